@@ -60,5 +60,7 @@ def test_one_that_cannot_be_loaded_is_named_with_the_place(
 
 def test_what_is_no_skill_is_refused(install: Install) -> None:
     install("wave_seven", "Wave = 3\n", Wave="Wave")
-    with pytest.raises(InputError, match=r'the entry point "Wave" \(wave_seven:Wave\) is not a subclass of'):
+    with pytest.raises(
+        InputError, match=r'the entry point "Wave" \(wave_seven:Wave\) is neither a subclass of Skill nor'
+    ):
         load_skills()

@@ -10,7 +10,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.perception.detectors.detector_registry import find_detector_kinds
-from executive.plugins import list_entries, load_cell_kind, load_skills
+from executive.plugins import list_entries, load_behaviour, load_cell_kind, load_skills
 
 Write = Callable[..., Path]
 Install = Callable[[str, str], None]
@@ -126,3 +126,84 @@ def test_this_repository_registers_nothing_twice(missions: Path, monkeypatch: py
     here = load_skills()
     monkeypatch.chdir("/")
     assert here == load_skills()
+
+
+NOD = """
+from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Success
+
+
+class Nod(Behaviour):
+    "Nod."
+
+    def __init__(self, name, times: int = 1):
+        super().__init__(name)
+
+    def update(self):
+        raise NotImplementedError
+
+
+class Shake(Nod):
+    "Shake."
+
+
+class Unfinished(Behaviour):
+    "Has no update."
+"""
+
+
+def test_a_behaviour_of_py_trees_is_registered_like_a_skill(project: Write) -> None:
+    project(
+        "hall_eight", NOD, skills='Agree = "hall_eight.part:Nod"\nCount = "py_trees.behaviours:TickCounter"'
+    )
+    skills = load_skills()
+    assert (skills["Agree"].__name__, list(skills["Agree"].params)) == ("Agree", ["times"])
+    assert list(skills["Count"].params) == ["duration", "completion_status"]
+
+
+def test_a_behaviour_that_cannot_be_registered_is_named(project: Write) -> None:
+    project("hall_nine", NOD, skills='Nod = "hall_nine.part:Unfinished"')
+    with pytest.raises(InputError) as caught:
+        load_skills()
+    assert str(caught.value).startswith(
+        'the behaviour "Nod" (hall_nine.part:Unfinished) is abstract: it has no '
+    )
+
+
+def test_a_mission_may_name_behaviours_of_py_trees_and_of_modules_that_register_a_skill(
+    project: Write,
+) -> None:
+    project("hall_ten", NOD, skills='Nod = "hall_ten.part:Nod"')
+    assert load_behaviour("hall_ten.part:Nod") is load_skills()["Nod"]
+    assert load_behaviour("hall_ten.part:Shake").__doc__ == "Shake."
+    assert load_behaviour("py_trees.timers:Timer").__name__ == "Timer"
+
+
+@pytest.mark.parametrize(
+    ("path", "problem"),
+    [
+        (
+            "TickCounter",
+            '"TickCounter" is no import path; write, for example, py_trees.behaviours:TickCounter',
+        ),
+        ("os:system", 'a mission may not import "os"; it may name classes of py_trees.behaviours and '),
+        ("hall_eleven.other:Nod", 'a mission may not import "hall_eleven.other"'),
+        ("hall_eleven:Nod", 'a mission may not import "hall_eleven"'),
+        ("py_trees.demos.action:Action", 'a mission may not import "py_trees.demos.action"'),
+        ("hall_eleven.part:Nodd", 'the module "hall_eleven.part" defines no class "Nodd"'),
+        ("hall_eleven.part:Success", 'the module "hall_eleven.part" defines no class "Success"'),
+        ("hall_eleven.part:Nod.update", 'the module "hall_eleven.part" defines no class "Nod.update"'),
+        ("py_trees.behaviours:success", '"py_trees.behaviours:success" is not a behaviour of py_trees'),
+        ("skills.grasp:Grasp", '"skills.grasp:Grasp" is not a behaviour of py_trees'),
+        (
+            "hall_eleven.part:Unfinished",
+            'the behaviour "Unfinished" (hall_eleven.part:Unfinished) is abstract',
+        ),
+    ],
+)
+def test_a_mission_may_name_nothing_else(project: Write, path: str, problem: str) -> None:
+    file = project("hall_eleven", NOD, skills='Nod = "hall_eleven.part:Nod"')
+    (file.parent / "hall_eleven" / "other.py").write_text("raise SystemExit('a mission executed code')")
+    with pytest.raises(InputError) as caught:
+        load_behaviour(path)
+    assert str(caught.value).startswith(problem)

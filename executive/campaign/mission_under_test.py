@@ -18,7 +18,7 @@ class MissionUnderTest:
 
     Attributes:
         loaded: The mission, checked together with its cell file.
-        skills: Installed skills by name.
+        skills: Installed skills, and behaviours of py_trees that the mission names, by name.
         make_cell: Function that makes the work cell; None: the function for the kind in the cell file.
         cell_description: Kind of the cell, and source of the detections, for reports.
         seed: Random seed; in a series of runs, the seed of the first run.
@@ -51,6 +51,7 @@ def load_mission_under_test(
     """
     skills = load_skills()
     loaded = load_mission(mission, skills, overrides, load_cell_kind)
+    skills |= loaded.behaviours
     kind = loaded.cell_config.kind
     if not has_oracle:
         return MissionUnderTest(loaded, skills, None, kind, seed)

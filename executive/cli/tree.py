@@ -69,7 +69,7 @@ def command(
             case "json":
                 output, as_json = json.loads(format_tree(nodes)), True
             case "btcpp":
-                output = format_btcpp(loaded.mission, skills)
+                output = format_btcpp(loaded.mission, {**skills, **loaded.behaviours})
             case _:
                 output = draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
     print_json(output) if as_json else click.echo(output)

@@ -38,7 +38,7 @@ def build_tree(
     Raises:
         InputError: A pattern matches no skill node.
     """
-    builder = TreeBuilder(skills, cell, blackboard, emit, substitutes or {})
+    builder = TreeBuilder({**skills, **loaded.behaviours}, cell, blackboard, emit, substitutes or {})
     root = builder.build_node(loaded.tree)
     paths = [node.path for node in root.iterate() if isinstance(node, SkillLeaf)]
     for pattern in builder.substitutes:

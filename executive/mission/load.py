@@ -49,6 +49,7 @@ class LoadedMission:
         unhandled_failures: Failures that can end the mission, because no node handles them.
         warnings: Findings that do not prevent a run.
         overrides: Values of `--set` as text, by name of a param or by `cell.<key>.<key>`.
+        behaviours: Behaviours of py_trees that the mission names, as skills, by the names of their classes.
     """
 
     mission: Mission
@@ -61,6 +62,7 @@ class LoadedMission:
     unhandled_failures: tuple[UnhandledFailure, ...] = ()
     warnings: tuple[Finding, ...] = ()
     overrides: Mapping[str, str] = field(default_factory=dict)
+    behaviours: Mapping[str, type[Skill]] = field(default_factory=dict)
 
     @property
     def params(self) -> dict[str, JsonValue]:
@@ -103,6 +105,7 @@ def load_mission(
     mission_path, node_classes = find_mission(path), load_control_nodes()
     files = read_mission(mission_path, overrides or {}, skills, node_classes, recorded_cell)
     mission, cell, findings = files.mission, files.cell, list(files.findings)
+    skills = {**skills, **files.behaviours}
     config = cell.config if cell else None
     cell_kind, classes_by_detector, min_times = None, {}, None
     if cell is not None and config is not None and find_cell_kind is not None:
@@ -131,7 +134,7 @@ def load_mission(
     return LoadedMission(
         mission, tree, config, files.source.text, mission_path, cell.path, files.libraries,
         find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
-        dict(overrides or {}),
+        dict(overrides or {}), files.behaviours,
     )  # fmt: skip
 
 

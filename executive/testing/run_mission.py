@@ -123,7 +123,7 @@ def run_mission(
     assert isinstance(workcell, FaultyCell)
     try:
         workcell.check_patterns([getattr(node, "path", node.name) for node in run.root.iterate()])
-        _check_substitutes(run, skills)
+        _check_substitutes(run, {**skills, **loaded.behaviours})
         run.add_observer(workcell.on_event)
         for visitor in visitors:
             run.behaviour_tree.add_visitor(visitor)

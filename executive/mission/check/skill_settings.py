@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from executive.mission.check.context import CheckContext
 from executive.mission.check.variables import list_skills_with_output
 from executive.mission.descriptions import describe_value
-from executive.mission.findings import Finding, make_error, suggest_choice, suggest_word
+from executive.mission.findings import Finding, make_error, make_warning, suggest_choice, suggest_word
 from executive.mission.model.conversion import WrongType, convert_value, find_input_problem
 from executive.mission.model.nodes import SkillNode
 from executive.mission.model.values import Literal, Reference
@@ -59,6 +59,17 @@ def _check_reference(
     elif not declaration.is_name or reference.name not in context.written_variables:
         message = f"{name} must be a constant, but ${reference.name} is neither a param nor an argument"
         yield make_error(reference.span, "unknown-param", message, context.make_unknown_param_hint(reference))
+
+
+def find_unreplayable_skills(context: CheckContext) -> Iterator[Finding]:
+    """Yield a warning for every skill that may read the world without the cell, unrecorded."""
+    for node, skill in context.iterate_installed_skills():
+        if not skill.is_replayable:
+            message = f"{node.skill} may read the world by itself, and a run does not record what it reads"
+            hint = (
+                "A replay or a resumed run executes it again. If it reads nothing, set is_replayable = True."
+            )
+            yield make_warning(node.span, "not-recorded", message, hint)
 
 
 def _check_value(

@@ -44,6 +44,17 @@ USE_SIBLINGS: GrammarKeys = {
 }
 """Keys at the level of `use`."""
 
+BEHAVIOUR_KEYWORD = "PyTree"
+"""Keyword of a node that runs a behaviour of py_trees."""
+
+BEHAVIOUR_CLASS = "class"
+"""Key below `PyTree` for the import path of the behaviour; all other keys are its arguments and ports."""
+
+BEHAVIOUR_KEYS: GrammarKeys = {
+    BEHAVIOUR_CLASS: GrammarKey("text", "Import path of the behaviour: `module:Class`.", is_required=True),
+}
+"""The keys below `PyTree` that every behaviour has."""
+
 KEYWORD_HINTS: Mapping[str, str] = {
     "then": "Write nodes that run in sequence as a list.",
     "do": 'Only control nodes have the key "do"; write the node without "do".',

@@ -6,9 +6,11 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 
+from executive.errors import InputError
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model import grammar
 from executive.mission.model.nodes import InnerNode, InvalidNode, Node, SkillNode, SubtreeNode
+from executive.mission.model.values import Literal
 from executive.mission.parse.control_node_parser import (
     find_inner_keys,
     find_sibling_keys,
@@ -25,6 +27,7 @@ from executive.mission.text.yaml_text import (
     YamlSequence,
     describe_node,
 )
+from executive.plugins import load_behaviour
 from executive.skill import Skill
 from executive.tree.node_registry import ControlNodes
 
@@ -35,15 +38,22 @@ _SKILL_PATTERN = re.compile(r"[A-Z][A-Za-z0-9]*")
 
 
 class NodeParser:
-    """Parser of nodes, which adds errors to `findings` and returns `InvalidNode`s for invalid YAML nodes."""
+    """Parser of nodes, which adds errors to `findings` and returns `InvalidNode`s for invalid YAML nodes.
+
+    Attributes:
+        behaviours: Behaviours of py_trees that the nodes name, as skills, by the names of their classes.
+    """
 
     def __init__(self, findings: list[Finding], skills: Skills, node_classes: ControlNodes) -> None:
         self.findings, self._skills, self._node_classes = findings, skills, node_classes
-        self._keywords = [*node_classes, grammar.USE_KEYWORD]
+        self.behaviours: dict[str, type[Skill]] = {}
+        self._keywords = [*node_classes, grammar.USE_KEYWORD, grammar.BEHAVIOUR_KEYWORD]
 
     def make_silent_parser(self) -> NodeParser:
         """Return a parser whose errors are discarded."""
-        return NodeParser([], self._skills, self._node_classes)
+        parser = NodeParser([], self._skills, self._node_classes)
+        parser.behaviours = self.behaviours
+        return parser
 
     def read_node(self, node: YamlNode | None, span: Span) -> Node:
         """Return the mission node for a YAML node; for a missing or empty node, an invalid node at `span`."""
@@ -84,10 +94,10 @@ class NodeParser:
         node_class = self._node_classes.get(word)
         if node_class is not None and has_optional_body(node_class):
             return InnerNode(node.span, "", node_class, {})
-        if isinstance(node.value, str) and _SKILL_PATTERN.fullmatch(word):
-            return SkillNode(node.span, "", word, {})
         if word in self._keywords:
             self.add_error(node.span, "missing-node", f'"{word}" needs a body: write {word}: ...')
+        elif isinstance(node.value, str) and _SKILL_PATTERN.fullmatch(word):
+            return SkillNode(node.span, "", word, {})
         else:
             self._add_keyword_error(node.span, word)
         return InvalidNode(node.span, "")
@@ -136,6 +146,8 @@ class NodeParser:
         name = entry.key.text
         if name == grammar.USE_KEYWORD:
             return self._read_use(node, entry, label)
+        if name == grammar.BEHAVIOUR_KEYWORD:
+            return self._read_behaviour(entry, label)
         if name in self._node_classes:
             return read_control_node(self, node, entry, label, self._node_classes[name])
         params = self._skills[name].params if name in self._skills else {}
@@ -152,6 +164,32 @@ class NodeParser:
             return InvalidNode(entry.key.span, "")
         arguments, returns = settings.get("with", {}), settings.get("returns", {})
         return SubtreeNode(entry.value.span, label, entry.value.text, arguments, returns)
+
+    def _read_behaviour(self, entry: YamlEntry, label: str) -> Node:
+        """Return the skill node for a behaviour, or an invalid node if a mission cannot use the behaviour."""
+        keyword, class_key, span = entry.key.text, grammar.BEHAVIOUR_CLASS, entry.key.span
+        settings = read_settings(entry.value, keyword, self.findings, class_key)
+        path = settings.pop(class_key).value if class_key in settings else None
+        if isinstance(path, Literal) and isinstance(path.value, str):
+            try:
+                skill = load_behaviour(path.value)
+            except InputError as error:
+                self.add_error(path.span, "unknown-behaviour", str(error))
+                return InvalidNode(span, label)
+            name = skill.__name__
+            if {**self._skills, **self.behaviours}.get(name, skill) is skill:
+                self.behaviours[name] = skill
+                return SkillNode(span, label, name, settings)
+            message = f'there is another skill "{name}"; register this class as a skill under another name'
+            self.add_error(path.span, "unknown-behaviour", message)
+        elif path is not None:
+            message = (
+                f"{keyword}.{class_key} must be an import path, for example py_trees.behaviours:TickCounter"
+            )
+            self.add_error(path.span, "wrong-type", message)
+        elif is_empty(entry.value) or isinstance(entry.value, YamlMapping):
+            self.add_error(span, "missing-key", f'{keyword} needs the key "{class_key}"')
+        return InvalidNode(span, label)
 
     def _read_label(self, node: YamlMapping) -> str:
         value = node.get("as")

@@ -27,6 +27,7 @@ class MissionFiles:
         source: Text of the mission file.
         mission: Content of the mission file and the subtrees of its libraries.
         libraries: Text of each library file by its path as written in the mission.
+        behaviours: Behaviours of py_trees that the files name, as skills, by the names of their classes.
         cell: Content of the cell file, or None if the file cannot be read.
         findings: Errors of the parsers.
     """
@@ -34,6 +35,7 @@ class MissionFiles:
     source: Source
     mission: Mission
     libraries: Mapping[str, str]
+    behaviours: Skills
     cell: CellFile | None
     findings: tuple[Finding, ...]
 
@@ -68,7 +70,7 @@ def read_mission(
             findings += cell.findings
         except InputError as error:
             parser.add_error(mission.cell.span, "no-cell", str(error))
-    return MissionFiles(source, mission, libraries, cell, tuple(findings))
+    return MissionFiles(source, mission, libraries, parser.behaviours, cell, tuple(findings))
 
 
 def _add_library(

@@ -57,6 +57,7 @@ def _make_file_schema(title: str, keys: GrammarKeys, skills: Skills, node_classe
             **{name: make_settings_schema(name, skill) for name, skill in skills.items()},
             **control_nodes,
             grammar.USE_KEYWORD: use,
+            grammar.BEHAVIOUR_KEYWORD: _make_behaviour_schema(),
         },
     }
 
@@ -68,7 +69,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     complete valid keys in `dependencies`, but not in alternatives.
     """
     label: Schema = {**_make_reference("label"), "description": grammar.LABEL_KEY.doc}
-    names = [*skills, *node_classes, grammar.USE_KEYWORD]
+    names = [*skills, *node_classes, grammar.USE_KEYWORD, grammar.BEHAVIOUR_KEYWORD]
     nodes_without_body = [
         {"const": word, "title": word, "description": _get_first_line(node_class), **NO_ITEM_SUGGESTION}
         for word, node_class in node_classes.items()
@@ -119,6 +120,13 @@ def _make_control_node_schema(node_class: type[ControlNode]) -> Schema:
     return {"title": node_class.keyword, "description": _get_first_line(node_class), **value}
 
 
+def _make_behaviour_schema() -> Schema:
+    """Return the schema of the mapping under `PyTree`: its arguments and ports depend on the behaviour."""
+    title = grammar.BEHAVIOUR_KEYWORD
+    mapping = {**_make_mapping_schema(grammar.BEHAVIOUR_KEYS), "additionalProperties": True}
+    return {"title": title, "description": "A behaviour of py_trees.", **mapping}
+
+
 def _get_first_line(node_class: type[ControlNode]) -> str:
     return (inspect.getdoc(node_class) or "").partition("\n")[0]
 
@@ -164,6 +172,7 @@ def _make_reasons_schema(skills: Skills) -> Schema:
     skill_reasons = [f"{name}.{reason}" for name, skill in skills.items() for reason in skill.reasons]
     reason = [
         {"title": "Skill.reason", "enum": skill_reasons},
+        {"title": "Behaviour.failed", "type": "string", "pattern": r"^[A-Za-z_]\w*\.failed$"},
         {"title": "label.reason", "type": "string", "pattern": rf"^{grammar.LABEL_PATTERN}\.{_NAME}$"},
     ]
     reasons = {"title": "list", "type": "array", "items": {"anyOf": reason}, "minItems": 1}

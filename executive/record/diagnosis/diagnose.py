@@ -64,7 +64,7 @@ def diagnose(
         return None
     run = FailedRun(loaded, timeline, end)
     arm_state = _describe_arm(is_at_rest) if end.status == "FAULT" else "at rest"
-    readings = list(_list_deciding_readings(run, skills))
+    readings = list(_list_deciding_readings(run, {**skills, **loaded.behaviours}))
     journal = RunDirectory(run_folder).journal
     has_journal = journal.exists() and journal.stat().st_size > 0
     items = timeline.items.find_items_in_states("seen", "dropped", "held")

@@ -1,0 +1,172 @@
+"""Skill that runs a behaviour of py_trees."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from enum import Enum
+from functools import cache
+from typing import Any, ClassVar, Optional, cast
+
+from py_trees.behaviour import Behaviour
+from py_trees.behaviours import ProbabilisticBehaviour
+from py_trees.common import Status
+from py_trees.ports import PortInformation, PortsMixin
+
+from executive.behaviours.arguments import ConstructorArgument, find_mission_type, list_arguments, to_argument
+from executive.behaviours.run_blackboard import RunBlackboard
+from executive.cell.protocols import Cell, Steps
+from executive.errors import Fault, InputError
+from executive.skill import Direction, Param, Port, Skill, get_attribute_name, param
+
+NAME_ARGUMENT = "name"
+"""Argument of constructors for the name of the behaviour, which missions do not set."""
+_REPLAYABLE_MODULE = "py_trees.behaviours"
+"""Module whose behaviours read nothing but their arguments and the blackboard, except random numbers."""
+
+
+class BehaviourSkill(Skill):
+    """Base class of skills that run a behaviour; `make_behaviour_skill` returns a subclass.
+
+    Each start creates the behaviour, connects its ports, and calls its `setup`. Each control step ticks the
+    behaviour once. A halt calls `stop(INVALID)`. After every end, `shutdown` is called.
+
+    Attributes:
+        behaviour_type: Class of the behaviour.
+        arguments: Arguments of its constructor by name.
+    """
+
+    behaviour_type: ClassVar[type[Behaviour]]
+    arguments: ClassVar[Mapping[str, ConstructorArgument]]
+    reasons: ClassVar = ("failed",)
+
+    def __init__(self, **values: Any) -> None:
+        super().__init__(**values)
+        self._values = values
+
+    def run(self, cell: Cell) -> Steps:
+        """Tick a new instance of the behaviour until it ends; its feedback message explains a failure."""
+        blackboard = RunBlackboard(cell.clock)
+        with blackboard:
+            behaviour = self.behaviour_type(**self._make_arguments())
+        keys = {port: f"/{behaviour.id.hex}/{port}" for port in self.ports}
+        try:
+            with blackboard:
+                if isinstance(behaviour, PortsMixin):
+                    behaviour.setup_ports(keys)
+                    blackboard.storage.update(self._list_inputs(keys))
+                behaviour.setup_with_descendants()
+                behaviour.tick_once()
+            while behaviour.status is Status.RUNNING:
+                yield
+                with blackboard:
+                    behaviour.tick_once()
+            status = behaviour.status
+        finally:
+            with blackboard:
+                _end(behaviour)
+            values = {port: blackboard.storage.pop(key, None) for port, key in keys.items()}
+        if status is Status.FAILURE:
+            raise self.failure("failed", _explain_failure(behaviour))
+        if status is not Status.SUCCESS:
+            raise Fault("its status is INVALID after a tick; update() must return a status")
+        for name, port in self.ports.items():
+            # A required output without a value stays unset, which is a fault of the skill.
+            if port.direction is Direction.OUT and (values[name] is not None or port.default is None):
+                setattr(self, get_attribute_name(name), values[name])
+
+    def _make_arguments(self) -> dict[str, Any]:
+        values = {name: self._values[name] for name in self.params if name in self._values}
+        name = {NAME_ARGUMENT: type(self).__name__} if NAME_ARGUMENT in self.arguments else {}
+        return name | {name: to_argument(value, self.arguments[name].hint) for name, value in values.items()}
+
+    def _list_inputs(self, keys: Mapping[str, str]) -> Iterator[tuple[str, object]]:
+        """Yield the key on the blackboard and the value of each input that has a value other than None."""
+        for name in keys:
+            if (value := self._values.get(name)) is not None:
+                # py_trees accepts no integer where a float is declared.
+                is_float = self.ports[name].type is float and type(value) is int
+                yield keys[name], float(value) if is_float else value
+
+
+@cache
+def make_behaviour_skill(name: str, behaviour_type: type[Behaviour]) -> type[BehaviourSkill]:
+    """Return the skill `name` that runs a behaviour: its arguments are params, its ports are ports.
+
+    Raises:
+        InputError: A mission cannot use the behaviour; the message is the predicate of a sentence.
+    """
+    port_tables = ("INPUT_PORTS", "OUTPUT_PORTS") if issubclass(behaviour_type, PortsMixin) else ()
+    if inspect.isabstract(behaviour_type) or not all(hasattr(behaviour_type, table) for table in port_tables):
+        raise InputError("is abstract: it has no method update, or does not declare its ports")
+    ports = {
+        port: _make_port(port, direction, declared)
+        for direction, table in zip(Direction, port_tables, strict=False)
+        for port, declared in getattr(behaviour_type, table).items()
+    }
+    arguments = list_arguments(behaviour_type)
+    params = dict(_make_params(arguments))
+    for each in (*params, *ports):
+        if hasattr(Skill, each) or (each in params and each in ports):
+            raise InputError(f'has an argument or port with the reserved name "{each}"; rename it')
+    is_known = (
+        behaviour_type.__module__ == _REPLAYABLE_MODULE and behaviour_type is not ProbabilisticBehaviour
+    )
+    is_replayable = getattr(behaviour_type, "is_replayable", is_known)
+    members = {
+        "__doc__": inspect.getdoc(behaviour_type), "__module__": behaviour_type.__module__,
+        "behaviour_type": behaviour_type, "arguments": arguments, "params": params, "ports": ports,
+        "is_condition": getattr(behaviour_type, "is_condition", False),
+        "is_replayable": is_replayable, "senses": not is_replayable,
+    }  # fmt: skip
+    return cast("type[BehaviourSkill]", type(name, (BehaviourSkill,), members))
+
+
+def _make_params(arguments: Mapping[str, ConstructorArgument]) -> Iterator[tuple[str, Param]]:
+    """Yield name and declaration of the param for each argument that a mission can set."""
+    for name, argument in arguments.items():
+        mission_type, default = find_mission_type(argument.hint), argument.default
+        if name != NAME_ARGUMENT and mission_type is not None:
+            # A default is only shown to authors, as a plain value: the constructor knows its defaults.
+            default = default.name if isinstance(default, Enum) else default
+            default = default if default is ... or isinstance(default, str | int | float) else None
+            yield name, replace(param(default, doc=argument.doc), name=name, type=mission_type)
+        elif name != NAME_ARGUMENT and default is ...:
+            raise InputError(
+                f'needs the argument "{name}", and no mission can contain a value of its type; '
+                "register a subclass whose constructor sets it"
+            )
+
+
+def _make_port(name: str, direction: Direction, declared: PortInformation) -> Port:
+    """Return the port for a declaration of py_trees; a port without a value has the value None."""
+    default: object = ... if declared.required else None
+    if direction is Direction.IN and declared.has_default:
+        default = declared.default_value
+    port_type = Optional[declared.data_type] if default is None else declared.data_type  # noqa: UP045
+    return Port(name, port_type, direction, default, "", declared.description)
+
+
+def _explain_failure(behaviour: Behaviour) -> str:
+    """Return the feedback message of a failed behaviour, or of the node below that failed, with its name."""
+    failed_node = behaviour.tip()
+    if behaviour.feedback_message or failed_node in (None, behaviour):
+        return behaviour.feedback_message or "it has no feedback message"
+    return f"{failed_node.name}: {failed_node.feedback_message or 'no feedback message'}"
+
+
+def _end(behaviour: Behaviour) -> None:
+    """Stop the running nodes of a behaviour, also after an exception of a node; then shut all nodes down."""
+    errors = []
+    for node in (behaviour, *behaviour.iterate()):
+        if node.status is Status.RUNNING:
+            try:
+                node.stop(Status.INVALID)
+            except Exception as error:
+                node.status = Status.INVALID
+                errors.append(error)
+    for node in behaviour.iterate():
+        node.shutdown()
+    if errors:
+        raise errors[0]
