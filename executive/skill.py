@@ -234,6 +234,11 @@ class Skill:
         raise NotImplementedError
 
     @classmethod
+    def is_instantaneous(cls) -> bool:
+        """Return True if `run` is declared to return None, so that the skill ends in its first tick."""
+        return cls.is_condition or cls.run.__annotations__.get("return", "") in ("None", None)
+
+    @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
         """Return the minimum time until success [s]; by default, the value of the param named in `waits`.
 

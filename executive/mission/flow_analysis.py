@@ -9,7 +9,7 @@ from executive.mission.findings import find_similar_word
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.wiring import find_wires
-from executive.skill import Direction, Skill
+from executive.skill import HOLDING, Direction, Skill
 from executive.tree.flow import (
     INITIAL_STATE,
     UNKNOWN_NAME,
@@ -89,14 +89,7 @@ class FlowAnalysis:
             return make_unknown_flow(node.skill, node.path)
         precondition, postcondition = skill.tool_state
         if skill.is_condition:
-            failure_states = skill.tool_state_after_failure
-            failures = {
-                PossibleFailure(node.skill, reason, node.path): state.apply_failure(
-                    failure_states.get(reason), node.path
-                )
-                for reason in skill.reasons
-            }
-            return Flow(state.apply_observation(postcondition, node.path), failures, None)
+            return self._compute_condition_flow(node, skill, state)
         state = state.apply_precondition(precondition, node.path)
         outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
         final_state = state.with_arm_moved() if skill.moves else state
@@ -106,7 +99,17 @@ class FlowAnalysis:
             for key in (*skill.reasons, HALT_KEY)
         }
         failures = {PossibleFailure(node.skill, key, node.path): end_states[key] for key in skill.reasons}
-        return Flow(success, failures, end_states[HALT_KEY])
+        return Flow(success, failures, None if skill.is_instantaneous() else end_states[HALT_KEY])
+
+    def _compute_condition_flow(self, node: SkillNode, skill: type[Skill], state: FlowState) -> Flow:
+        # A condition does not fill the tool: after its failure, a tool that was empty is still empty.
+        may_be_holding = state.tool_states is None or state.find_tool_state(HOLDING) is not None
+        left_states = skill.tool_state_after_failure if may_be_holding else {}
+        failures = {
+            PossibleFailure(node.skill, key, node.path): state.apply_failure(left_states.get(key), node.path)
+            for key in skill.reasons
+        }
+        return Flow(state.apply_observation(skill.tool_state[1], node.path), failures, None)
 
     def _compute_subtree_flow(self, node: SubtreeNode, body: Node, state: FlowState) -> Flow:
         flow = self._analyse(body, state)

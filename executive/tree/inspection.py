@@ -20,14 +20,15 @@ class NodeFinding:
     """A mistake in the mission that a control node finds.
 
     Attributes:
-        place: Place of the mistake: a key of the node, or a reason under a key; "" for the node itself.
+        place: Place of the mistake: a key of the node, a reason under a key, or a child; "" for the node
+            itself.
         code: Code of the finding, such as `short-timeout`.
         message: Description of the mistake, one sentence.
         hint: Description of a remedy, or "".
         is_warning: True if the mission can run nevertheless.
     """
 
-    place: str | Reason
+    place: str | Reason | Child
     code: str
     message: str
     hint: str = ""

@@ -83,6 +83,7 @@ class Key:
         is_in_path: True if the paths of the nodes under the key contain the key.
         raising_key: For a list of reasons: key with the nodes that may fail with the reasons.
         list_key: For a loop variable: key of the list of its values; otherwise "".
+        takes_conditions: True if each node under the key must be a condition.
         name: Name of the key in the mission file.
         attribute: Name of the attribute in the class.
         kind: Kind of the value.
@@ -100,6 +101,7 @@ class Key:
     is_in_path: bool = True
     raising_key: str = "do"
     list_key: str = ""
+    takes_conditions: bool = False
     name: str = ""
     attribute: str = ""
     kind: KeyKind = KeyKind.CONSTANT
@@ -133,12 +135,14 @@ def key(
     in_path: bool = True,
     raising_key: str = "do",
     list_key: str = "",
+    conditions: bool = False,
 ) -> Any:
     """Declare a key in the body of a class; the arguments set attributes of `Key`, such as `is_shorthand`.
 
     The name of the key is the name of the attribute, without a trailing underscore.
     """
-    return Key(doc, default, ge, gt, max_key, max_count, shorthand, sibling, in_path, raising_key, list_key)
+    flags = shorthand, sibling, in_path
+    return Key(doc, default, ge, gt, max_key, max_count, *flags, raising_key, list_key, conditions)
 
 
 class KeyOwner:

@@ -105,6 +105,7 @@ class ControlNode(KeyOwner, TreeNode):
         shape: Shape of the node in Graphviz drawings.
         remedy: Advice to let this node handle a failure: `add a retry around`; the name of the failing node
             follows. "" if this node handles no failures.
+        is_condition: True if the node is a condition, because its children must be conditions.
         keyword_hints: Hints for authors, by the wrong keyword that an author writes instead of `keyword`.
         clock: Clock of the run.
         list_open_items: Function that returns the names of the items that still have to be sorted.
@@ -115,6 +116,7 @@ class ControlNode(KeyOwner, TreeNode):
     symbol: ClassVar[str] = "◇"
     shape: ClassVar[str] = "ellipse"
     remedy: ClassVar[str] = ""
+    is_condition: ClassVar[bool] = False
     keyword_hints: ClassVar[Mapping[str, str]] = {}
 
     def __init__(self, context: NodeContext, **values: object) -> None:

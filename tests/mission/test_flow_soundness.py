@@ -138,9 +138,35 @@ class Pause(Chance):
     """Do nothing for a while; it cannot fail."""
 
 
-SKILLS: dict[str, type[Skill]] = {skill.__name__: skill for skill in (Look, Choose, Take, Carry, Put, Pause)}
+class Holds(Skill):
+    """Ask the tool."""
+
+    is_condition: ClassVar = True
+    reasons: ClassVar = ("empty",)
+    tool_state: ClassVar = (ANY, HOLDING)
+    tool_state_after_failure: ClassVar = {"empty": ANY}
+
+    def run(self, cell: Any) -> None:
+        if not cell.holding:
+            raise self.failure("empty", "the tool says so")
+
+
+class Coin(Skill):
+    """Toss a coin."""
+
+    is_condition: ClassVar = True
+    reasons: ClassVar = ("tails",)
+
+    def run(self, cell: Any) -> None:
+        if cell.dice.random() < 0.2:
+            raise self.failure("tails", "the coin says so")
+
+
+SKILLS: dict[str, type[Skill]] = {
+    skill.__name__: skill for skill in (Look, Choose, Take, Carry, Put, Pause, Holds, Coin)
+}
 REASONS = [f"{name}.{reason}" for name, skill in SKILLS.items() for reason in skill.reasons]
-REASONS += ["timeout.timeout", "invert.inverted"]
+REASONS += ["timeout.timeout", "invert.inverted", "guard.broken", "not.inverted"]
 
 reasons = st.lists(st.sampled_from(REASONS), min_size=1, max_size=3, unique=True)
 leaves = st.sampled_from(
@@ -149,6 +175,18 @@ leaves = st.sampled_from(
 routine = st.just(
     ["Look", "Choose", "Take", {"try": ["Carry", "Put"], "catch": [{"on": ["Carry.blocked"], "do": "Put"}]}]
 )
+
+
+def combined(condition: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
+    lists = st.lists(condition, min_size=1, max_size=3)
+    return st.one_of(
+        st.builds(lambda nodes: {"all": nodes}, lists),
+        st.builds(lambda nodes: {"any": nodes}, lists),
+        st.builds(lambda node: {"not": node}, condition),
+    )
+
+
+conditions = st.recursive(st.sampled_from(["Holds", "Coin"]), combined, max_leaves=3)
 
 
 def bodies(node: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
@@ -184,6 +222,8 @@ def bodies(node: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
         st.builds(lambda do, catch, end: {"try": do, "catch": catch, "finally": end}, node, catches, node),
         st.builds(lambda do, end: {"try": do, "finally": end}, node, node),
         st.builds(lambda s, do: {"timeout": {"seconds": s, "do": do}}, st.integers(1, 5), node),
+        st.builds(lambda holds, do: {"guard": {"holds": holds, "do": do}}, conditions, node),
+        conditions,
         st.builds(lambda do: {"invert": do}, node),
         st.builds(lambda do: {"succeed": do}, node),
     )  # fmt: skip

@@ -112,6 +112,7 @@ tree:
   - retry: {attempts: 2, backoff: 1, do: Look}
   - repeat: {times: 3, until: [Look.unsure, first.hidden], do: Look}
   - while: {condition: Look, do: Pick}
+  - guard: {holds: {all: [Look, {any: [Look, {not: Look}]}]}, do: Pick}
   - for_each: {each: name, in: $names, do: Pick}
   - for_each: {each: name, in: [a, b], do: Pick}
   - try: Pick

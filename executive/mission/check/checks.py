@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 
 from executive.mission.check import (
+    conditions,
     connection_types,
     control_nodes,
     parallel_branches,
@@ -26,6 +27,7 @@ CHECKS: tuple[Check, ...] = (
     skill_settings.check_settings,
     skill_settings.find_unreplayable_skills,
     control_nodes.check_constants,
+    conditions.find_non_conditions,
     reasons.check_labels,
     skill_settings.check_routes,
     quota_routes.check_quotas,

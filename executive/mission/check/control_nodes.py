@@ -90,6 +90,8 @@ def _locate_finding(node: InnerNode, node_finding: NodeFinding) -> Finding:
     span, message = node.span, node_finding.message
     if isinstance(node_finding.place, FailureName):
         span = node_finding.place.span
+    elif isinstance(node_finding.place, Child):
+        span = get_mission_node(node_finding.place).span
     elif isinstance(value := node.values.get(str(node_finding.place)), Literal):
         span, message = value.span, message + value.origin_note
     make_finding = make_warning if node_finding.is_warning else make_error

@@ -1,0 +1,53 @@
+"""Check of the nodes that must be conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from executive.mission.check.context import CheckContext
+from executive.mission.findings import Finding, make_error
+from executive.mission.model.node_paths import get_type_name
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode, iterate_keys, list_nodes
+from executive.skill import Direction, Skill
+
+
+def find_non_conditions(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every node that is no condition, under a key that takes only conditions."""
+    for parent in context.iterate_control_nodes():
+        for key, value in iterate_keys(parent):
+            for node in list_nodes(value) if key.takes_conditions else ():
+                if problem := _find_problem(context, node):
+                    message = f"{problem}, but {get_type_name(parent)}.{key.name} needs a condition"
+                    yield make_error(node.span, "no-condition", message, _make_hint(context))
+
+
+def _find_problem(context: CheckContext, node: Node) -> str:
+    """Return the beginning of a message about a node that is no condition; "" for a condition."""
+    match node:
+        case SubtreeNode(body=Node() as body):
+            problem = _find_problem(context, body)
+            return problem and f'in the subtree "{node.name}", {problem}'
+        case SkillNode() if node.skill in context.skills:
+            skill = context.skills[node.skill]
+            return "" if skill.is_condition else f"{node.skill} {_describe_effect(skill)}"
+        case InnerNode() if not node.declaring_class.is_condition:
+            return "a list is a sequence" if node.is_list else f"{get_type_name(node)} is no condition"
+    return ""
+
+
+def _describe_effect(skill: type[Skill]) -> str:
+    """Return the reason why a skill is no condition, as the predicate of a sentence."""
+    if skill.moves:
+        return "moves the arm"
+    if outputs := [name for name, port in skill.ports.items() if port.direction is Direction.OUT]:
+        return f"writes ${outputs[0]}"
+    if skill.uses:
+        return f"uses the {skill.uses[0]}"
+    return f"takes time ({skill.waits})" if skill.waits else "does not declare that it changes nothing"
+
+
+def _make_hint(context: CheckContext) -> str:
+    """Return a hint with all conditions and the control nodes that combine conditions."""
+    conditions = [name for name, skill in context.skills.items() if skill.is_condition]
+    combining = [word for word, node_class in context.node_classes.items() if node_class.is_condition]
+    return f"Conditions: {', '.join(conditions)}; they are combined by {', '.join(combining)}."

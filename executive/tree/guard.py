@@ -1,0 +1,91 @@
+"""Control node that runs its body while a condition holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from py_trees.common import Status
+
+from executive.errors import Fault
+from executive.tree.event_gate import EventGate
+from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
+from executive.tree.inspection import MinTimeFunction, NodeAnalysis, NodeFinding, PropagatedFailure
+from executive.tree.keys import Child, key
+from executive.tree.node import ControlNode, NodeContext
+
+
+class Guard(ControlNode):
+    """Run the body while a condition holds; when the condition fails, halt the body and fail with `broken`.
+
+    Every tick checks the condition before it ticks the body. If the condition fails at the first tick, the
+    body does not start. The guard otherwise ends as its body.
+    """
+
+    keyword = "guard"
+    reasons = ("broken",)
+    symbol = "◉"
+
+    holds: Child = key(conditions=True, doc="Condition that must succeed at every tick.")
+    do: Child = key(doc="Body.")
+
+    def __init__(self, context: NodeContext, **values: object) -> None:
+        super().__init__(context, **values)
+        self._gate = EventGate(self.holds, context.emit)
+
+    def start(self) -> None:
+        """Let the events of the first check pass."""
+        self._gate.forget()
+
+    def step(self) -> Status:
+        """Check the condition, then tick the body.
+
+        Raises:
+            Fault: The condition did not decide within the tick.
+        """
+        status = self._gate.tick(self.tick_child)
+        if status is Status.RUNNING:
+            raise Fault(f"{self.holds.name} is a condition, but it did not decide within one tick", self.path)
+        if status is Status.FAILURE:
+            self.halt_children([self.do])
+            cause = self.get_failure(self.holds)
+            return self.fail_with_reason("broken", f"{cause}: {cause.message}")
+        status = self.tick_child(self.do)
+        return self.fail(self.get_failure(self.do)) if status is Status.FAILURE else status
+
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
+        """Return the outcomes of the body, and `broken` in all states in which a check may fail."""
+        first_check = get_flow(self.holds, state)
+        body = get_flow(self.do, first_check.success) if first_check.success else Flow(None, {}, None)
+        ends = [*first_check.failures.values()]
+        if body.halted is not None:
+            ends += get_flow(self.holds, body.halted).failures.values()
+        failures = dict(body.failures)
+        if (broken_state := join_states(ends)) is not None:
+            failures[PossibleFailure(self.keyword, "broken", self.path)] = broken_state
+        return Flow(body.success, failures, body.halted)
+
+    def min_time(self, get_min_time: MinTimeFunction) -> float:
+        """Return the minimum time of the body [s]."""
+        return get_min_time(self.do)
+
+    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+        """Yield an error if the body can never run, and a warning if the guard can never stop the body."""
+        condition, body = analysis.get_flow(self.holds), analysis.get_flow(self.do)
+        if condition is None:
+            return
+        name = analysis.get_name(self.holds)
+        if body is None:
+            message = f"{name} cannot succeed here, so the body of this guard never runs"
+            yield NodeFinding(self.holds, "never-holds", message)
+        elif not condition.failures:
+            message = f"{name} cannot fail here, so this guard never stops its body"
+            yield NodeFinding(self.holds, "useless-guard", message, is_warning=True)
+        elif body.halted is None:
+            message = f"this guard cannot stop its body: {analysis.get_name(self.do)} ends in its first tick"
+            hint = "Write a list with the condition and the body."
+            yield NodeFinding(self.do, "useless-guard", message, hint, is_warning=True)
+
+    def explain(self, failure: PropagatedFailure) -> str:
+        """Return a text for a failure of the body: the condition did not fail."""
+        del failure
+        return "handles no failures; its condition still held"
