@@ -39,6 +39,7 @@ Out = Annotated[T, Direction.OUT]
 Seconds = Annotated[float, "s"]
 Metres = Annotated[float, "m"]
 MetresPerSecond = Annotated[float, "m/s"]
+Newtons = Annotated[float, "N"]
 
 
 class ToolState(Enum):

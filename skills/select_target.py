@@ -7,8 +7,7 @@ from typing import ClassVar
 
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
-from executive.manipulation.obstacles import predict_object_count
-from executive.manipulation.tool_goals import list_free_bins, sort_pickable_targets
+from executive.manipulation.tool_goals import choose_bin, list_free_bins, sort_pickable_targets
 from executive.perception.evidence import describe_unknown_labels
 from executive.skill import In, Out, Skill, SkillFailed, param, port
 
@@ -51,12 +50,10 @@ class SelectTarget(Skill):
             message = f"{best.item} is deferred, and not enough looks agree on {names} yet; look again"
             raise self.failure("doubtful", message)
         self.target, self.item = best, best.item
-        label = cell.ledger.get_label(best.item)
-        self.bin = min(
-            list_free_bins(cell, label),
-            key=lambda bin: (not cell.quotas.is_limited(bin, label), predict_object_count(cell, bin)),
-        )
-        cell.report_selection(best, self.bin)
+        bin = choose_bin(cell, cell.ledger.get_label(best.item))
+        assert bin is not None, "every candidate has a free bin"
+        self.bin = bin
+        cell.report_selection(best, bin)
 
     def _rank(self, cell: Cell, target: Target) -> tuple[float | str, ...]:
         """Return the sort key of a candidate; the smallest key comes first."""

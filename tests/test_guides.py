@@ -8,14 +8,13 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import at_hand
 import jsonschema
 import mission_reference
-import numpy as np
 import pytest
 from click.testing import CliRunner
 from guide_blocks import GUIDES, ROOT, TUTORIAL, blocks, files, read, shown, transcripts
 
-from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.scene_file import (
     load_scene,
@@ -23,6 +22,7 @@ from executive.cells.sim.scene_file import (
 from executive.cli.main import main
 from executive.events import Event
 from executive.exit_codes import ExitCode
+from executive.geometry import GRAVITY
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.parse.cell_file import load_cell
@@ -176,13 +176,23 @@ def test_the_guides_show_missions_and_skills() -> None:
 
 
 def test_the_skill_to_copy_works(fake: FakeCell, tmp_path: Path) -> None:
-    (text,) = (block.text for block in shown("python") if "class PointAt" in block.text)
-    skill = module_of(text, tmp_path / "point_at.py").PointAt
-    target = Target("cube-1", "cube", np.array([0.5, 0.1, 0.025]), 0.9, 1, 0, 0.0)
-    assert run_skill(skill(target=target, height=0.03), fake).status == "SUCCESS"
-    assert fake.arm.tool_pose.position == pytest.approx([0.5, 0.1, 0.08])
-    far = Target("cube-2", "cube", np.array([0.9, 0.3, 0.025]), 0.9, 1, 0, 0.0)
-    assert run_skill(skill(target=far), fake).reason == "unreachable"
+    (text,) = (block.text for block in shown("python") if "class WeighItem" in block.text)
+    skill = module_of(text, tmp_path / "weigh_item.py").WeighItem
+    fake.world.put("cube", 0.5, 0.1)
+    (target,) = at_hand.look(fake)
+    result = run_skill(skill(held=at_hand.pick(fake, target)), fake)
+    assert result.status == "SUCCESS"
+    assert result.outputs["weight"] == pytest.approx(0.1 * GRAVITY)
+    assert fake.arm.tool_pose.position == pytest.approx([0.5, 0.1, 0.1], abs=0.003)
+
+
+def test_the_skill_to_copy_declares_a_part_of_the_shipped_one(tmp_path: Path) -> None:
+    (text,) = (block.text for block in shown("python") if "class WeighItem" in block.text)
+    skill, shipped = module_of(text, tmp_path / "weigh_item.py").WeighItem, load_skills()["Weigh"]
+    assert skill.ports.items() <= shipped.ports.items()
+    assert skill.params.items() <= shipped.params.items()
+    assert {*skill.reasons} < {*shipped.reasons}
+    assert (skill.tool_state, skill.uses, skill.waits) == (shipped.tool_state, shipped.uses, shipped.waits)
 
 
 def test_the_skill_on_the_front_page_declares_what_the_shipped_one_does(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,8 +31,11 @@ def build_bin(name: str, config: BinConfig) -> Bin:
 
 
 def build_object_class(label: str, config: ObjectConfig) -> ObjectClass:
-    """Return the object class that `config` declares, with the default mass."""
-    return ObjectClass(label, config.height, config.radius, config.ring)
+    """Return the object class that `config` declares; if it declares no mass, with the default mass."""
+    object_class = ObjectClass(label, config.height, config.radius, config.ring, looks_like=config.looks_like)
+    if config.mass is None:
+        return object_class
+    return replace(object_class, mass=config.mass, mass_std=config.mass_std)
 
 
 def compute_travel_height(config: CellConfig) -> float:
@@ -89,5 +93,5 @@ def build_bins(config: CellConfig) -> dict[str, Bin]:
 
 
 def build_object_classes(config: CellConfig) -> dict[str, ObjectClass]:
-    """Return the object classes of a cell file by label, each with the default mass."""
+    """Return the object classes of a cell file by label; the masses in URDFs are not read."""
     return {label: build_object_class(label, section) for label, section in config.objects.items()}

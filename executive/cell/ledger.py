@@ -7,7 +7,7 @@ from typing import Protocol
 
 from executive.cell.detection import Detections, Observation
 from executive.cell.frame import Frame
-from executive.cell.objects import Item, KnownItem, Target
+from executive.cell.objects import Item, KnownItem, ObjectClass, Target
 from executive.geometry import Array
 
 
@@ -99,6 +99,18 @@ class Ledger(Protocol):
             item: The item.
             contradiction: Sentence that states how the height of the touch contradicts the class, or "".
             may_miss_top: True if the cup may have touched the object below its top.
+        """
+
+    def record_weight(self, item: Item, weight: float, std: float, classes: Mapping[str, ObjectClass]) -> str:
+        """Record the weight of an item, which determines its class among the classes that look alike.
+
+        Return "" if the class is then certain, otherwise a sentence that states the contradiction.
+
+        Args:
+            item: The item.
+            weight: Measured weight [N].
+            std: Standard deviation of the error of the measurement [N].
+            classes: Classes of the cell by label.
         """
 
     def record_miss(self, item: Item, *, found_table: bool = False) -> None:

@@ -88,6 +88,9 @@ class ObjectClass:
         radius: Radius of the circle around the outline of the object, seen from above [m].
         contact_radius: Distance of the contact point from the centre [m]; above 0 only for parts with a hole.
         mass: Mass of the object [kg].
+        mass_std: Standard deviation of the mass between the objects of the class [kg]; infinite if the cell
+            file declares no mass.
+        looks_like: Class whose label the detectors report for objects of this class; "": this class.
     """
 
     label: str
@@ -95,6 +98,13 @@ class ObjectClass:
     radius: float
     contact_radius: float = 0.0
     mass: float = 0.1
+    mass_std: float = math.inf
+    looks_like: str = ""
+
+    @property
+    def look(self) -> str:
+        """Class whose label the detectors report for objects of this class."""
+        return self.looks_like or self.label
 
 
 @dataclass(frozen=True)

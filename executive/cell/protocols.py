@@ -42,7 +42,7 @@ class Clock(Protocol):
 
 
 class Tool(Protocol):
-    """A suction tool with a contact sensor and a vacuum sensor."""
+    """A suction tool with a contact sensor, a vacuum sensor and a load cell."""
 
     @property
     def touching(self) -> bool:
@@ -55,6 +55,14 @@ class Tool(Protocol):
     @property
     def holding_force(self) -> float:
         """Maximum force that the seal withstands [N], computed from the vacuum; 0 without a seal."""
+
+    @property
+    def load(self) -> float:
+        """Measured downward force of the held object on the tool [N], with noise; at rest, its weight."""
+
+    @property
+    def load_std(self) -> float:
+        """Standard deviation of one reading of `load` [N]."""
 
     def close(self) -> None:
         """Switch the vacuum on, which holds a touched object if its surface allows a seal."""

@@ -47,7 +47,7 @@ def associate(
         for record in records:
             distance = record.distance_to(observation.position)
             if distance <= compute_association_distance(record, observation, gate):
-                is_other_class = record.label != observation.detection.label
+                is_other_class = record.look != observation.detection.label
                 rank = (not staleness.is_unmoved(record), is_other_class, distance)
                 pairs.append((rank, observation, record))
     matches: dict[Observation, ItemRecord] = {}
@@ -107,7 +107,7 @@ def _may_be_same_object(
     The robot may push an object anywhere, a person by at most `MAX_PUSH_DISTANCE`. An item that became a
     phantom after an attempt to pick it may be an object that the attempt pushed away.
     """
-    if old_item is new_item or old_item.label != new_item.label:
+    if old_item is new_item or old_item.look != new_item.look:
         return False
     if old_item.state is State.DROPPED:
         return new_item.first_change_count > old_item.change_count

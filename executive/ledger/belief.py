@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from scipy.special import bdtrc, expit
@@ -56,6 +57,8 @@ class Belief:
         log_likelihoods: Log likelihood of each detected class, relative to a class that was never detected.
         label_counts: Number of looks by detected class.
         max_confusion_rate: Largest confusion rate of the detectors that detected the item, 0 to 1.
+        looks: After a weighing: for each class of the cell, the class that it looks like. Before, empty:
+            every class stands for all classes that look like it.
     """
 
     first_label: str
@@ -68,6 +71,7 @@ class Belief:
     log_likelihoods: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     label_counts: Counter[str] = field(default_factory=Counter)
     max_confusion_rate: float = 0.0
+    looks: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def look_count(self) -> int:
@@ -80,6 +84,11 @@ class Belief:
         if not self.label_counts:
             return self.first_label
         return min(self.log_likelihoods, key=lambda label: (-self.log_likelihoods[label], label))
+
+    @property
+    def look(self) -> str:
+        """Class that the detectors report for an object of the class `label`."""
+        return self.looks.get(self.label, self.label)
 
     @property
     def class_error(self) -> float:
@@ -100,7 +109,7 @@ class Belief:
 
         A small value shows that the detector confuses classes more often than its error rates state.
         """
-        wrong_count = self.look_count - self.label_counts[self.label]
+        wrong_count = self.look_count - self.label_counts[self.look]
         # bdtrc(k, n, p) is the probability of more than k events in n trials with the event probability p.
         return float(bdtrc(wrong_count - 1, self.look_count, self.max_confusion_rate))
 
@@ -135,7 +144,7 @@ class Belief:
         self.last_label_by_viewpoint[viewpoint] = label
         confusion_rate = rates.confusion_rate
         class_evidence = _compute_log_ratio(1.0 - confusion_rate, confusion_rate, copy_probability)
-        self.log_likelihoods[label] += class_evidence
+        self._add_class_evidence(label, class_evidence)
         self.max_confusion_rate = max(self.max_confusion_rate, confusion_rate)
         if is_ambiguous and not self.look_count:
             self.log_odds = min(self.log_odds, MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM)
@@ -152,12 +161,32 @@ class Belief:
         self.miss_probability *= rates.miss_rate
         self.log_odds += math.log(rates.miss_rate)
 
+    def add_weight(self, log_ratios: Mapping[str, float], looks: Mapping[str, str]) -> None:
+        """Update the class with a weighing, which distinguishes classes that look alike.
+
+        Args:
+            log_ratios: For each class of the cell, log likelihood of the measured weight, relative to an
+                object of another class.
+            looks: For each class of the cell, the class that it looks like; by default, itself.
+        """
+        if not self.looks:
+            detected = self.log_likelihoods
+            known = {label: detected[look] for label, look in looks.items() if look in detected}
+            self.log_likelihoods, self.looks = defaultdict(float, known), looks
+        for label in self.log_likelihoods:
+            self.log_likelihoods[label] += log_ratios[label]
+
     def merge(self, duplicate: Belief) -> None:
-        """Add the detections of a duplicate item, which is the same object."""
+        """Add the detections of a duplicate item, which is the same object and was never weighed."""
         for label, value in duplicate.log_likelihoods.items():
-            self.log_likelihoods[label] += value
+            self._add_class_evidence(label, value)
         self.label_counts += duplicate.label_counts
         self.miss_probability = 1.0
+
+    def _add_class_evidence(self, look: str, log_ratio: float) -> None:
+        """Add the log likelihood ratio of a detected class to each class that looks like it."""
+        for label in [label for label, other in self.looks.items() if other == look] or [look]:
+            self.log_likelihoods[label] += log_ratio
 
 
 def _compute_log_ratio(probability: float, alternative: float, copy_probability: float) -> float:

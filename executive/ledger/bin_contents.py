@@ -106,8 +106,8 @@ class BinContents:
         placed_records = []
         for record in self.records.filter_by_state(State.DROPPED):
             for bin_name in self.routes.get(record.label, ()):
-                key = (record.label, bin_name)
-                is_visible = visible_counts[key] > sum((item.label, item.bin) == key for item in self.records)
+                key = (record.look, bin_name)
+                is_visible = visible_counts[key] > sum((item.look, item.bin) == key for item in self.records)
                 if is_visible or self.is_floor_visible(bin_name, look):
                     update_bin_log_odds(record, bin_name, look.error_rates, is_visible=is_visible)
                 if record.bin_log_odds[bin_name] >= -math.log(self.config.max_miss_probability):

@@ -127,6 +127,11 @@ class ItemRecord:
         return self.belief.label
 
     @property
+    def look(self) -> str:
+        """Class that the detectors report for an object of the class `label`."""
+        return self.belief.look
+
+    @property
     def target(self) -> Target:
         """The item as the target that skills receive."""
         return Target(

@@ -81,7 +81,7 @@ def discard_moved_items(records: Collection[ItemRecord], dropped: Collection[Ite
     phantoms = []
     for lost_item in (record for record in records if record.state is State.LOST and record not in dropped):
         later_items = (item for item in new_items if item.first_stamp > lost_item.stamp)
-        if new_item := next((item for item in later_items if item.label == lost_item.label), None):
+        if new_item := next((item for item in later_items if item.look == lost_item.look), None):
             lost_item.set_state(State.PHANTOM, f"it is {new_item.item}")
             new_items.remove(new_item)
             phantoms.append(lost_item)

@@ -12,7 +12,7 @@ from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.detection import Detections, Observation
 from executive.cell.frame import Frame, FrameCaptured
-from executive.cell.objects import Item, KnownItem, Target
+from executive.cell.objects import Item, KnownItem, ObjectClass, Target
 from executive.cell.protocols import Routes
 from executive.cell.quotas import Quotas
 from executive.errors import Fault
@@ -27,6 +27,11 @@ from executive.ledger.item import ON_TABLE, ItemRecord, State
 from executive.ledger.look import LookUpdate, make_look_event
 from executive.ledger.records import ItemRecords
 from executive.ledger.staleness import Staleness
+from executive.perception.evidence import compute_weight_log_ratios, describe_weight
+
+MIN_LOG_RATIO_OF_WEIGHT = math.log(0.01)
+"""Minimum log likelihood ratio of a weight that agrees with the class of an item: prior odds that the item is
+an object of no declared class."""
 
 
 class Tracker:
@@ -194,6 +199,18 @@ class Tracker:
             self._records.emit(record)
             return False
         return True
+
+    def record_weight(self, item: Item, weight: float, std: float, classes: Mapping[str, ObjectClass]) -> str:
+        """Update the class of an item by its weight, and return "" or a contradiction."""
+        record = self._records.find(item)
+        log_ratios = compute_weight_log_ratios(weight, std, classes)
+        record.belief.add_weight(log_ratios, {label: other.look for label, other in classes.items()})
+        fits = log_ratios[record.label] >= MIN_LOG_RATIO_OF_WEIGHT
+        contradiction = ""
+        if not fits or record.belief.class_error > self._config.max_class_error:
+            contradiction = record.last_contradiction = describe_weight(weight, record.label, classes)
+        self._records.emit(record)
+        return contradiction
 
     def record_miss(self, item: Item, *, found_table: bool = False) -> None:
         """Record a failed attempt to pick an item, which may have moved any object.

@@ -90,11 +90,23 @@ def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, goal_name: str) 
         # `dropped` has priority: handlers of the other reasons expect the item in the tool.
         if not detect_and_record_drop(cell, item):
             raise
+    fail_if_dropped(skill, cell, item, f"on the way to {goal_name}")
+
+
+def fail_if_dropped(skill: Skill, cell: Cell, item: Item, place: str) -> None:
+    """If the seal on `item` is broken, record the drop, open the tool, and fail.
+
+    `place` describes the place of the drop in the error message.
+
+    Raises:
+        SkillFailed: The seal broke; the reason is `dropped`.
+    """
     if detect_and_record_drop(cell, item):
         x, y, z = cell.arm.tool_pose.position
         cell.tool.open()
-        message = f"the seal on {item} broke on the way to {goal_name}, near ({x:.2f}, {y:.2f}, {z:.2f}) m"
-        raise skill.failure("dropped", message)
+        raise skill.failure(
+            "dropped", f"the seal on {item} broke {place}, near ({x:.2f}, {y:.2f}, {z:.2f}) m"
+        )
 
 
 def release(skill: Skill, cell: Cell, item: Item, settle: float, record_release: Callable[[], None]) -> Steps:

@@ -133,6 +133,15 @@ def list_free_bins(cell: Cell, label: str) -> list[str]:
     return [name for name in bin_names if not cell.quotas.is_reached(name, label, count_objects)]
 
 
+def choose_bin(cell: Cell, label: str) -> str | None:
+    """Return the free bin of a class with the fewest objects, bins with a quota first; None: no free bin."""
+    return min(
+        list_free_bins(cell, label),
+        key=lambda bin: (not cell.quotas.is_limited(bin, label), predict_object_count(cell, bin)),
+        default=None,
+    )
+
+
 def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
     """Return the goal of a transit: `item` in the tool, at `drop_height` [m] above the next slot of a bin."""
     bin, object_count = cell.bins[bin_name], predict_object_count(cell, bin_name, item)

@@ -1,4 +1,4 @@
-"""Evidence against a detected class: height of a touch, height in the depth image, size of the box.
+"""Evidence about a detected class: height of a touch, weight, height in the depth image, size of the box.
 
 An object may stand on the table or on one object of any class. In the functions, `label` is the assumed class
 of the object, and `classes` contains the classes of the cell by label.
@@ -16,7 +16,7 @@ from executive.cell.detection import Detection
 from executive.cell.frame import Box, Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
-from executive.geometry import Array
+from executive.geometry import GRAVITY, Array
 from executive.perception.camera_model import project
 from executive.perception.depth_image import measure_top_height
 
@@ -32,6 +32,8 @@ In 480 scenes of the cell `depth` (60 crowded, 60 with unknown objects), the top
 objects had a mean error of 2.1 mm and a maximum error of 10.1 mm. The tops of 20 of 26 unknown objects
 contradicted the detected class.
 """
+MAX_OTHER_WEIGHT = 10.0
+"""Maximum weight of an object of no declared class [N], of the order of the breakaway force of the cups."""
 REFERENCE_DISTANCE = 1.2
 """Maximum distance from the camera at which `TOP_TOLERANCE` applies [m].
 
@@ -60,6 +62,36 @@ def describe_touch_contradiction(label: str, height: float, classes: Mapping[str
         f"it was touched {height * 1000:.0f} mm above the table, and a {label} is "
         f"{classes[label].height * 1000:.0f} mm high"
     )
+
+
+def compute_weight_log_ratios(
+    weight: float, std: float, classes: Mapping[str, ObjectClass]
+) -> dict[str, float]:
+    """Return the log likelihood ratio of a measured weight for each class; 0 for a class of unknown mass.
+
+    Weights within a class have a normal distribution. The alternative is an object of no declared class,
+    whose weight has a uniform distribution from 0 to `MAX_OTHER_WEIGHT`.
+
+    Args:
+        weight: Measured weight [N].
+        std: Standard deviation of the error of the measurement [N].
+        classes: Classes of the cell by label.
+    """
+    ratios = dict.fromkeys(classes, 0.0)
+    for label, object_class in classes.items():
+        if math.isfinite(object_class.mass_std):
+            total_std = math.hypot(std, object_class.mass_std * GRAVITY)
+            deviation = (weight - object_class.mass * GRAVITY) / total_std
+            ratios[label] = math.log(MAX_OTHER_WEIGHT / (math.sqrt(math.tau) * total_std)) - deviation**2 / 2
+    return ratios
+
+
+def describe_weight(weight: float, label: str, classes: Mapping[str, ObjectClass]) -> str:
+    """Return a sentence with a weight [N], and with the weights of the classes that look like `label`."""
+    look = classes[label].look
+    similar_classes = [object_class for object_class in classes.values() if object_class.look == look]
+    weights = " and ".join(f"a {other.label} {other.mass * GRAVITY:.2f} N" for other in similar_classes)
+    return f"it weighs {weight:.2f} N, and {weights}"
 
 
 def find_classes_distinct_by_touch(config: CellConfig) -> frozenset[str]:

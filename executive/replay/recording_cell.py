@@ -48,6 +48,8 @@ INPUT_FORMATS: Mapping[str, InputFormat] = {
     "tool.touching": InputFormat("tool.touching"),
     "tool.holding": InputFormat("tool.holding"),
     "tool.holding_force": InputFormat("tool.bears"),
+    "tool.load": InputFormat("tool.load"),
+    "tool.load_std": InputFormat("tool.load_std"),
     "camera.name": InputFormat("camera.name"),
     "camera.scan_poses": InputFormat("camera.scan_poses", codecs.STRINGS),
     "camera.next_pose": InputFormat("camera.next_pose"),

@@ -36,7 +36,7 @@ def complaint(text: str) -> str:
 def test_a_mesh_is_found_beside_the_cell_file_wherever_the_command_is_given() -> None:
     washer = load(WASHER).objects["washer"]
     assert washer.mesh == str(Path("cells/parts/washer.obj").resolve())
-    assert (washer.urdf, washer.mass, washer.ring) == ("", 0.05, 0.017)
+    assert (washer.urdf, washer.mass, washer.ring) == ("", None, 0.017)
 
 
 def test_a_mesh_is_found_beside_the_base_that_names_it() -> None:
@@ -55,7 +55,6 @@ def test_a_mesh_is_found_beside_the_base_that_names_it() -> None:
     [
         ("mesh: parts/washer.obj, ", "", "objects.washer needs either a urdf or a mesh\n"),
         ("mesh:", "urdf: cube_small.urdf, mesh:", "objects.washer needs either a urdf or a mesh, not both\n"),
-        ("mesh: parts/washer.obj", "urdf: cube_small.urdf, mass: 0.1", "objects.washer must not have a mass: the URDF contains it; only a mesh needs one\n"),
         ("ring: 0.017", "ring: 0.03", "objects.washer has a ring of 0.03 m, which must be smaller than the radius, 0.025 m\n"),
         ("ring: 0.017", "ring: -0.01", "objects.washer.ring must be at least 0, not -0.01\n"),
         ("ring: 0.017", "mass: 0", "objects.washer.mass must be at least 0.0001, not 0\n"),

@@ -11,6 +11,7 @@ import pytest
 from executive.cell.detection import Answer, Detection
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
+from executive.cell.objects import ObjectClass
 from executive.errors import Crowded, Unavailable
 from executive.geometry import Pose
 from executive.perception.detectors.screening import MAX_BOXES, screen_answer, screen_detectors
@@ -19,6 +20,8 @@ RATES = ErrorRates(threshold=0.5, miss_rate=0.02, confusion_rate=0.0025, false_d
 VISIBLE = np.ones((20, 20), bool)
 VISIBLE[:, 10:] = False  # The arm hides the right half.
 FRAME = Frame(1, "eye", np.zeros((20, 20, 3), np.uint8), None, np.eye(3), Pose.identity(), 0.0, VISIBLE, 0)
+
+LOOKS = {"cube": "cube", "full_cube": "cube"}
 
 
 def detect(
@@ -30,15 +33,18 @@ def detect(
 def test_detections_are_divided_by_confidence_second_class_and_label() -> None:
     cube, weak, torn = detect(), detect(confidence=0.4), detect(confidence=0.7, second_confidence=0.4)
     mug, weak_mug = detect("mug"), detect("mug", confidence=0.4)
-    answer = screen_answer(Answer("eye", (cube, mug, torn, weak, weak_mug), RATES), FRAME, "table", ["cube"])
+    answer = screen_answer(Answer("eye", (cube, mug, torn, weak, weak_mug), RATES), FRAME, "table", LOOKS)
     assert (answer.confident, answer.doubtful, answer.unknown) == ((cube,), (torn, weak), (mug,))
 
 
 def test_a_box_that_the_arm_hides_is_left_out() -> None:
     shown, hidden = detect(right=12.0), detect(right=16.0)
-    assert screen_answer(Answer("eye", (shown, hidden), RATES), FRAME, "table", ["cube"]).confident == (
-        shown,
-    )
+    assert screen_answer(Answer("eye", (shown, hidden), RATES), FRAME, "table", LOOKS).confident == (shown,)
+
+
+def test_a_class_that_looks_like_another_gets_the_label_of_the_other() -> None:
+    answer = screen_answer(Answer("eye", (detect("full_cube"),), RATES), FRAME, "table", LOOKS)
+    assert answer.confident == (detect("cube"),)
 
 
 def raise_unavailable() -> Answer:
@@ -64,7 +70,9 @@ def raise_unavailable() -> Answer:
 )
 def test_an_unusable_answer_names_the_detector(result: Any, error: type[Exception], message: str) -> None:
     eye: Any = SimpleNamespace(request=lambda frame, view: SimpleNamespace(ready=True, result=result))
-    request = screen_detectors({"eye": eye}, ["cube"])["eye"].request(FRAME, "full")
+    request = screen_detectors({"eye": eye}, {"cube": ObjectClass("cube", 0.05, 0.0354)})["eye"].request(
+        FRAME, "full"
+    )
     with pytest.raises(error) as raised:
         request.result()
     assert str(raised.value) == message

@@ -109,6 +109,9 @@ class ToolConfig(Section):
     """Angle between surface normal and tool axis at which the breakaway force is zero [degree]."""
     min_force: Force
     """Minimum breakaway force at which the vacuum sensor reports a seal [N]."""
+    load_std: float = Field(0.05, gt=0, le=100)
+    """Standard deviation of a reading of the load [N]. The default is assumed: 0.5 % of 10 N, the range of a
+    small load cell."""
     source: str
     """Source of the constants."""
 

@@ -29,8 +29,14 @@ class ObjectConfig(Section):
     mesh: str = ""
     """Path of a Wavefront mesh (`.obj`), relative to the cell file or to pybullet_data. The collision shape
     of each group (`o`) is the convex hull of the group: a part with a hole needs several groups."""
-    mass: float = Field(0.05, ge=1e-4, le=1000)
-    """Mass of a mesh [kg]; a URDF contains its mass."""
+    mass: float | None = Field(None, ge=1e-4, le=1000)
+    """Mean mass of the objects [kg]. If not given, a weight is no evidence about the class, and a simulation
+    uses the mass in the URDF, or 0.05 kg for a mesh."""
+    mass_std: float = Field(0.002, ge=0, le=1000)
+    """Standard deviation of the mass between the objects of the class [kg]."""
+    looks_like: str = ""
+    """Class whose label the detectors report for objects of this class, because both look alike; only the
+    weight distinguishes them. If not given, the detectors report the label of this class."""
     scale: float = Field(1.0, ge=1e-4, le=1e4)
     """Scale factor of the model; a mesh at scale 1 is in metres."""
     upright_deg: Angles = (0.0, 0.0, 0.0)
@@ -48,8 +54,6 @@ class ObjectConfig(Section):
     def _check_model(self) -> ObjectConfig:
         if bool(self.urdf) == bool(self.mesh):
             raise ValueError("needs either a urdf or a mesh" + (", not both" if self.urdf else ""))
-        if self.urdf and "mass" in self.model_fields_set:
-            raise ValueError("must not have a mass: the URDF contains it; only a mesh needs one")
         if self.ring >= self.radius:
             raise ValueError(
                 f"has a ring of {self.ring:g} m, which must be smaller than the radius, {self.radius:g} m"

@@ -19,7 +19,7 @@ from executive.cells.fake.fake_obstacles import Collision, FakeObstacles
 from executive.cells.fake.world import FakeWorld
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit, discard_event
-from executive.geometry import Array, Pose, make_tool_down_pose
+from executive.geometry import GRAVITY, Array, Pose, make_tool_down_pose
 from executive.motion.arms import build_kinematics
 from executive.motion.plans import Plan, PlanFactory
 
@@ -220,15 +220,19 @@ class FakeTool:
     Args:
         world: The world with the objects.
         get_tip_position: Returns the position of the tool tip `(3,)` [m].
+        load_std: Standard deviation of a reading of `load` [N], which the fake tool only declares.
 
     Attributes:
         can_seal: Function that returns True if the cup can seal on the touched object; set by tests.
         breakaway_force: Force that every seal withstands [N].
+        load_error: Error of `load` [N]; set by tests.
     """
 
-    def __init__(self, world: FakeWorld, get_tip_position: Callable[[], Array]) -> None:
+    def __init__(self, world: FakeWorld, get_tip_position: Callable[[], Array], load_std: float) -> None:
         self._world = world
         self._get_tip_position = get_tip_position
+        self.load_std = load_std
+        self.load_error = 0.0
         self.can_seal: Callable[[], bool] = lambda: True
         self.breakaway_force = DEFAULT_BREAKAWAY_FORCE
 
@@ -247,6 +251,12 @@ class FakeTool:
     def holding_force(self) -> float:
         """Breakaway force of the seal [N]; 0 while the tool holds nothing."""
         return self.breakaway_force if self.holding else 0.0
+
+    @property
+    def load(self) -> float:
+        """Weight of the held object by the mass of its class, plus `load_error` [N]; no noise."""
+        held = self._world.held_object
+        return self.load_error + (self._world.classes[held.label].mass * GRAVITY if held else 0.0)
 
     def close(self) -> None:
         """Seal the cup on the touched object."""

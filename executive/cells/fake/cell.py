@@ -99,7 +99,7 @@ class FakeCell(CellWithoutHardware):
         self.world = FakeWorld(classes, bins=bins)
         put_random_objects(self.world, config, seed)
         self.arm = FakeArm(self.world, config, clock, emit)
-        self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position)
+        self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position, config.tool.load_std)
         name, camera = next(iter(config.cameras.items()))
         X_TF = Pose.of((0.0, 0.0, -config.tool.length))  # pose of the flange F in the frame T of the tool
         self.camera = FakeCamera(

@@ -47,7 +47,7 @@ class SimCell(CellWithoutHardware):
 
     Args:
         config: The cell file.
-        seed: Random seed of the objects, their poses and the noise of camera and detectors.
+        seed: Random seed of the objects, their poses and the noise of camera, detectors and load cell.
         routes: Names of the permitted bins of each class.
         emit: Receives the events of the cell.
         options: Options of the run.
@@ -73,13 +73,13 @@ class SimCell(CellWithoutHardware):
             raise InputError(f"cell {config.cell}: {message}")
         super().__init__(config, seed=seed, routes=routes, emit=emit, options=options)
         clock, bins = self.cell.clock, self.cell.bins.values()
-        _, camera_seed, detector_seed = derive_seeds(seed)
+        _, camera_seed, detector_seed, load_seed = derive_seeds(seed)
         scene = load_scene(options.scene, config)
         world = self._world = build_initial_world(config, seed, gui=options.gui, scene=scene)
         self._initial_positions = {body: world.get_object_pose(body).position for body in world.labels}
         self._clearance_checker = ClearanceChecker(config)
         planner = build_planner(config, self._clearance_checker.check)
-        self._tool = SuctionTool(world, config.tool)
+        self._tool = SuctionTool(world, config.tool, load_seed)
         state = None if options.resume is None else self._rebuild_world(options.resume.log_path)
         self._arm = SimArm(world, planner, config, clock, lambda: self._tool.held_body, emit, state)
         name, camera_config = next(iter(config.cameras.items()))

@@ -20,6 +20,8 @@ from executive.cells.sim.model_files import find_mesh, find_model, parse_numbers
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 
+DEFAULT_MESH_MASS = 0.05
+"""Mass of a mesh for which the cell file declares no mass [kg]."""
 SIZE_TOLERANCE = 0.003
 """Maximum difference between a size in a cell file and the size of the model [m]."""
 ROLLING_FRICTION = 0.0005
@@ -85,6 +87,8 @@ def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
     """
     X_WL = X_WO @ compute_upright_pose(config)
     body = _add_mesh(client, config, X_WL) if config.mesh else _add_urdf(client, config, X_WL)
+    if config.urdf and config.mass is not None:
+        client.changeDynamics(body, -1, mass=config.mass)
     client.changeDynamics(body, -1, rollingFriction=ROLLING_FRICTION, spinningFriction=ROLLING_FRICTION)
     return body
 
@@ -107,14 +111,14 @@ def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
     centroid = compute_upright_pose(config).inverse().apply(load_mesh(config).centroid)
     collision = client.createCollisionShape(pybullet.GEOM_MESH, **shape)
     visual = client.createVisualShape(pybullet.GEOM_MESH, **shape)
-    body = client.createMultiBody(config.mass, collision, visual, X_WL.position, X_WL.quaternion, centroid)
-    return int(body)
+    mass = compute_mass(config)
+    return int(client.createMultiBody(mass, collision, visual, X_WL.position, X_WL.quaternion, centroid))
 
 
 def compute_mass(config: ObjectConfig) -> float:
     """Return the mass of a simulated object [kg], from the cell file or its URDF."""
-    if config.mesh:
-        return config.mass
+    if config.mass is not None or config.mesh:
+        return config.mass or DEFAULT_MESH_MASS
     masses = read_urdf(find_model(config.urdf)).iterfind(".//inertial/mass")
     return sum(sum(parse_numbers(mass.get("value"), (0.0,))) for mass in masses)
 

@@ -35,12 +35,12 @@ MAX_DISPLACEMENT = 0.005
 """Maximum distance of an object in a stable stack from its goal position [m]."""
 
 
-def derive_seeds(seed: int) -> tuple[int, int, int]:
-    """Return the random seeds of objects, camera noise and detectors for the seed of a run."""
-    objects, camera, detectors = (
-        int(sequence.generate_state(1)[0]) for sequence in np.random.SeedSequence(seed).spawn(3)
+def derive_seeds(seed: int) -> tuple[int, int, int, int]:
+    """Return the random seeds of objects, camera noise, detectors and load noise for the seed of a run."""
+    objects, camera, detectors, load = (
+        int(sequence.generate_state(1)[0]) for sequence in np.random.SeedSequence(seed).spawn(4)
     )
-    return objects, camera, detectors
+    return objects, camera, detectors, load
 
 
 def build_initial_world(
@@ -55,7 +55,7 @@ def build_initial_world(
     """
     world = World(apply_scene(config, scene), gui=gui)
     paint_table(world, scene)
-    object_seed, _, _ = derive_seeds(seed)
+    object_seed, *_ = derive_seeds(seed)
     spawn_objects(world, world.config, object_seed, unknown=scene.unknown)
     world.rest_positions.clear()
     return world

@@ -47,13 +47,19 @@ class SuctionTool:
     force; moments do not break the seal. The object is still within reach immediately after a break. A
     new seal therefore forms only after the object has left the reach or the vacuum has been off.
 
+    Args:
+        world: The world with the tool.
+        config: Section of the tool in the cell file.
+        noise_seed: Random seed of the noise of `load`.
+
     Attributes:
         dropped_bodies: Bodies whose last seal broke; ground truth, not for skills.
     """
 
-    def __init__(self, world: World, config: ToolConfig) -> None:
+    def __init__(self, world: World, config: ToolConfig, noise_seed: int = 0) -> None:
         self._world = world
         self._config = config
+        self._noise_seed = noise_seed
         self._is_vacuum_on = False
         self._grip: _Grip | None = None
         self._separating_body: int | None = None  # Body whose seal broke and that is still within reach.
@@ -79,6 +85,19 @@ class SuctionTool:
     def holding_force(self) -> float:
         """Breakaway force of the seal [N]; 0 while the tool holds nothing."""
         return 0.0 if self._grip is None else self._grip.breakaway_force
+
+    @property
+    def load(self) -> float:
+        """Downward force of the held body on the tool [N]: its filtered pull on the seal, plus noise."""
+        force = 0.0 if self._grip is None else -float(self._grip.pull[2])
+        # The noise depends only on the physics step, so that a resumed run continues with the same noise.
+        random_generator = np.random.default_rng([self._noise_seed, self._world.step_count])
+        return force + float(random_generator.normal(0.0, self._config.load_std))
+
+    @property
+    def load_std(self) -> float:
+        """Standard deviation of the noise of `load` [N]."""
+        return self._config.load_std
 
     @property
     def held_body(self) -> int | None:

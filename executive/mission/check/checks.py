@@ -32,6 +32,7 @@ CHECKS: tuple[Check, ...] = (
     skill_settings.check_routes,
     quota_routes.check_quotas,
     skill_settings.find_undetectable_classes,
+    skill_settings.find_unweighed_classes,
     reasons.check_failure_names,
     variables.find_unwritten_inputs,
     variables.find_unwritten_library_inputs,

@@ -13,7 +13,7 @@ from executive.mission.model.nodes import SkillNode
 from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import find_literals
 from executive.mission.source import Span
-from executive.skill import Direction, Param, Port
+from executive.skill import HOLDING, Direction, Param, Port, Skill
 
 
 def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
@@ -143,6 +143,34 @@ def check_routes(context: CheckContext) -> Iterator[Finding]:
                 yield make_error(bin.span, "unknown-bin", f'the cell has no bin "{bin.name}"', hint)
 
 
+def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every class whose bin depends on the weight of the object, if no node weighs it.
+
+    A skill that requires and leaves a held object, and writes a bin, weighs the object.
+    """
+    objects = {} if context.cell is None else context.cell.objects
+    routes = {route.label: route for route in context.mission.routes}
+    bins = {label: {bin.name for bin in route.bins} for label, route in routes.items()}
+    weighing_skills = [name for name, skill in context.skills.items() if _is_weighing(skill)]
+    is_weighed = any(node.skill in weighing_skills for node, _ in context.iterate_installed_skills())
+    looks = {label: section.looks_like for label, section in objects.items() if section.looks_like in objects}
+    for label, look in looks.items():
+        if label in routes and look not in routes:
+            message = (
+                f"{label} looks like {look}, which has no route, so no object of either class is selected"
+            )
+            yield make_error(routes[label].label_span, "unweighed", message, f"Add a route for {look}.")
+        elif look in routes and bins.get(label) != bins[look] and not is_weighed:
+            message = f"{label} looks like {look}, their routes differ, and no node weighs the held object"
+            hint = f"Before the transport, insert {' or '.join(weighing_skills)}."
+            yield make_error(routes.get(label, routes[look]).label_span, "unweighed", message, hint)
+
+
+def _is_weighing(skill: type[Skill]) -> bool:
+    outputs = (port for port in skill.ports.values() if port.direction is Direction.OUT)
+    return skill.tool_state == (HOLDING, HOLDING) and any(port.refers_to == "bin" for port in outputs)
+
+
 def find_undetectable_classes(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every class in the mission that no detector of the cell can detect."""
     detectors = {
@@ -160,8 +188,12 @@ def find_undetectable_classes(context: CheckContext) -> Iterator[Finding]:
 
 
 def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Span]]:
-    """Yield every class in the routes and in the settings of skills, with its position."""
-    yield from ((route.label, route.label_span) for route in context.mission.routes)
+    """Yield every class in the routes and in the settings of skills, with its position.
+
+    For a class in the routes that looks like another class, the other class is yielded.
+    """
+    looks = {} if context.cell is None else {label: o.looks_like for label, o in context.cell.objects.items()}
+    yield from ((looks.get(route.label) or route.label, route.label_span) for route in context.mission.routes)
     for node, skill in context.iterate_installed_skills():
         for name, value in find_literals(node):
             declaration = skill.params.get(name) or skill.ports.get(name)

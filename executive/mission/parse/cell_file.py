@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from executive.cell.config import CellConfig
+from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, make_error, sort_findings
@@ -92,8 +92,9 @@ def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
     if config is None:
         return file
     overlap_errors = (file.make_error(keys, "layout", message) for keys, message in find_overlaps(config))
+    name_errors = (*_find_unknown_poses(file, config), *_find_wrong_looks(file, config))
     resolved_config, outside_errors = _resolve_model_files(file, config, reader.folders)
-    findings = (*findings, *_find_unknown_poses(file, config), *outside_errors, *overlap_errors)
+    findings = (*findings, *name_errors, *outside_errors, *overlap_errors)
     # If a model file lies outside the folder, `config` is None, so that no caller opens that file.
     return replace(file, config=None if outside_errors else resolved_config, findings=findings)
 
@@ -201,6 +202,29 @@ def _find_unknown_poses(file: CellFile, config: CellConfig) -> Iterator[Finding]
             if pose not in poses:
                 message = f'the arm has no pose "{pose}"; arm.poses_deg has: {", ".join(poses)}'
                 yield file.make_error(("cameras", name, "scan_poses", index), "unknown-pose", message)
+
+
+def _find_wrong_looks(file: CellFile, config: CellConfig) -> Iterator[Finding]:
+    """Yield an error for each class that looks like a class that the cell lacks or that differs in size."""
+    for label, section in config.objects.items():
+        if not (name := section.looks_like):
+            continue
+        key_path, look = ("objects", label, "looks_like"), config.objects.get(name)
+        if look is None:
+            message = f'the cell has no class "{name}"; it has: {", ".join(config.objects)}'
+            yield file.make_error(key_path, "unknown-class", message)
+        elif look.looks_like:
+            message = (
+                f"{name} looks like {look.looks_like}, so no detector reports {name}; name another class"
+            )
+            yield file.make_error(key_path, "wrong-value", message)
+        elif None in (section.mass, look.mass) or _get_size(section) != _get_size(look):
+            message = f"{label} looks like {name}, so both need a mass, and equal height, radius and ring"
+            yield file.make_error(key_path, "wrong-value", message)
+
+
+def _get_size(section: ObjectConfig) -> tuple[float, float, float]:
+    return section.height, section.radius, section.ring
 
 
 def _resolve_model_files(

@@ -5,12 +5,13 @@ Every answer of every kind of detector is screened before a skill reads it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import filterfalse
 
 from executive.cell.detection import Answer, Detection
 from executive.cell.frame import Frame
+from executive.cell.objects import ObjectClass
 from executive.cell.protocols import Detector
 from executive.errors import Crowded, Unavailable
 from executive.perception.detectors.requests import ChangedRequest
@@ -28,16 +29,17 @@ MAX_SECOND_CLASS_RATIO = 0.5
 """Maximum confidence of the second class of a confident detection, as a fraction of the first confidence."""
 
 
-def screen_answer(answer: Answer, frame: Frame, view: str, labels: Collection[str]) -> Answer:
+def screen_answer(answer: Answer, frame: Frame, view: str, looks: Mapping[str, str]) -> Answer:
     """Return an answer with its detections divided into `confident`, `doubtful` and `unknown`.
 
-    Boxes that the arm occludes, and unknown labels with a confidence below the threshold, are omitted.
+    Boxes that the arm occludes, and unknown labels with a confidence below the threshold, are omitted. The
+    label of a class that looks like another class is replaced by the label of the other class.
 
     Args:
         answer: Answer with all detections in `confident`.
         frame: The searched frame.
         view: Name of the searched region, for an error message.
-        labels: Class names in the cell file.
+        looks: For each class in the cell file, the class that it looks like; by default, itself.
 
     Raises:
         Crowded: There are more than `MAX_BOXES` boxes.
@@ -57,8 +59,9 @@ def screen_answer(answer: Answer, frame: Frame, view: str, labels: Collection[st
     for detection in answer.confident:
         if frame.compute_visible_fraction(detection.box) < MIN_VISIBLE_FRACTION:
             continue
-        if detection.label in labels:
-            (confident if _is_confident(detection, threshold) else doubtful).append(detection)
+        if detection.label in looks:
+            is_confident = _is_confident(detection, threshold)
+            (confident if is_confident else doubtful).append(replace(detection, label=looks[detection.label]))
         elif detection.confidence >= threshold:
             unknown.append(detection)
     return replace(answer, confident=tuple(confident), doubtful=tuple(doubtful), unknown=tuple(unknown))
@@ -71,24 +74,27 @@ class ScreenedDetector:
     Attributes:
         detector: The detector.
         name: Name of the detector in the cell file.
-        labels: Class names in the cell file.
+        looks: For each class in the cell file, the class that it looks like; by default, itself.
     """
 
     detector: Detector
     name: str
-    labels: Collection[str]
+    looks: Mapping[str, str]
 
     def request(self, frame: Frame, view: str) -> ChangedRequest:
         """Start the detection in a view of a frame: `table` (the workspace) or `full` (the whole image)."""
         request = self.detector.request(frame, view)
         return ChangedRequest(
-            request, lambda answer: screen_answer(answer, frame, view, self.labels), self.name
+            request, lambda answer: screen_answer(answer, frame, view, self.looks), self.name
         )
 
 
-def screen_detectors(detectors: Mapping[str, Detector], labels: Collection[str]) -> dict[str, Detector]:
-    """Return detectors with screened answers, by name; `labels` are the class names in the cell file."""
-    return {name: ScreenedDetector(detector, name, labels) for name, detector in detectors.items()}
+def screen_detectors(
+    detectors: Mapping[str, Detector], classes: Mapping[str, ObjectClass]
+) -> dict[str, Detector]:
+    """Return detectors with screened answers, by name; `classes` are the classes of the cell by label."""
+    looks = {label: object_class.look for label, object_class in classes.items()}
+    return {name: ScreenedDetector(detector, name, looks) for name, detector in detectors.items()}
 
 
 def _is_confident(detection: Detection, threshold: float) -> bool:

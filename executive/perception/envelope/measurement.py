@@ -114,7 +114,8 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Finger
 
     The fingerprint contains weights and settings of the detector, the localization method, the classes and
     their sizes, and pose, intrinsics, image size, `table_view` and depth settings of the camera. It does not
-    contain bins, the number of objects, light and colours. Paths in the cell file are relative to `base`.
+    contain bins, the number of objects, light, colours, and classes that look like another class. Paths in
+    the cell file are relative to `base`.
     """
     section = config.detectors[detector]
     options = {key: value for key, value in section.options.items() if key != "threads"}
@@ -126,6 +127,7 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Finger
         **{
             f"class {label}": f"{kind.height * 1000:.1f} mm high, radius {kind.radius * 1000:.1f} mm"
             for label, kind in config.objects.items()
+            if not kind.looks_like
         },
         **_describe_camera(next(iter(config.cameras.values())), config),
     }

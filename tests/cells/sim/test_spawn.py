@@ -123,4 +123,4 @@ def test_the_first_world_is_the_one_that_a_cell_of_the_same_seed_begins_with(ove
 
 
 def test_the_parts_draw_from_seeds_of_their_own() -> None:
-    assert derive_seeds(5) == (803261128, 3767054407, 3210010690)
+    assert derive_seeds(5)[:3] == (803261128, 3767054407, 3210010690)

@@ -8,7 +8,7 @@ import pytest
 
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
-from executive.geometry import Array, Pose
+from executive.geometry import GRAVITY, Array, Pose
 from executive.motion.arms import build_kinematics
 from tests.cells.sim.conftest import shipped_cell
 from tests.motion.joint_states import reach
@@ -172,3 +172,47 @@ def test_opening_drops_the_object_and_lets_it_collide_with_the_tool_again(bench:
     assert bench.pose_in_tool().position[2] > 0.1
     bench.put(-0.0005)
     assert bench.world.client.getContactPoints(bench.world.arm, bench.body)
+
+
+def test_the_load_of_a_hanging_object_is_its_weight_and_noise_of_the_declared_size() -> None:
+    bench = Bench("cube")
+    assert bench.tool.load == pytest.approx(0.0, abs=5 * bench.tool.load_std)
+    bench.hang()
+    loads = []
+    for _ in range(300):
+        bench.steps(1)
+        loads.append(bench.tool.load)
+    mass = bench.world.client.getDynamicsInfo(bench.body, -1)[0]
+    assert np.mean(loads) == pytest.approx(mass * GRAVITY, abs=4 * bench.tool.load_std / 300**0.5)
+    assert np.std(loads) == pytest.approx(bench.tool.load_std, rel=0.15)
+    bench.world.close()
+
+
+def test_the_load_of_an_object_that_lies_on_the_table_is_not_its_weight(bench: Bench) -> None:
+    bench.put(0.0012)
+    bench.tool.close()
+    bench.steps(60)
+    assert bench.tool.holding
+    assert bench.tool.load < 0.5 * 0.1 * GRAVITY
+
+
+def test_the_noise_of_the_load_depends_on_the_seed_and_the_step_and_not_on_the_number_of_readings(
+    bench: Bench,
+) -> None:
+    other = SuctionTool(bench.world, bench.config, noise_seed=1)
+    first = bench.tool.load
+    assert bench.tool.load == first
+    assert other.load != first
+    bench.steps(1)
+    assert bench.tool.load != first
+
+
+def test_the_load_contains_the_inertia_of_an_object_that_is_lifted(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.hang()
+    loads, advance = [], bench.tool.advance
+    monkeypatch.setattr(bench.tool, "advance", lambda: (advance(), loads.append(bench.tool.load)))
+    bench.raise_by(0.05, steps=60)
+    assert max(loads) > 0.1 * GRAVITY + 4 * bench.tool.load_std
+    assert min(loads) < 0.1 * GRAVITY - 4 * bench.tool.load_std

@@ -1,0 +1,49 @@
+"""Skill that weighs the held item."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from executive.cell.arm import Goal
+from executive.cell.objects import Item
+from executive.cell.protocols import Cell, Steps
+from executive.manipulation.motions import fail_if_dropped, transport
+from executive.manipulation.tool_goals import choose_bin
+from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Newtons, Out, Seconds, Skill, param, port
+
+
+class Weigh(Skill):
+    """Lift the held item, and determine its class and its bin by its weight."""
+
+    held: In[Item] = port(refers_to="item", doc="the item in the tool")
+    weight: Out[Newtons] = port(doc="the weight of the item")
+    bin: Out[str] = port(refers_to="bin", doc="the bin for the item")
+    height: Metres = param(0.05, ge=0.01, le=0.3, doc="height by which the item is lifted")
+    settle: Seconds = param(0.10, ge=0, le=2, doc="time between motion and measurement")
+    period: Seconds = param(0.25, ge=0.05, le=10, doc="time over which the load is averaged")
+    reasons: ClassVar = ("unreachable", "blocked", "dropped", "contradicted", "no_bin")
+    uses: ClassVar = ("arm", "tool")
+    senses: ClassVar = True
+    moves: ClassVar = True
+    tool_state: ClassVar = (HOLDING, HOLDING)
+    tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": ANY}
+    waits: ClassVar = "period"
+
+    def run(self, cell: Cell) -> Steps:
+        """Lift the item, average the load of the tool at rest, and record the weight."""
+        x, y, z = map(float, cell.arm.tool_pose.position)
+        yield from transport(self, cell, self.held, Goal((x, y, z + self.height)), "the weighing")
+        yield from cell.clock.sleep(self.settle)
+        loads: list[float] = []
+        for _ in cell.clock.sleep(self.period):
+            loads.append(cell.tool.load)
+            yield
+        fail_if_dropped(self, cell, self.held, "during the weighing")
+        self.weight = sum(loads) / len(loads)
+        ledger, std = cell.ledger, cell.tool.load_std
+        if contradiction := ledger.record_weight(self.held, self.weight, std, cell.classes):
+            raise self.failure("contradicted", f"{self.held} is of no certain class: {contradiction}")
+        label = ledger.get_label(self.held)
+        if (bin := choose_bin(cell, label)) is None:
+            raise self.failure("no_bin", f"{self.held} is a {label}, for which no bin is free")
+        self.bin = bin

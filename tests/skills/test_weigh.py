@@ -1,0 +1,129 @@
+"""Weighing of the held item, and correction of its class and its bin."""
+
+from __future__ import annotations
+
+import at_hand
+import pytest
+
+from executive.cells.fake.cell import FakeCell, load_empty_cell
+from executive.geometry import GRAVITY
+from executive.skill import SkillFailed
+from executive.testing.run_skill import SkillResult, run_skill
+from skills.weigh import Weigh
+
+ROUTES = {"bottle": ("red_bin",), "full_bottle": ("blue_bin",), "jar": ("yellow_bin",), "duck": ("red_bin",)}
+
+
+def make_fake(routes: dict[str, tuple[str, ...]] = ROUTES) -> FakeCell:
+    """A fake cell with empty and full bottles, which look alike, and jars, which weigh as full bottles."""
+    config = load_empty_cell()
+    bottle = config.objects["cube"].model_copy(update={"mass": 0.05})
+    full = bottle.model_copy(update={"mass": 0.20, "looks_like": "bottle"})
+    jar = bottle.model_copy(update={"mass": 0.20})
+    objects = {"bottle": bottle, "full_bottle": full, "jar": jar, "duck": config.objects["duck"]}
+    return FakeCell(config.model_copy(update={"objects": objects}), routes=routes)
+
+
+def pick(fake: FakeCell, label: str) -> str:
+    """Put an object of a class on the table, look once, and pick it."""
+    fake.world.put(label, 0.5, 0.0)
+    return at_hand.pick(fake, at_hand.look(fake)[0])
+
+
+def weigh(fake: FakeCell, item: str) -> SkillResult:
+    return run_skill(Weigh(held=item), fake)
+
+
+@pytest.mark.parametrize(
+    ("label", "mass", "bin"), [("bottle", 0.05, "red_bin"), ("full_bottle", 0.20, "blue_bin")]
+)
+def test_a_full_and_an_empty_bottle_look_alike_and_get_their_own_bins(
+    label: str, mass: float, bin: str
+) -> None:
+    fake = make_fake()
+    item = pick(fake, label)
+    assert (item, fake.ledger.get_label(item)) == ("bottle-1", "bottle")
+    result = weigh(fake, item)
+    assert (result.status, result.outputs["bin"]) == ("SUCCESS", bin)
+    assert result.outputs["weight"] == pytest.approx(mass * GRAVITY)
+    assert fake.ledger.get_label(item) == label
+
+
+def test_the_item_is_lifted_before_it_is_weighed() -> None:
+    fake = make_fake()
+    item = pick(fake, "bottle")
+    height = fake.arm.tool_pose.position[2]
+    run_skill(Weigh(held=item, height=0.1), fake)
+    assert fake.arm.tool_pose.position[2] == pytest.approx(height + 0.1)
+
+
+def test_a_weight_of_another_class_that_looks_different_contradicts_the_look() -> None:
+    fake = make_fake()
+    item = pick(fake, "jar")
+    fake.tool.load_error = -0.15 * GRAVITY
+    result = weigh(fake, item)
+    assert (result.status, result.reason) == ("FAILURE", "contradicted")
+    expected = "jar-1 is of no certain class: it weighs 0.49 N, and a jar 1.96 N"
+    assert (result.message, fake.ledger.get_label(item)) == (expected, "jar")
+
+
+def test_a_weight_between_two_classes_contradicts_both() -> None:
+    fake = make_fake()
+    item = pick(fake, "bottle")
+    fake.tool.load_error = 0.07 * GRAVITY
+    result = weigh(fake, item)
+    assert result.reason == "contradicted"
+    assert "it weighs 1.18 N, and a bottle 0.49 N and a full_bottle 1.96 N" in result.message
+
+
+def test_an_item_that_was_contradicted_is_rejected_with_its_weight() -> None:
+    fake = make_fake()
+    item = pick(fake, "bottle")
+    fake.tool.load_error = 0.07 * GRAVITY
+    weigh(fake, item)
+    fake.ledger.reject(item, "could not be picked")
+    (row,) = fake.ledger.list_items()
+    assert row.reason.startswith("could not be picked: it weighs 1.18 N")
+
+
+def test_a_class_without_a_declared_mass_is_weighed_without_a_conclusion() -> None:
+    fake = make_fake()
+    item = pick(fake, "duck")
+    fake.tool.load_error = 3.0
+    result = weigh(fake, item)
+    assert (result.status, result.outputs["weight"]) == ("SUCCESS", pytest.approx(3.981))
+
+
+def test_a_class_without_a_route_has_no_bin() -> None:
+    fake = make_fake({"bottle": ("red_bin",)})
+    result = weigh(fake, pick(fake, "full_bottle"))
+    expected = "bottle-1 is a full_bottle, for which no bin is free"
+    assert (result.reason, result.message) == ("no_bin", expected)
+
+
+def test_the_bin_with_the_fewest_objects_is_chosen() -> None:
+    fake = make_fake({"bottle": ("red_bin", "blue_bin")})
+    first = pick(fake, "bottle")
+    fake.ledger.record_placement(first, "red_bin")
+    fake.tool.open()
+    fake.world.objects.clear()
+    assert weigh(fake, pick(fake, "bottle")).outputs["bin"] == "blue_bin"
+
+
+def test_an_item_that_falls_during_the_measurement_is_dropped_and_not_weighed() -> None:
+    fake = make_fake()
+    item = pick(fake, "bottle")
+    steps = Weigh(held=item, settle=0.0).run(fake.cell)
+    loads = 0
+    with pytest.raises(SkillFailed) as failure:
+        while True:
+            next(steps)
+            fake.advance()
+            loads += fake.arm.at_rest
+            if loads == 40:
+                fake.tool.break_seal()
+    assert failure.value.reason == "dropped"
+    assert failure.value.message.startswith(
+        "the seal on bottle-1 broke during the weighing, near (0.50, 0.00"
+    )
+    assert fake.ledger.find_held_item() is None
