@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
 
+import guide_blocks
 import pytest
 from btcpp_rules import BUILT_IN, RULES, Document, list_violations
 
@@ -119,6 +120,16 @@ def export(tmp_path: Path, text: str) -> Document:
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_file_of_every_shipped_mission_satisfies_the_rules_of_xml_parsing(name: str) -> None:
     assert list_violations(format_btcpp(read_shipped(name), SKILLS)) == []
+
+
+def test_the_file_of_every_mission_of_the_guides_satisfies_the_rules(tmp_path: Path) -> None:
+    for file in guide_blocks.files().values():
+        path = tmp_path / file.name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(file.text, encoding="utf-8")
+    for name, file in guide_blocks.files().items():
+        if file.text.startswith("mission:") and not file.block.is_mistake:
+            assert list_violations(format_btcpp(read(tmp_path / name), SKILLS)) == [], name
 
 
 GOOD = """<root BTCPP_format="4" main_tree_to_execute="m"><BehaviorTree ID="m"><Sequence><A p="1"/>
