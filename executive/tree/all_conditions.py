@@ -9,7 +9,11 @@ from executive.tree.sequence import Sequence
 
 
 class AllConditions(Sequence):
-    """Succeed if all conditions succeed; fail with the first failure, without a check of later conditions."""
+    """Succeed if all conditions succeed; fail with the first failure, without a check of later conditions.
+
+    * BehaviorTree.CPP: `Sequence`.
+    * py_trees: `Sequence`.
+    """
 
     keyword = "all"
     symbol, shape = "&", "ellipse"

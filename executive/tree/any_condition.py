@@ -9,7 +9,11 @@ from executive.tree.keys import Children, Key, key
 
 
 class AnyCondition(Fallback):
-    """Succeed with the first condition that succeeds; fail with the failure of the last condition."""
+    """Succeed with the first condition that succeeds; fail with the failure of the last condition.
+
+    * BehaviorTree.CPP: `Fallback`.
+    * py_trees: `Selector`.
+    """
 
     keyword = "any"
     keyword_hints: ClassVar = {"or": "Write any."}

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.errors import Fault
+from executive.tree.counterpart import Counterpart
 from executive.tree.event_gate import EventGate
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.inspection import MinTimeFunction, NodeAnalysis, NodeFinding, PropagatedFailure
@@ -19,11 +20,15 @@ class Guard(ControlNode):
 
     Every tick checks the condition before it ticks the body. If the condition fails at the first tick, the
     body does not start. The guard otherwise ends as its body.
+
+    * BehaviorTree.CPP: `ReactiveSequence` with condition and body.
+    * py_trees: `decorators.EternalGuard`, with a function as the condition.
     """
 
     keyword = "guard"
     reasons = ("broken",)
     symbol = "◉"
+    counterpart = Counterpart("ReactiveSequence")
 
     holds: Child = key(conditions=True, doc="Condition that must succeed at every tick.")
     do: Child = key(doc="Body.")

@@ -7,7 +7,11 @@ from executive.tree.keys import Child, key
 
 
 class NotCondition(Invert):
-    """Succeed if the condition fails; fail with `inverted` if the condition succeeds."""
+    """Succeed if the condition fails; fail with `inverted` if the condition succeeds.
+
+    * BehaviorTree.CPP: `Inverter`.
+    * py_trees: `decorators.Inverter`.
+    """
 
     keyword = "not"
     is_condition = True

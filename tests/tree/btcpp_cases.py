@@ -19,7 +19,7 @@ class Case:
 
     Attributes:
         name: Name of the original test: file, fixture and test.
-        tree: Tree of the mission. Its skills are `A` to `G`, each with a digit or not.
+        tree: Tree of the mission. Its skills are `A` to `G`, each with a digit or not; `C` is a condition.
         scripts: Scripts by skill; `S` for other skills.
         expected: Statuses by node in BehaviorTree.CPP; `root` is the root of the tree.
         different: Statuses by node that differ here.
@@ -146,6 +146,13 @@ CASES = (
     Case("reactive/ReactiveSequence_AllChildrenSucceed", "{sequence: {memory: false, do: [A, B, C]}}", {},
          {"root": "S", "A": "S", "B": "S", "C": "S"}),
     Case("reactive/ReactiveSequence_ReEvaluatesOnEveryTick", "{sequence: {memory: false, do: [C, A]}}",
+         {"A": "RRS"}, {"root": "R R S", "C": "S S S", "A": "R R S"}),
+    # A guard is a reactive sequence of a condition and a body.
+    Case("reactive/ReactiveSequence_FirstChildFails, guard", "{guard: {holds: C, do: A}}", {"C": "F"},
+         {"root": "F", "C": "F", "A": "-"}),
+    Case("reactive/ReactiveSequence_HaltOnConditionChange, guard", "{guard: {holds: C, do: A}}",
+         {"C": "S S F", "A": "RRR"}, {"root": "R R F", "C": "S S F", "A": "R R H"}),
+    Case("reactive/ReactiveSequence_ReEvaluatesOnEveryTick, guard", "{guard: {holds: C, do: A}}",
          {"A": "RRS"}, {"root": "R R S", "C": "S S S", "A": "R R S"}),
     # gtest_reactive_backchaining.cpp
     Case("reactive_backchaining/EnsureWarm",

@@ -39,7 +39,6 @@ class ScriptedSkill(Skill):
     """
 
     reasons: ClassVar = ("failed",)
-    senses: ClassVar = True
     words: ClassVar[list[str]]
     letters: ClassVar[str]
 
@@ -61,7 +60,9 @@ class ScriptedSkill(Skill):
 
 
 def make_skill(name: str) -> type[ScriptedSkill]:
-    return type(name, (ScriptedSkill,), {"__doc__": "Follow a script."})
+    is_condition = name.startswith("C")
+    attributes = {"is_condition": is_condition, "senses": not is_condition}
+    return type(name, (ScriptedSkill,), {"__doc__": "Follow a script.", **attributes})
 
 
 SKILLS = {

@@ -28,9 +28,11 @@ SHIPPED = sorted(path.stem for path in get_shipped_folder().glob("*.yaml"))
 KEYWORDS = {
     "Sequence": "sequence", "Fallback": "fallback", "Inverter": "invert", "ForceSuccess": "succeed",
     "AlwaysSuccess": "succeed", "Repeat": "repeat", "RetryUntilSuccessful": "retry", "Timeout": "timeout",
-    "Parallel": "parallel", "ParallelAll": "parallel",
+    "Parallel": "parallel", "ParallelAll": "parallel", "ReactiveSequence": "guard",
 }  # fmt: skip
 """Keywords of the control nodes by their counterparts."""
+KEYWORDS_OF_CONDITIONS = {"all": "sequence", "any": "fallback", "not": "invert"}
+"""Keywords of nodes that combine conditions, with the keywords of nodes that have the same counterpart."""
 KEYS = {"num_attempts": "attempts", "num_cycles": "times", "msec": "seconds"}
 """Keys of the control nodes by ports of their counterparts."""
 Branch = tuple[str, dict[str, str], list["Part"]]
@@ -55,6 +57,16 @@ class Fail(Skill):
 
     reasons: ClassVar = ("failed", "late")
     senses: ClassVar = True
+
+    def run(self, cell: Any) -> None:
+        """Do nothing."""
+
+
+class Held(Skill):
+    """Be a condition."""
+
+    reasons: ClassVar = ("failed",)
+    is_condition: ClassVar = True
 
     def run(self, cell: Any) -> None:
         """Do nothing."""
@@ -89,7 +101,7 @@ class Sleep(Skill):
         """Do nothing."""
 
 
-SKILLS = {**load_skills(), **{skill.__name__: skill for skill in (Fail, Name, Read, Sleep, Write)}}
+SKILLS = {**load_skills(), **{skill.__name__: skill for skill in (Fail, Held, Name, Read, Sleep, Write)}}
 
 
 @cache
@@ -213,7 +225,11 @@ class MissionTree:
                 ports |= {name: self.format(setting.value) for name, setting in settings.items()}
                 return f"use {node.name}", node.label, ports, []
         assert isinstance(node, InnerNode)
-        return node.declaring_class.keyword, node.label, *self.describe_keys(node)
+        keyword = node.declaring_class.keyword
+        ports, branches = self.describe_keys(node)
+        if keyword == "guard":
+            branches = [("do", {}, [child for _, _, children in branches for child in children])]
+        return KEYWORDS_OF_CONDITIONS.get(keyword, keyword), node.label, ports, branches
 
     def describe_keys(self, owner: InnerNode | NodeSection) -> tuple[dict[str, str], list[Branch]]:
         """Return the constants of a control node or section, and its branches; `do` is the last branch."""
@@ -360,6 +376,8 @@ CASES: tuple[tuple[str, list[str]], ...] = (
       "Fail"]),
     (f"{{as: first, fallback: [Fail, {WAIT}]}}", ["Fallback name=first", "Fail"]),
     ("{as: mine, Fail: {}}", ["Fail name=mine"]),
+    (f"{{guard: {{holds: {{all: [Held, {{any: [Held, {{not: Held}}]}}]}}, do: {WAIT}}}}}",
+     ["ReactiveSequence", "Sequence", "Held", "Fallback", "Held", "Inverter", "Held"]),
 )  # fmt: skip
 """Trees of missions, and the exported elements without `Wait`."""
 
@@ -454,6 +472,6 @@ def test_the_reference_names_the_counterpart_of_every_control_node(keyword: str)
     exported = {
         elements[0].partition(" ")[0]
         for tree, elements in CASES
-        if f"{{{keyword}: " in tree or tree == keyword
+        if tree.startswith(f"{{{keyword}: ") or tree == keyword
     }
     assert all(f"`{name}`" in section for name in exported)
