@@ -114,6 +114,7 @@ def read(path: Path) -> Mission:
     """Return the mission in a file without checks, which take most of the time of loading."""
     files = read_mission(path, {}, SKILLS, load_control_nodes())
     assert not files.findings
+    SKILLS.update(files.behaviours)
     return files.mission
 
 
