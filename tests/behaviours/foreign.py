@@ -166,12 +166,12 @@ class Double(BehaviourWithPorts):
     is_replayable = True
     INPUT_PORTS: ClassVar = {
         "number": PortInformation(float, description="number to double"),
-        "offset": PortInformation(float, default_value=0.5),
-        "note": PortInformation(str, required=False),
+        "offset": PortInformation(float, default_value=0.5, description="offset of the result"),
+        "note": PortInformation(str, required=False, description="text"),
     }
     OUTPUT_PORTS: ClassVar = {
-        "doubled": PortInformation(float),
-        "remark": PortInformation(str, required=False),
+        "doubled": PortInformation(float, description="result"),
+        "remark": PortInformation(str, required=False, description="text"),
     }
 
     def update(self) -> Status:

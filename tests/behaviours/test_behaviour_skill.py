@@ -16,6 +16,7 @@ from executive.behaviours.run_blackboard import RunBlackboard
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
 from executive.skill import Direction, Skill
+from executive.testing.conformance import list_conformance_checks
 from executive.testing.run_skill import SkillResult, run_skill
 
 
@@ -179,3 +180,18 @@ def test_only_known_behaviours_are_replayable() -> None:
 def test_a_skill_is_made_once() -> None:
     assert make_behaviour_skill("A", foreign.Logged) is make_behaviour_skill("A", foreign.Logged)
     assert Status.SUCCESS.name in str(make_behaviour_skill("Logged", foreign.Logged).params["last"].default)
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "values"),
+    [
+        (foreign.Double, {"number": 2.0}),
+        (behaviours.TickCounter, {"duration": 3, "completion_status": "SUCCESS"}),
+    ],
+)
+def test_a_behaviour_conforms_to_the_rules_of_skills(
+    behaviour: type[Behaviour], values: dict[str, object]
+) -> None:
+    skill = make_behaviour_skill(behaviour.__name__, behaviour)
+    verdicts = [check.run() for check in list_conformance_checks(skill, lambda scene: values)]
+    assert [verdict for verdict in verdicts if verdict.status != "ok"] == []

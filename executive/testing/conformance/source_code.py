@@ -51,8 +51,10 @@ class FunctionSource:
 
 
 def list_skill_functions(skill: type[Skill]) -> list[FunctionType]:
-    """Return the functions that the class of a skill and its base classes define, in this order."""
-    parents = [parent for parent in skill.__mro__ if issubclass(parent, Skill) and parent is not Skill]
+    """Return the functions of a skill and its base classes, except base classes of this package."""
+    package = Skill.__module__.partition(".")[0]
+    skills = [parent for parent in skill.__mro__ if issubclass(parent, Skill)]
+    parents = [parent for parent in skills if parent.__module__.partition(".")[0] != package]
     members = [member for parent in parents for member in vars(parent).values()]
     functions = [getattr(member, "__func__", member) for member in members]
     return [member for member in functions if isinstance(member, FunctionType)]
