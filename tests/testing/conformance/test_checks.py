@@ -238,7 +238,8 @@ def test_a_problem_is_raised_with_the_rule_and_without_a_stage_nothing_succeeds(
     with pytest.raises(ConformanceError) as raised:
         check_of(faulty.AlwaysFails, "can_succeed")()
     assert str(raised.value).splitlines()[0] == (
-        "The skill can be tested, and succeeds in at least one situation. Violated:"
+        "The skill can be tested, and succeeds in at least one situation; a condition may always fail. "
+        "Violated:"
     )
     check = check_of(faulty.NeedsUnknown, "leaves_arm_at_rest")
     assert check.run().status == "not run"
