@@ -15,12 +15,13 @@ from executive.skill import In, Out, Skill, SkillFailed, param, port
 class SelectTarget(Skill):
     """Select the next target to pick, and its bin.
 
-    The skill selects only open items with a valid position and a class with a bin below its quota. Bins with
-    a quota come before bins without one. Enough looks must agree on the class of an item, given the error
-    rates of the detector. `nearest` refers to the tool or, while the arm moves, to the destination of the
-    arm; `surest` refers to the confidence of the last detection; `least_tried` selects the item with the
-    fewest failed attempts, and of several the nearest. A deferred item comes after all others (see `Defer`).
-    With `among`, the skill fails with `no_candidate` as soon as none of these items is open.
+    The skill selects only open items with a valid position and a class with a bin below its quota. Of the
+    bins of the class, it chooses the first one below its quota; without quotas, the one with the fewest
+    objects. Enough looks must agree on the class of an item, given the error rates of the detector. `nearest`
+    refers to the tool or, while the arm moves, to the destination of the arm; `surest` refers to the
+    confidence of the last detection; `least_tried` selects the item with the fewest failed attempts, and of
+    several the nearest. A deferred item comes after all others (see `Defer`). With `among`, the skill fails
+    with `no_candidate` as soon as none of these items is open.
     """
 
     targets: In[list[Target]] = port(doc="the known targets")
@@ -30,7 +31,7 @@ class SelectTarget(Skill):
     not_: In[list[Item] | None] = port(default=None, refers_to="item", doc="none of these items")
     target: Out[Target] = port(doc="the chosen target")
     item: Out[Item] = port(refers_to="item", doc="the item of the target")
-    bin: Out[str] = port(refers_to="bin", doc="the bin with the fewest used slots, of the bins of the class")
+    bin: Out[str] = port(refers_to="bin", doc="the bin for the target")
     prefer: str = param(
         "nearest",
         choices=("nearest", "surest", "least_tried"),

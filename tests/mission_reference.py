@@ -53,6 +53,7 @@ KINDS = {
     "trees": "names with subtrees", "args": "list of names, or names with values", "label": "name",
     KeyKind.NODE: "node", KeyKind.NODES: "list of nodes", KeyKind.REASONS: "reason, or list of reasons",
     KeyKind.VARIABLE: "name of a variable", KeyKind.ELEMENTS: "list, or `$name`",
+    KeyKind.REASONS_OR_SECTIONS: "reason, section, or list of both",
     KeyKind.SECTION: "section", KeyKind.SECTIONS: "section, or list of sections",
     "float": "number", "int": "whole number", "str": "text", "str | None": "text",
 }  # fmt: skip
@@ -124,7 +125,7 @@ def _key_rows(owner: str, node: type[ControlNode | KeySection], prefix: str = ""
         value = KINDS.get(key.kind) or _value(key.make_validator().json_schema())
         value += f", at most {key.max_count}" if key.max_count else ""
         yield [written, value, _default(key.default), key.doc]
-        if key.kind in (KeyKind.SECTION, KeyKind.SECTIONS):
+        if key.kind in (KeyKind.SECTION, KeyKind.SECTIONS, KeyKind.REASONS_OR_SECTIONS):
             yield from _key_rows(name, key.section, f"{name}.")
 
 

@@ -86,6 +86,12 @@ class Ledger(Protocol):
         `label` restricts the count to one class.
         """
 
+    def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
+        """Return the number of items in the state `placed` or `rejected`.
+
+        `label` restricts the count to one class, `bin` to one bin.
+        """
+
     def explain_exemption(self, label: str) -> str:
         """Return the reason why the mission does not sort further objects of a class, or "".
 

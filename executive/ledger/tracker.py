@@ -177,6 +177,11 @@ class Tracker:
         """Return the number of objects in a bin; `label` restricts the count to one class."""
         return self._bins.count_objects_in(bin, label)
 
+    def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
+        """Return the number of items in a state, of one class (`label`) and in one bin, or of all."""
+        items = self._records.filter_by_state(State(state))
+        return sum(label in (None, item.label) and bin in (None, item.bin) for item in items)
+
     def explain_exemption(self, label: str) -> str:
         """Return the reason why the mission does not sort further objects of a class, or ""."""
         return self._bins.explain_exemption(label)

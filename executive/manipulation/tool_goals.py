@@ -134,12 +134,11 @@ def list_free_bins(cell: Cell, label: str) -> list[str]:
 
 
 def choose_bin(cell: Cell, label: str) -> str | None:
-    """Return the free bin of a class with the fewest objects, bins with a quota first; None: no free bin."""
-    return min(
-        list_free_bins(cell, label),
-        key=lambda bin: (not cell.quotas.is_limited(bin, label), predict_object_count(cell, bin)),
-        default=None,
-    )
+    """Return the first free bin with a quota, else the free bin with the fewest objects, or None."""
+    bins = list_free_bins(cell, label)
+    limited_bins = (bin for bin in bins if cell.quotas.is_limited(bin, label))
+    fewest = min(bins, key=lambda bin: predict_object_count(cell, bin), default=None)
+    return next(limited_bins, fewest)
 
 
 def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:

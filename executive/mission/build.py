@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from functools import partial
 
+from executive.cell.counters import read_counter
 from executive.cell.protocols import Cell
 from executive.errors import InputError
 from executive.events import Emit
@@ -65,8 +67,9 @@ class TreeBuilder:
     def build_node(self, node: Node) -> TreeNode:
         """Return the behaviour for a node of the mission, with the behaviours of all nodes below it."""
         context = NodeContext(
-            node.path, self.cell.clock, self.blackboard, node.label, self.emit, self._list_open_items
-        )
+            node.path, self.cell.clock, self.blackboard, node.label, self.emit, self._list_open_items,
+            partial(read_counter, self.cell),
+        )  # fmt: skip
         match node:
             case SkillNode():
                 return self._build_skill_leaf(context, node)

@@ -42,6 +42,10 @@ class NodeAnalysis(Protocol):
     def is_halted_by_sibling(self) -> bool:
         """True if the node is halted when a concurrent node ends."""
 
+    @property
+    def is_concurrent(self) -> bool:
+        """True if another node may run at the same time."""
+
     def get_flow(self, child: Child) -> Flow | None:
         """Return the possible outcomes of a child; None if the child never runs."""
 
@@ -111,6 +115,6 @@ class Advice:
     child: Child | None = None
 
 
-def format_reasons(reasons: Sequence[Reason]) -> str:
-    """Return a text with all reasons: `Grasp.missed, look.unsure`."""
+def format_reasons(reasons: Sequence[object]) -> str:
+    """Return a text with all reasons, and with limits of counters: `Grasp.missed, look.unsure, placed: 4`."""
     return ", ".join(map(str, reasons))

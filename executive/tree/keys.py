@@ -61,6 +61,7 @@ class KeyKind(Enum):
     NODE = auto()
     NODES = auto()
     REASONS = auto()
+    REASONS_OR_SECTIONS = auto()
     VARIABLE = auto()
     ELEMENTS = auto()
     SECTION = auto()
@@ -212,6 +213,9 @@ def _complete_declaration(declaration: Key, attribute: str, annotation: object) 
         kind = KeyKind.SECTION
     elif isinstance(element_type, type) and issubclass(element_type, KeySection):
         kind, value_type = KeyKind.SECTIONS, element_type
+    elif get_origin(element_type) in (Union, types.UnionType) and Reason in get_args(element_type):
+        (value_type,) = (member for member in get_args(element_type) if member is not Reason)
+        kind = KeyKind.REASONS_OR_SECTIONS
     name = attribute.rstrip("_")
     return replace(declaration, name=name, attribute=attribute, kind=kind, value_type=value_type)
 

@@ -15,6 +15,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from pydantic import ValidationError
 
+from executive.cell.counters import CounterName
 from executive.cell.protocols import Clock
 from executive.errors import Fault, InputError
 from executive.events import BranchChosen, Emit, NodeEnded, NodeStarted, discard_event
@@ -38,6 +39,7 @@ class NodeContext:
         label: Label of the node in the mission, or "".
         emit: Function that emits the events of the node.
         list_open_items: Function that returns the names of the items that still have to be sorted.
+        read_counter: Function that returns the value of a counter of the run; by default always 0.
     """
 
     path: str
@@ -46,6 +48,7 @@ class NodeContext:
     label: str = ""
     emit: Emit = discard_event
     list_open_items: Callable[[], Sequence[str]] = tuple
+    read_counter: Callable[[CounterName], float] = lambda _: 0.0
 
 
 class TreeNode(Behaviour):
@@ -109,6 +112,7 @@ class ControlNode(KeyOwner, TreeNode):
         keyword_hints: Hints for authors, by the wrong keyword that an author writes instead of `keyword`.
         clock: Clock of the run.
         list_open_items: Function that returns the names of the items that still have to be sorted.
+        read_counter: Function that returns the value of a counter of the run.
     """
 
     keyword: ClassVar[str] = ""
@@ -122,6 +126,7 @@ class ControlNode(KeyOwner, TreeNode):
     def __init__(self, context: NodeContext, **values: object) -> None:
         super().__init__(context, self.keyword)
         self.clock, self.list_open_items = context.clock, context.list_open_items
+        self.read_counter = context.read_counter
         self.set_key_values(values)
         self.children = [child for key in self.keys for child in self.list_children(key)]
         for child in self.children:

@@ -1,22 +1,59 @@
-"""Loop that ends after a number of iterations or with an expected failure."""
+"""Loop that ends after a number of iterations, with an expected failure, or at the limit of a counter."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import ClassVar
 
 from py_trees.common import Status
 
+from executive.cell.counters import CounterName
+from executive.skill import Skill, ToolState
 from executive.tree.counterpart import Counterpart
+from executive.tree.failure import Reason
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
-from executive.tree.inspection import MinTimeFunction, PropagatedFailure, format_reasons
-from executive.tree.keys import Child, Reasons, key
+from executive.tree.inspection import (
+    MinTimeFunction,
+    NodeAnalysis,
+    NodeFinding,
+    PropagatedFailure,
+    format_reasons,
+)
+from executive.tree.keys import Child, KeySection, key
 from executive.tree.loop import Loop
 
 
-class Repeat(Loop):
-    """Run the body repeatedly, up to a maximum number of iterations or until an expected failure.
+class CounterLimits(KeySection):
+    """Values of counters of the run; the loop ends at the first that is reached."""
 
-    The loop succeeds in both cases. Any other failure of the body ends the loop and is passed on.
+    any_of = ("placed", "rejected", "elapsed")
+
+    placed: int | None = key(default=None, ge=0, doc="Number of items that the run has placed.")
+    rejected: int | None = key(default=None, ge=0, doc="Number of items that the run has rejected.")
+    elapsed: float | None = key(default=None, gt=0, doc="Time since the start of the run [s].")
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name}: {limit:g}" for name, limit in self.list_limits())
+
+    def list_limits(self) -> list[tuple[CounterName, float]]:
+        """Return the counters that have a limit, with their limits."""
+        limits: list[tuple[CounterName, float | None]] = [
+            ("placed", self.placed), ("rejected", self.rejected), ("elapsed", self.elapsed),
+        ]  # fmt: skip
+        return [(name, limit) for name, limit in limits if limit is not None]
+
+
+def _may_release(skill: type[Skill]) -> bool:
+    """Return True if a skill may release a held object."""
+    state_before, state_after = skill.tool_state
+    return state_before is not ToolState.EMPTY and state_after is ToolState.EMPTY
+
+
+class Repeat(Loop):
+    """Run the body repeatedly: up to a number of iterations, an expected failure, or the limit of a counter.
+
+    The loop succeeds in these cases. It reads the counters before each iteration, and does not interrupt an
+    iteration. Any other failure of the body ends the loop and is passed on.
 
     * BehaviorTree.CPP: `Repeat`; with `until`, a custom node `repeat`, because failures have no reasons.
     * py_trees: `decorators.Repeat`. Each iteration begins in a new tick, and there is no `until`.
@@ -27,7 +64,9 @@ class Repeat(Loop):
     any_of = ("times", "until")
 
     times: int | None = key(default=None, ge=0, doc="Maximum number of iterations.")
-    until: Reasons = key(default=(), doc="Failures that end the loop with success.")
+    until: tuple[Reason | CounterLimits, ...] = key(
+        default=(), doc="Failures and limits of counters that end the loop with success."
+    )
     do: Child = key(doc="Body of the loop.")
 
     @property
@@ -45,36 +84,70 @@ class Repeat(Loop):
 
     def step(self) -> Status:
         """Tick the body; after its end, begin the next iteration, in the same tick if possible."""
-        while self._iteration_count != self.times:
+        while self.do.status is Status.RUNNING or not self._is_complete():
             status = self.tick_in_iteration(self.do)
             if status is Status.RUNNING:
                 return status
             if status is Status.FAILURE:
                 failure = self.get_failure(self.do)
-                if not failure.matches(self.until):
+                if not failure.matches(self._expected_reasons):
                     return self.fail(failure)
                 self.report_choice("done", failure)
                 return Status.SUCCESS
             self._iteration_count += 1
-            if not self.begin_iteration() and self._iteration_count != self.times:
+            if not self.begin_iteration() and not self._is_complete():
                 return Status.RUNNING
+        if reached_limit := self._find_reached_limit():
+            self.report_choice(f"done, {reached_limit}")
         return Status.SUCCESS
+
+    @property
+    def _expected_reasons(self) -> list[Reason]:
+        """Failures that end the loop with success."""
+        return [end for end in self.until if isinstance(end, Reason)]
+
+    @property
+    def _limits(self) -> list[tuple[CounterName, float]]:
+        """Counters that have a limit, with their limits."""
+        return [limit for end in self.until if isinstance(end, CounterLimits) for limit in end.list_limits()]
+
+    def _is_complete(self) -> bool:
+        """Return True if no further iteration may begin."""
+        return self._iteration_count == self.times or bool(self._find_reached_limit())
+
+    def _find_reached_limit(self) -> str:
+        """Return the first limit that a counter has reached, as a text: `placed: 4`; "" without one."""
+        limits = (f"{name}: {limit:g}" for name, limit in self._limits if self.read_counter(name) >= limit)
+        return next(limits, "")
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes; the next iteration starts in the state after success of the body."""
-        if self.times == 0:
+        if self.times == 0 or any(limit == 0 for _, limit in self._limits):
             return Flow(state, {}, None)
         body, entry = find_fixed_point(
             get_flow, self.do, state, lambda body: None if self.times == 1 else body.success
         )
-        expected_ends = [end for failure, end in body.failures.items() if failure.may_match(self.until)]
-        success = join_states((*expected_ends, None if self.times is None else body.success))
-        failures = {cause: end for cause, end in body.failures.items() if not cause.must_match(self.until)}
+        reasons = self._expected_reasons
+        expected_ends = [end for failure, end in body.failures.items() if failure.may_match(reasons)]
+        # A counter may have reached its limit before the first iteration.
+        last_ends = (None if self.times is None else body.success, entry if self._limits else None)
+        success = join_states((*expected_ends, *last_ends))
+        failures = {cause: end for cause, end in body.failures.items() if not cause.must_match(reasons)}
         return Flow(success, failures, join_states((body.halted, entry)))
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the minimum time of all iterations [s]; 0 if a failure may end the loop with success."""
         return 0.0 if self.until else (self.times or 0) * get_min_time(self.do)
+
+    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+        """Yield an error if the loop can succeed only by placed items, and its body places none."""
+        names = {name for name, _ in self._limits}
+        if names != {"placed"} or self._expected_reasons or self.times is not None or analysis.is_concurrent:
+            return
+        skills = analysis.list_skills()
+        if not any(skill is None or _may_release(skill) for skill in skills):
+            message = "this loop never succeeds: its body releases no object, so `placed` does not increase"
+            yield NodeFinding("", "endless", message, "Add a reason or elapsed to until, or add times.")
 
     def explain_unreachable(self, child: Child) -> str:
         """Return a text that explains why the body never runs: the number of iterations is 0."""

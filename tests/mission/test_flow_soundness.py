@@ -213,6 +213,10 @@ def bodies(node: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
         ),
         st.builds(lambda n, do: {"repeat": {"times": n, "do": do}}, st.integers(0, 3), node),
         st.builds(lambda until, do: {"repeat": {"until": until, "do": do}}, reasons, node),
+        st.builds(
+            lambda until, limit, do: {"repeat": {"until": [*until, {"elapsed": limit}], "do": do}},
+            reasons, st.floats(0.1, 9), node,
+        ),
         st.builds(lambda condition, do: {"while": {"condition": condition, "do": do}}, node, node),
         st.builds(
             lambda n, do: {"for_each": {"each": "element", "in": list(range(n)), "do": do}},

@@ -136,6 +136,26 @@ def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name
     assert json.loads((path / "result.json").read_text()) == to_json(result)
 
 
+@pytest.mark.parametrize(
+    ("name", "setting"), [("sort_until_four", {"enough": "2"}), ("fill_by_quota", {"most": "1"})]
+)
+def test_counters_and_quotas_are_the_same_after_a_kill(missions: Path, tmp_path: Path, name, setting) -> None:
+    loaded = load_mission(missions / f"{name}.yaml", load_skills(), setting)
+    whole = run_of(loaded, tmp_path)
+    whole_bins = list_bins(find_run("latest", tmp_path))
+    path = cut_off(loaded, tmp_path, 700)
+    result = resumed(path)
+    assert (result.status, result.items, result.audit.agrees) == ("SUCCESS", whole.items, True)
+    assert sorted(list_bins(path).values()) == sorted(whole_bins.values())
+    assert redecided(path) == ""
+
+
+def list_bins(path: Path) -> dict[str, str]:
+    """Return the bin of each placed item at the end of a run."""
+    changes = (timed.event for timed in read_journal(path / "journal.jsonl"))
+    return {one.item: one.bin for one in changes if isinstance(one, ItemChanged) and one.state == "placed"}
+
+
 @pytest.mark.parametrize("nth", [1, 2, 3, 10])
 def test_a_run_that_was_killed_in_its_first_control_step_starts_again(
     missions: Path, tmp_path: Path, nth: int

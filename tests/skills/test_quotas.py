@@ -42,9 +42,9 @@ def place_all(fake: FakeCell, targets) -> list[str]:
     return results
 
 
-def test_bins_with_a_quota_are_filled_before_the_bin_without_one() -> None:
+def test_bins_with_a_quota_are_filled_in_their_order_before_the_bin_without_one() -> None:
     fake = make_cell({("red_bin", "cube"): 2, ("blue_bin", "cube"): 1}, *["cube"] * 5)
-    bins = ["red_bin", "blue_bin", "red_bin", "yellow_bin", "yellow_bin"]
+    bins = ["red_bin", "red_bin", "blue_bin", "yellow_bin", "yellow_bin"]
     assert place_all(fake, look(fake))[:5] == bins
 
 

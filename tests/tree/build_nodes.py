@@ -19,7 +19,7 @@ from executive.tree.invert import Invert
 from executive.tree.keys import VariableName
 from executive.tree.node import NodeContext
 from executive.tree.parallel import Parallel
-from executive.tree.repeat import Repeat
+from executive.tree.repeat import CounterLimits, Repeat
 from executive.tree.retry import Backoff, Retry
 from executive.tree.sequence import Sequence as SequenceNode
 from executive.tree.succeed import Succeed
@@ -75,8 +75,11 @@ def retry(
     return Retry(site, attempts=attempts, on=names_of(on), recover=recover, backoff=backoff, do=body)
 
 
-def repeat(site: NodeContext, body: Behaviour, times: int | None = None, until: Names = ()) -> Repeat:
-    return Repeat(site, times=times, until=names_of(until), do=body)
+def repeat(
+    site: NodeContext, body: Behaviour, times: int | None = None, until: Names = (), **limits: float
+) -> Repeat:
+    ends = (*names_of(until), *((CounterLimits(**limits),) if limits else ()))
+    return Repeat(site, times=times, until=ends, do=body)
 
 
 def while_loop(site: NodeContext, condition: Behaviour, body: Behaviour) -> While:

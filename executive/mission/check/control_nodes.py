@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import cast
 
 from executive.mission.check.context import CheckContext
@@ -12,13 +12,14 @@ from executive.mission.findings import Finding, find_similar_word, make_error, m
 from executive.mission.model.conversion import WrongType, convert_constant
 from executive.mission.model.instance import find_upper_bound, get_mission_node, make_inspection_instance
 from executive.mission.model.node_paths import get_path_name
-from executive.mission.model.nodes import InnerNode, KeyValue, Node, NodeSection, SkillNode, iterate_keys
+from executive.mission.model.nodes import InnerNode, KeyValue, NodeSection, SkillNode, iterate_keys
 from executive.mission.model.values import FailureName, Literal, Reference
 from executive.skill import Skill
 from executive.tree.failure import Reason
 from executive.tree.flow import Flow
 from executive.tree.inspection import NodeFinding
 from executive.tree.keys import Child, ElementWord, Key, KeyKind
+from executive.tree.node import ControlNode
 
 ELEMENT_WORDS = tuple(word.value for word in ElementWord)
 """Words that stand for a list of names."""
@@ -71,18 +72,21 @@ def _check_constant(
 
 def run_node_checks(context: CheckContext) -> Iterator[Finding]:
     """Yield the findings of the method `check` of every control node."""
-    halted_paths = {node.path for node in _find_halted_nodes(context)}
+    halted_paths = _find_paths_below(context, lambda node: node.children_halted_by_sibling)
+    concurrent_paths = _find_paths_below(context, lambda node: node.concurrent_children)
     for node in context.iterate_control_nodes():
-        analysis = CheckerAnalysis(context, node, node.path in halted_paths)
+        analysis = CheckerAnalysis(context, node, node.path in halted_paths, node.path in concurrent_paths)
         for node_finding in make_inspection_instance(node).check(analysis):
             yield _locate_finding(node, node_finding)
 
 
-def _find_halted_nodes(context: CheckContext) -> Iterator[Node]:
-    """Yield every node that may be halted because another branch of a `parallel` has ended."""
-    for node in context.iterate_control_nodes():
-        for child in make_inspection_instance(node).children_halted_by_sibling:
-            yield from get_mission_node(child).walk()
+def _find_paths_below(
+    context: CheckContext, select_children: Callable[[ControlNode], Sequence[Child]]
+) -> set[str]:
+    """Return the paths of all nodes in and below the selected children of all control nodes."""
+    instances = map(make_inspection_instance, context.iterate_control_nodes())
+    roots = [get_mission_node(child) for instance in instances for child in select_children(instance)]
+    return {node.path for root in roots for node in root.walk()}
 
 
 def _locate_finding(node: InnerNode, node_finding: NodeFinding) -> Finding:
@@ -101,9 +105,11 @@ def _locate_finding(node: InnerNode, node_finding: NodeFinding) -> Finding:
 class CheckerAnalysis:
     """Implementation of `NodeAnalysis` for one control node."""
 
-    def __init__(self, context: CheckContext, node: InnerNode, is_halted_by_sibling: bool) -> None:
+    def __init__(
+        self, context: CheckContext, node: InnerNode, is_halted_by_sibling: bool, is_concurrent: bool
+    ) -> None:
         self._context, self._node = context, node
-        self.is_halted_by_sibling = is_halted_by_sibling
+        self.is_halted_by_sibling, self.is_concurrent = is_halted_by_sibling, is_concurrent
 
     def get_flow(self, child: Child) -> Flow | None:
         """Return the possible ends of a child; None if the child can never run."""

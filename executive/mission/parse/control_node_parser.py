@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
 from executive.mission.model.nodes import InnerNode, InvalidNode, KeyValue, Node, NodeSection, list_nodes
-from executive.mission.model.values import LocatedName
+from executive.mission.model.values import FailureName, LocatedName
 from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
 from executive.mission.source import Span
 from executive.mission.text.yaml_text import (
@@ -131,6 +131,8 @@ class _KeyReader:
                 return self._read_nodes(reader, key, node)
             case KeyKind.REASONS:
                 return reader.read_failure_names(key.name)
+            case KeyKind.REASONS_OR_SECTIONS:
+                return self._read_reasons_or_sections(reader, key)
             case KeyKind.VARIABLE:
                 return self._read_variable(reader, key.name)
             case KeyKind.SECTION:
@@ -158,9 +160,21 @@ class _KeyReader:
         name = variable.name.removeprefix("$")
         return LocatedName(name, variable.span) if NAME_PATTERN.fullmatch(name) else None
 
+    def _read_reasons_or_sections(
+        self, reader: MappingReader, key: Key
+    ) -> tuple[FailureName | NodeSection, ...]:
+        """Return the failure names and the sections in the list or single value of a key."""
+        mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
+        sections = [self._read_section(key, item, item.span) for item in mappings]
+        names = reader.read_failure_names(key.name, tuple(key.section.keys))
+        return (*names, *(section for section in sections if section is not None))
+
     def _read_section(self, key: Key, value: YamlNode, span: Span) -> NodeSection | None:
         """Return the section below a key, or None if the section lacks a required constant."""
         values = self.read_inner_keys(key.name, span, value, key.section)
+        if key.section.any_of and isinstance(value, YamlMapping) and not value.entries:
+            alternatives = " or ".join(f'"{name}"' for name in key.section.any_of)
+            self.parser.add_error(span, "missing-key", f"{key.name} needs {alternatives}")
         for name, inner_key in key.section.keys.items():
             if inner_key.is_required and inner_key.kind is KeyKind.CONSTANT and name not in values:
                 return None

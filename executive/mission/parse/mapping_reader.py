@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from pydantic import JsonValue
@@ -87,8 +87,11 @@ class MappingReader:
         self.add_error(node.span, "wrong-type", message)
         return ""
 
-    def read_failure_names(self, key: str) -> tuple[FailureName, ...]:
-        """Return the failure names in the list or single value of `key`; add an error for invalid items."""
+    def read_failure_names(self, key: str, section_keys: Sequence[str] = ()) -> tuple[FailureName, ...]:
+        """Return the failure names in the list or single value of `key`; add an error for invalid items.
+
+        If the value may also contain sections with keys `section_keys`, mappings are ignored.
+        """
         node = self.get(key)
         names = []
         if isinstance(node, YamlSequence) and not node.items:
@@ -96,10 +99,14 @@ class MappingReader:
             self.add_error(node.span, "empty-list", f"{self._describe_key(key)} names no failure", hint)
         for item in self.list_items(key):
             text = item.text if isinstance(item, YamlScalar) else ""
+            if section_keys and isinstance(item, YamlMapping):
+                continue
             if match := _FAILURE_PATTERN.fullmatch(text):
                 names.append(FailureName(match[1], match[2], item.span))
             else:
                 rule = f"{self._describe_key(key)} must name failures as Skill.reason or label.reason"
+                if section_keys:
+                    rule += f", or be a mapping with {' or '.join(section_keys)}"
                 message = f'{rule}, not "{text}"' if text else f"{rule}, not {describe_node(item)}"
                 self.add_error(item.span, "bad-match", message)
         return tuple(names)

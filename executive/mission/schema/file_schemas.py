@@ -51,7 +51,8 @@ def _make_file_schema(title: str, keys: GrammarKeys, skills: Skills, node_classe
             "tree": {"anyOf": [_make_reference("node"), subtree]},
             "param": _make_param_schema(),
             "library": _make_mapping_schema(grammar.LIBRARY_KEYS),
-            "reasons": _make_reasons_schema(skills),
+            "reason": _make_reason_schema(skills),
+            "reasons": {"anyOf": [*_make_reason_schema(skills)["anyOf"], _make_list_schema(_REASON)]},
             "label": {"type": "string", "pattern": f"^{grammar.LABEL_PATTERN}$"},
             "reference": {"title": "$name", "type": "string", "pattern": rf"^\${_NAME}(\.{_NAME})?$"},
             **{name: make_settings_schema(name, skill) for name, skill in skills.items()},
@@ -144,6 +145,9 @@ def _make_value_schema(key: Key | GrammarKey) -> Schema:
             return _SCHEMAS_BY_KIND["nodes"]
         case KeyKind.REASONS:
             return _make_reference("reasons")
+        case KeyKind.REASONS_OR_SECTIONS:
+            section = {**_make_mapping_schema(key.section.keys), **_require_any_of(key.section.any_of)}
+            return {"anyOf": [_make_reference("reasons"), section, _make_list_schema(_REASON, section)]}
         case KeyKind.VARIABLE:
             return _SCHEMAS_BY_KIND["name"]
         case KeyKind.ELEMENTS:
@@ -167,16 +171,21 @@ def _require_any_of(keys: Sequence[str]) -> Schema:
     return {"anyOf": [{"required": [key]} for key in keys]} if keys else {}
 
 
-def _make_reasons_schema(skills: Skills) -> Schema:
-    """Return the schema of one reason, or of a list of reasons."""
+def _make_reason_schema(skills: Skills) -> Schema:
     skill_reasons = [f"{name}.{reason}" for name, skill in skills.items() for reason in skill.reasons]
-    reason = [
-        {"title": "Skill.reason", "enum": skill_reasons},
-        {"title": "Behaviour.failed", "type": "string", "pattern": r"^[A-Za-z_]\w*\.failed$"},
-        {"title": "label.reason", "type": "string", "pattern": rf"^{grammar.LABEL_PATTERN}\.{_NAME}$"},
-    ]
-    reasons = {"title": "list", "type": "array", "items": {"anyOf": reason}, "minItems": 1}
-    return {"anyOf": [*reason, reasons]}
+    label_pattern = rf"^{grammar.LABEL_PATTERN}\.{_NAME}$"
+    return {
+        "anyOf": [
+            {"title": "Skill.reason", "enum": skill_reasons},
+            {"title": "Behaviour.failed", "type": "string", "pattern": r"^[A-Za-z_]\w*\.failed$"},
+            {"title": "label.reason", "type": "string", "pattern": label_pattern},
+        ]
+    }
+
+
+def _make_list_schema(*item_schemas: Schema) -> Schema:
+    """Return the schema of a list whose items have one of the schemas."""
+    return {"title": "list", "type": "array", "items": {"anyOf": [*item_schemas]}, "minItems": 1}
 
 
 def _make_param_schema() -> Schema:
@@ -220,6 +229,8 @@ def _allow_list(text_schema: Schema) -> Schema:
 
 _ANY_NAME: Schema = {"pattern": "^[A-Za-z_][A-Za-z0-9_-]*$"}
 """Schema of a name that may contain hyphens."""
+
+_REASON = _make_reference("reason")
 
 _QUOTA: Schema = make_value_or_reference_schema({"type": "integer", "minimum": 1})
 _QUOTAS_BY_CLASS: Schema = {"type": "object", "additionalProperties": _QUOTA, "minProperties": 1}
