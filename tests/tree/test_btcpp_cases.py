@@ -60,13 +60,13 @@ class ScriptedSkill(Skill):
 
 
 def make_skill(name: str) -> type[ScriptedSkill]:
-    is_condition = name.startswith("C")
+    is_condition = name[0] in "CT"
     attributes = {"is_condition": is_condition, "senses": not is_condition}
     return type(name, (ScriptedSkill,), {"__doc__": "Follow a script.", **attributes})
 
 
 SKILLS = {
-    name: make_skill(name) for letter in "ABCDEFG" for name in (letter, *(f"{letter}{n}" for n in (1, 2, 3)))
+    name: make_skill(name) for letter in "ABCDEFGT" for name in (letter, *(f"{letter}{n}" for n in (1, 2, 3)))
 }
 
 
