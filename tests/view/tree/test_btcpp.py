@@ -21,6 +21,7 @@ from executive.mission.parse.read_mission import read_mission
 from executive.mission.text.file_search import find_mission, get_shipped_folder
 from executive.plugins import load_skills
 from executive.skill import Direction, In, Out, Skill, param
+from executive.tree.failure import Reason
 from executive.tree.node_registry import load_control_nodes
 from executive.view.tree.btcpp import format_btcpp
 
@@ -28,7 +29,8 @@ SHIPPED = sorted(path.stem for path in get_shipped_folder().glob("*.yaml"))
 KEYWORDS = {
     "Sequence": "sequence", "Fallback": "fallback", "Inverter": "invert", "ForceSuccess": "succeed",
     "AlwaysSuccess": "succeed", "Repeat": "repeat", "RetryUntilSuccessful": "retry", "Timeout": "timeout",
-    "Parallel": "parallel", "ParallelAll": "parallel", "ReactiveSequence": "guard",
+    "Parallel": "parallel", "ParallelAll": "parallel", "ReactiveSequence": "sequence",
+    "ReactiveFallback": "fallback",
 }  # fmt: skip
 """Keywords of the control nodes by their counterparts."""
 KEYWORDS_OF_CONDITIONS = {"all": "sequence", "any": "fallback", "not": "invert"}
@@ -229,7 +231,9 @@ class MissionTree:
         keyword = node.declaring_class.keyword
         ports, branches = self.describe_keys(node)
         if keyword == "guard":
-            branches = [("do", {}, [child for _, _, children in branches for child in children])]
+            # The counterpart is that of a sequence of the condition and the body, without memory.
+            children = [child for _, _, nodes in branches for child in nodes]
+            return "sequence", node.label, {"memory": "false"}, [("do", {}, children)]
         return KEYWORDS_OF_CONDITIONS.get(keyword, keyword), node.label, ports, branches
 
     def describe_keys(self, owner: InnerNode | NodeSection) -> tuple[dict[str, str], list[Branch]]:
@@ -257,8 +261,10 @@ class MissionTree:
                 return str(constant).lower() if isinstance(constant, bool) else str(constant)
             case NodeSection() as section:
                 return ",".join(f"{key.name}={self.format(item)}" for key, item in iterate_keys(section))
-            case tuple() as reasons:
-                return ";".join(map(str, reasons))
+            case tuple() as items:
+                return ";".join(
+                    str(item) if isinstance(item, Reason) else self.format(item) for item in items
+                )
         return f"{{{value.name}}}"
 
 
@@ -287,6 +293,8 @@ def rebuild_node(element: Element) -> Part:
         # The pointers to local variables contain the name of the subtree.
         ports = {key: text for key, text in ports.items() if "." not in text or text[0] != "{"}
         return f"use {element.get('ID')}", label, ports, []
+    if element.tag.startswith("Reactive"):
+        ports["memory"] = "false"
     if element.tag == "Timeout":
         ports["seconds"] = str(int(ports["seconds"]) / 1000)
     branches: list[Branch] = []
