@@ -11,12 +11,14 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import (
     BranchChosen,
+    InputRead,
     ItemChanged,
     NodeEnded,
     NodeStarted,
     TargetSelected,
     ToolCommanded,
 )
+from executive.geometry import GRAVITY
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.record.journal import read_journal
@@ -52,6 +54,19 @@ def test_the_same_mission_decides_the_same(missions: Path, tmp_path: Path, name:
     done = again(recorded(missions, tmp_path, name))
     assert (done.is_equal, done.difference) == (True, "")
     assert done.decisions > 100
+
+
+def test_a_weighing_is_replayed_without_the_tool(missions: Path, tmp_path: Path) -> None:
+    path = recorded(missions, tmp_path, "weigh_and_sort")
+    events = [timed.event for timed in read_journal(path / "journal.jsonl")]
+    readings = [event.value for event in events if isinstance(event, InputRead) and event.name == "tool.load"]
+    assert 0.15 * GRAVITY in [pytest.approx(value) for value in readings]
+    assert again(path).is_equal
+
+
+@pytest.mark.slow
+def test_a_simulated_weighing_is_replayed_with_its_noise(missions: Path, tmp_path: Path) -> None:
+    assert again(recorded(missions, tmp_path, "weigh_and_sort", kind=make_oracle_kind())).is_equal
 
 
 @pytest.mark.slow
