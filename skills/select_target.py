@@ -78,7 +78,12 @@ class SelectTarget(Skill):
     def _is_nothing_left(self, cell: Cell) -> bool:
         """Return True if no requested item is left, or if none of the items in `among` is open."""
         if self.among is None:
-            return self.same is None and cell.ledger.is_table_empty(self.wanted, self.not_ or ())
+            # An object that looks like an object of the wanted class may belong to it, until it is weighed.
+            looks = {other.look for other in cell.classes.values() if other.label == self.wanted}
+            labels, ignored_items = {self.wanted, *looks}, self.not_ or ()
+            return self.same is None and all(
+                cell.ledger.is_table_empty(label, ignored_items) for label in labels
+            )
         known_items = [item for item in cell.ledger.list_known_items() if self._is_requested(cell, item.item)]
         return not any(item.is_open or item.state == "lost" for item in known_items)
 

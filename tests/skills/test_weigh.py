@@ -9,6 +9,7 @@ from executive.cells.fake.cell import FakeCell, load_empty_cell
 from executive.geometry import GRAVITY
 from executive.skill import SkillFailed
 from executive.testing.run_skill import SkillResult, run_skill
+from skills.select_target import SelectTarget
 from skills.weigh import Weigh
 
 ROUTES = {"bottle": ("red_bin",), "full_bottle": ("blue_bin",), "jar": ("yellow_bin",), "duck": ("red_bin",)}
@@ -108,6 +109,21 @@ def test_the_bin_with_the_fewest_objects_is_chosen() -> None:
     fake.tool.open()
     fake.world.objects.clear()
     assert weigh(fake, pick(fake, "bottle")).outputs["bin"] == "blue_bin"
+
+
+def test_no_full_bottle_is_left_only_if_no_bottle_is_left_that_was_not_weighed() -> None:
+    fake = make_fake()
+    fake.world.put("bottle", 0.5, 0.0)
+    targets = [at_hand.look(fake, "full") for _ in range(4)][-1]
+    select = SelectTarget(targets=targets, wanted="full_bottle")
+    assert run_skill(select, fake).reason == "unseen"
+    weigh(fake, at_hand.pick(fake, targets[0]))
+    fake.ledger.record_placement("bottle-1", "red_bin")
+    fake.tool.open()
+    fake.world.objects.clear()
+    for _ in range(4):
+        at_hand.look(fake, "full")
+    assert run_skill(select, fake).reason == "no_candidate"
 
 
 def test_an_item_that_falls_during_the_measurement_is_dropped_and_not_weighed() -> None:

@@ -180,7 +180,9 @@ def find_undetectable_classes(context: CheckContext) -> Iterator[Finding]:
         # A detector with unknown classes may detect every class.
         return
     for label, span in _find_named_classes(context):
-        if label in context.cell.objects and not any(label in classes for classes in detectors.values()):
+        section = context.cell.objects.get(label)
+        look = label if section is None else section.looks_like or label
+        if section is not None and not any(look in classes for classes in detectors.values()):
             descriptions = "; ".join(f"{name}: {', '.join(classes)}" for name, classes in detectors.items())
             message = f'no detector of the cell can detect the class "{label}"'
             hint = f"Classes by detector: {descriptions}. Train another detector with `executive train`."
@@ -188,12 +190,8 @@ def find_undetectable_classes(context: CheckContext) -> Iterator[Finding]:
 
 
 def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Span]]:
-    """Yield every class in the routes and in the settings of skills, with its position.
-
-    For a class in the routes that looks like another class, the other class is yielded.
-    """
-    looks = {} if context.cell is None else {label: o.looks_like for label, o in context.cell.objects.items()}
-    yield from ((looks.get(route.label) or route.label, route.label_span) for route in context.mission.routes)
+    """Yield every class in the routes and in the settings of skills, with its position."""
+    yield from ((route.label, route.label_span) for route in context.mission.routes)
     for node, skill in context.iterate_installed_skills():
         for name, value in find_literals(node):
             declaration = skill.params.get(name) or skill.ports.get(name)
