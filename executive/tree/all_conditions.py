@@ -20,5 +20,6 @@ class AllConditions(Sequence):
     is_condition = True
     # Conditions decide within one tick, so that the key `memory` of the sequence would have no effect.
     keys: ClassVar[dict[str, Key]] = {}
+    memory = True
 
     do: Children = key(shorthand=True, conditions=True, doc="Conditions, in order.")

@@ -21,5 +21,6 @@ class AnyCondition(Fallback):
     is_condition = True
     # Conditions decide within one tick, so that the key `memory` of the fallback would have no effect.
     keys: ClassVar[dict[str, Key]] = {}
+    memory = True
 
     do: Children = key(shorthand=True, conditions=True, doc="Conditions, in order.")

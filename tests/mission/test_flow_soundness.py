@@ -197,6 +197,10 @@ def bodies(node: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
         st.builds(lambda nodes: {"sequence": nodes}, lists),
         st.builds(lambda nodes: {"fallback": nodes}, lists),
         st.builds(
+            lambda word, checks, node: {word: {"memory": False, "do": [*checks, node]}},
+            st.sampled_from(["sequence", "fallback"]), st.lists(conditions, max_size=2), node,
+        ),
+        st.builds(
             lambda nodes, wait, halts: {"parallel": {"do": nodes, "wait_for": wait, "halt": halts}},
             lists, st.sampled_from(["all", "any", "lead"]), st.booleans(),
         ),

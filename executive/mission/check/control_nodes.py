@@ -138,6 +138,12 @@ class CheckerAnalysis:
         skills = [node for node in get_mission_node(child).walk() if isinstance(node, SkillNode)]
         return [(node.skill, compute_min_time(self._context, node)) for node in skills]
 
+    def list_actions(self, child: Child) -> Sequence[str]:
+        """Return the names of the installed skills in and below a child that are no conditions."""
+        names = [node.skill for node in get_mission_node(child).walk() if isinstance(node, SkillNode)]
+        skills = self._context.skills
+        return [name for name in names if name in skills and not skills[name].is_condition]
+
     def list_skills(self) -> Sequence[type[Skill] | None]:
         """Return the skills below the node; None stands for a skill that is not installed."""
         nodes = [node for node in self._node.walk() if isinstance(node, SkillNode)]

@@ -1,0 +1,78 @@
+"""Sequence and fallback without memory, as ReactiveSequence and ReactiveFallback of BehaviorTree.CPP."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from build_nodes import sequence
+from py_trees.common import Status
+
+from executive.events import BranchChosen, NodeStarted
+from executive.tree.fallback import Fallback
+from executive.tree.sequence import Sequence
+
+
+def reactive(kind: Any, site: Any, children: Any) -> Any:
+    return kind(site("node"), memory=False, do=children)
+
+
+@pytest.mark.parametrize(
+    ("kind", "first", "second", "statuses", "log"),
+    [
+        (Sequence, ("S",), ("R R S",), "RRS", ["A starts", "B starts", "A starts", "A starts"]),
+        (Sequence, ("S", "lost"), ("R R S",), "RF", ["A starts", "B starts", "A starts", "B halted"]),
+        (Sequence, ("S", "R S"), ("R S", "S"), "RRS",
+         ["A starts", "B starts", "A starts", "B halted", "B starts"]),
+        (Sequence, ("R S",), ("lost",), "RF", ["A starts", "B starts"]),
+        (Fallback, ("lost",), ("R R S",), "RRS", ["A starts", "B starts", "A starts", "A starts"]),
+        (Fallback, ("lost", "S"), ("R R S",), "RS", ["A starts", "B starts", "A starts", "B halted"]),
+        (Fallback, ("lost", "R lost"), ("R S", "S"), "RRS",
+         ["A starts", "B starts", "A starts", "B halted", "B starts"]),
+        (Fallback, ("lost",), ("R off",), "RF", ["A starts", "B starts", "A starts"]),
+    ],
+    ids=[
+        "sequence: an earlier child is checked again", "sequence: a failed check halts the running child",
+        "sequence: an earlier child that runs halts a later one", "sequence: fails with its failing child",
+        "fallback: an earlier child is tried again", "fallback: an earlier success halts the running child",
+        "fallback: an earlier child that runs halts a later one", "fallback: fails with its last child",
+    ],
+)  # fmt: skip
+def test_a_node_without_memory_begins_every_tick_with_its_first_child(
+    leaf: Any, site: Any, ticks: Any, kind: Any, first: Any, second: Any, statuses: str, log: Any,
+    request: Any,
+) -> None:  # fmt: skip
+    node = reactive(kind, site, [leaf("A", *first), leaf("B", *second)])
+    assert ticks(node) == statuses
+    assert request.getfixturevalue("log") == log
+
+
+@pytest.mark.parametrize("kind", [Sequence, Fallback])
+def test_a_halt_halts_the_running_child(leaf: Any, site: Any, log: Any, kind: Any) -> None:
+    node = reactive(kind, site, [leaf("A", "R R"), leaf("B")])
+    node.tick_once()
+    node.stop(Status.INVALID)
+    assert log == ["A starts", "A halted"]
+
+
+def test_a_repeated_check_with_an_equal_result_is_no_event(
+    leaf: Any, site: Any, ticks: Any, events: Any
+) -> None:
+    check = sequence(site("node/check"), [leaf("A", "S")])
+    work = sequence(site("node/work"), [leaf("B", "R " * 5 + "S")])
+    assert ticks(reactive(Sequence, site, [check, work])) == "RRRRRS"
+    assert [event.node for event in events if isinstance(event, NodeStarted)] == [
+        "node", "node/check", "node/work",
+    ]  # fmt: skip
+
+
+def test_a_fallback_reports_its_choice_only_when_the_choice_changes(
+    leaf: Any, site: Any, ticks: Any, events: Any
+) -> None:
+    ticks(reactive(Fallback, site, [leaf("A", "lost"), leaf("B", "R R R S")]))
+    assert [event.choice for event in events if isinstance(event, BranchChosen)] == ["choice 2 of 2"]
+
+
+def test_a_node_with_memory_runs_a_child_once(leaf: Any, site: Any, ticks: Any, log: Any) -> None:
+    ticks(sequence(site(), [leaf("A"), leaf("B", "R R S")]))
+    assert log == ["A starts", "B starts"]
