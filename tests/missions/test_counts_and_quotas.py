@@ -43,3 +43,17 @@ def test_two_cubes_fill_each_bin_with_a_quota_and_the_rest_goes_elsewhere() -> N
 def test_set_changes_a_quota(most: int) -> None:
     counts = count_by_bin(run_with("fill_by_quota", *["cube"] * 6, most=str(most)))
     assert [counts[name]["cube"] for name in ("red_bin", "blue_bin")] == [most, most]
+
+
+def test_sorting_ends_after_four_objects_and_the_others_are_skipped() -> None:
+    result = run_with("sort_until_four", *["sphere"] * 2, *["cube"] * 3, "sphere")
+    assert (result.status, result.items["placed"], result.items["skipped"]) == ("SUCCESS", 4, 2)
+    assert count_by_bin(result)["red_bin"] == {"cube": 3}, "the cubes come first"
+
+
+def test_the_first_kit_is_complete_before_the_second_begins() -> None:
+    result = run_with("kit_shapes", "cube", "cube", "cube", "sphere", "sphere", "duck")
+    counts = count_by_bin(result)
+    assert counts["red_bin"] == {"cube": 1, "sphere": 1, "duck": 1}
+    assert counts["blue_bin"] == {"cube": 1, "sphere": 1}
+    assert (result.status, result.items["skipped"], result.agrees) == ("SUCCESS", 1, True)
