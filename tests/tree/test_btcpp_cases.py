@@ -9,8 +9,7 @@ from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import pytest
-from btcpp_cases import CASES as ALL_CASES
-from btcpp_cases import NOT_RESTATED, Case
+from btcpp_cases import CASES, NOT_RESTATED, Case
 from hand_set_clock import Clock
 from py_trees.common import Status
 
@@ -22,9 +21,7 @@ from executive.skill import Skill
 from executive.tree.blackboard import Blackboard
 from executive.tree.node import TreeNode
 from executive.tree.node_registry import load_control_nodes
-from executive.tree.sequence import Sequence
 
-CASES = [case for case in ALL_CASES if "memory" in Sequence.keys or "memory" not in case.tree]
 NODE_CLASSES = load_control_nodes()
 TICK_PERIOD = 0.1
 """Time between two ticks [s]."""

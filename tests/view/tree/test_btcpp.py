@@ -352,6 +352,8 @@ WAIT = "{Wait: {seconds: 1}}"
 CASES: tuple[tuple[str, list[str]], ...] = (
     (f"[{WAIT}]", ["Sequence"]),
     (f"{{fallback: [Fail, {WAIT}]}}", ["Fallback", "Fail"]),
+    (f"{{sequence: {{memory: false, do: [Held, {WAIT}]}}}}", ["ReactiveSequence", "Held"]),
+    (f"{{fallback: {{memory: false, do: [Held, {WAIT}]}}}}", ["ReactiveFallback", "Held"]),
     (f"{{succeed: {WAIT}}}", ["ForceSuccess"]),
     ("succeed", ["AlwaysSuccess"]),
     ("{invert: {invert: Fail}}", ["Inverter", "Inverter", "Fail"]),
