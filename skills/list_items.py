@@ -12,8 +12,8 @@ from executive.skill import Out, Skill, param, port
 class ListItems(Skill):
     """List the known items in a state, in the order of their first detection; the list may be empty.
 
-    `open` items still have to be sorted; `deferred` items are open, too. `skipped` items have no route, and
-    `lost` items were dropped by the tool and not found since.
+    `open` items still have to be sorted; `deferred` items are open, too. `skipped` items have no route or
+    exceed a quota, and `lost` items were dropped by the tool and not found since.
     """
 
     items: Out[list[Item]] = port(refers_to="item", doc="the items in this state")

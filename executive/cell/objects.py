@@ -55,7 +55,7 @@ class KnownItem:
         item: Id of the item.
         label: Name of the most probable class.
         state: `open`: still to be sorted; `deferred`: open, behind the other items; `held`; `placed`;
-            `rejected`; `skipped`: without a route; `lost`: dropped by the tool and not found since.
+            `rejected`; `skipped`: without a route or beyond a quota; `lost`: dropped and not found since.
         bin: Name of the bin that contains the item, or "".
         position: Last known position of the centre `(3,)` [m] in the world.
         attempts: Number of failed attempts to pick the item.

@@ -147,13 +147,13 @@ class ItemRecord:
             self.belief.look_count, self.attempt_count, self.bin, self.reason,
         )  # fmt: skip
 
-    def describe(self, *, has_route: bool) -> KnownItem:
-        """Return the item for skills; `has_route` is True if the mission has a bin for the class."""
+    def describe(self, *, is_exempt: bool) -> KnownItem:
+        """Return the item for skills; `is_exempt` is True if the mission does not sort the class any more."""
         state = self.state.value
         if self.state is State.DROPPED:
             state = State.REJECTED.value if self.reason else State.LOST.value
         elif self.state is State.SEEN:
-            state = "deferred" if self.turn else "open" if has_route else State.SKIPPED.value
+            state = State.SKIPPED.value if is_exempt else "deferred" if self.turn else "open"
         return KnownItem(
             self.item, self.label, state, self.bin, self.position, self.attempt_count, self.deferral_count,
             self.turn,

@@ -348,7 +348,7 @@ class Tracker:
             self._records.emit(*self._bins.place_dropped_items(detections, bin_names))
 
     def _describe(self, record: ItemRecord) -> KnownItem:
-        return record.describe(has_route=record.label in self._routes)
+        return record.describe(is_exempt=bool(self._bins.explain_exemption(record.label)))
 
     def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
         """Set items to DROPPED, so that later looks search for them on the table and in the bins."""

@@ -1,0 +1,165 @@
+"""The missions that put an object back, follow an order, and ask for classes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from executive.cell.protocols import Cell, Steps
+from executive.cells.fake.cell import FakeCell
+from executive.events import ItemChanged, NodeEnded
+from executive.mission.load import load_mission
+from executive.plugins import load_skills
+from executive.record.journal import read_journal
+from executive.record.recorded_run import RecordOptions, record_run
+from executive.record.replayed_run import replay_run
+from executive.record.resume import resume_run
+from executive.record.run_directory import find_run
+from executive.run.assembly import RunOptions
+from executive.testing.faults import during, seal_fails
+from executive.testing.run_mission import MissionResult, run_mission
+from skills.approach import Approach
+from tests.record.test_resume import Cut, Cutter
+
+MAX_NEIGHBOUR_DISTANCE = 0.09
+"""Distance below which two neighbours prevent an approach to the object between them [m]."""
+
+
+def list_placed(result: MissionResult) -> list[str]:
+    """Return the items in the order of their placement."""
+    changes = [timed.event for timed in result.events if isinstance(timed.event, ItemChanged)]
+    return list(dict.fromkeys(change.item for change in changes if change.state == "placed"))
+
+
+def put(cell: FakeCell, *places: tuple[str, float, float]) -> None:
+    cell.world.objects.clear()
+    for place in places:
+        cell.world.put(*place)
+
+
+def put_a_row(cell: FakeCell) -> None:
+    put(cell, ("cube", 0.45, 0.0), ("sphere", 0.45, 0.08), ("duck", 0.45, -0.08))
+
+
+def test_a_missed_object_comes_last_and_is_then_picked() -> None:
+    first_item, *others = list_placed(run_mission("sort_with_second_chance", arrange=put_a_row))
+    misses = during("*/Grasp", seal_fails(), activations=[1, 2])
+    result = run_mission("sort_with_second_chance", arrange=put_a_row, faults=[misses])
+    assert (result.status, result.items["placed"], result.agrees) == ("SUCCESS", 3, True)
+    assert list_placed(result)[-1] == first_item
+    assert sorted(list_placed(result)[:-1]) == sorted(others)
+    assert len(result.list_activated_nodes("*/Defer")) == 1
+
+
+def test_an_object_that_is_missed_again_at_the_end_is_rejected() -> None:
+    misses = during("*/Grasp", seal_fails(), activations=[1, 2, 5, 6])
+    result = run_mission("sort_with_second_chance", arrange=put_a_row, faults=[misses])
+    assert (result.status, result.items["placed"], result.items["rejected"]) == ("INCOMPLETE", 2, 1)
+    assert result.list_failure_reasons("*/Defer") == ["exhausted"]
+
+
+class CarefulApproach(Approach):
+    """Approach that is blocked while two objects are too near to the target."""
+
+    def run(self, cell: Cell) -> Steps:
+        """Count the neighbours, then approach."""
+        targets = (entry for entry in cell.ledger.find_objects_on_table() if entry.item != self.target.item)
+        distances = [float(np.linalg.norm(entry.position - self.target.position)) for entry in targets]
+        if sum(distance < MAX_NEIGHBOUR_DISTANCE for distance in distances) >= 2:
+            raise self.failure("blocked", "two neighbours are too near")
+        yield from super().run(cell)
+
+
+def test_an_object_between_near_neighbours_is_picked_after_they_are_gone() -> None:
+    substitutes = {"*/Approach": CarefulApproach}
+
+    def put_a_corner(cell: FakeCell) -> None:
+        put(cell, ("cube", 0.43, 0.2), ("sphere", 0.51, 0.2), ("duck", 0.43, 0.12))
+
+    result = run_mission("sort_with_second_chance", arrange=put_a_corner, substitutes=substitutes)
+    assert (result.status, list_placed(result)[-1]) == ("SUCCESS", "cube-1")
+    assert result.list_failure_reasons("*/Approach") == ["blocked", "blocked"]
+
+
+def test_the_objects_are_picked_in_the_order_of_the_list() -> None:
+    def put_five(cell: FakeCell) -> None:
+        put(cell, ("cube", 0.45, 0.0), ("cube", 0.6, 0.1), ("duck", 0.45, 0.15), ("duck", 0.6, -0.15))
+        cell.world.put("sphere", 0.5, -0.2)
+
+    result = run_mission("pick_in_order", arrange=put_five)
+    assert [item.partition("-")[0] for item in list_placed(result)] == ["duck", "cube", "duck", "cube"]
+    assert (result.status, result.items["skipped"]) == ("SUCCESS", 1)
+
+
+def test_a_missing_object_of_the_list_is_skipped() -> None:
+    result = run_mission("pick_in_order", arrange=lambda cell: put(cell, ("duck", 0.5, 0.0)))
+    assert (result.status, list_placed(result)) == ("SUCCESS", ["duck-1"])
+
+
+def test_all_objects_of_the_requested_class_are_sorted_before_the_next_request() -> None:
+    def put_four(cell: FakeCell) -> None:
+        put(cell, ("cube", 0.45, 0.0), ("duck", 0.45, 0.15), ("cube", 0.6, -0.15), ("sphere", 0.6, 0.1))
+
+    result = run_mission("sort_requested_class", arrange=put_four, requests=["cube", "duck"])
+    assert [item.partition("-")[0] for item in list_placed(result)] == ["cube", "cube", "duck"]
+    assert (result.status, result.items["skipped"]) == ("SUCCESS", 1)
+    requests = [timed.event for timed in result.events if is_request(timed.event)]
+    assert len(requests) == 3
+
+
+def is_request(event: object) -> bool:
+    return isinstance(event, NodeEnded) and event.skill == "AwaitRequest"
+
+
+@pytest.fixture
+def cut_run(tmp_path: Path) -> Iterator[tuple[Path, Any]]:
+    """A run of the second-chance mission that ended after the deferral, and the options of its cell."""
+    loaded = load_mission("sort_with_second_chance", load_skills())
+
+    class Cell(FakeCell):
+        """Cell whose first two grasps miss."""
+
+        def __init__(self, *args: Any, **options: Any) -> None:
+            super().__init__(*args, **options)
+            if options["options"].resume is None:
+                put_a_row(self)
+                attempts = iter([False, False])
+                self.tool.can_seal = lambda: next(attempts, True)
+
+    ended: list[int] = []
+    whole = RecordOptions([Watcher(ended)], saves_pictures=False)
+    result = record_run(loaded, load_skills(), RunOptions(0, make_cell=Cell), tmp_path, whole)
+    assert result.status == "SUCCESS"
+    views = [Cutter(ended[0] + 400)]
+    with pytest.raises(Cut):
+        options = RecordOptions(views, saves_pictures=False)
+        record_run(loaded, load_skills(), RunOptions(0, make_cell=Cell), tmp_path, options)
+    yield find_run("latest", tmp_path), Cell
+
+
+class Watcher(Cutter):
+    """A view that notes the control step in which a skill `Defer` ends."""
+
+    def __init__(self, ended: list[int]) -> None:
+        super().__init__(10**9)
+        self._ended = ended
+
+    def __call__(self, timed: Any) -> None:
+        if isinstance(timed.event, NodeEnded) and timed.event.skill == "Defer":
+            self._ended.append(timed.tick)
+
+
+def test_a_resumed_run_still_picks_the_deferred_object_last(cut_run: tuple[Path, Any]) -> None:
+    path, cell = cut_run
+    options = RecordOptions(saves_pictures=False)
+    result = resume_run(path, load_skills(), RunOptions(0, make_cell=cell), options)
+    assert (result.status, result.items.placed) == ("SUCCESS", 3)
+    events = [timed.event for timed in read_journal(path / "journal.jsonl")]
+    placed = [one.item for one in events if isinstance(one, ItemChanged) and one.state == "placed"]
+    deferred = [one.item for one in events if isinstance(one, NodeEnded) and one.skill == "Defer"]
+    assert list(dict.fromkeys(placed))[-1] == deferred[0]
+    assert replay_run(path, read_journal(path / "journal.jsonl"), load_skills()).difference == ""
