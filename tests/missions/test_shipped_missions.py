@@ -23,7 +23,8 @@ REHEARSED = {"kit_fasteners", "recycle", "sort_fruit", "tray_instruments"}
 """Missions whose cell has no physics."""
 
 KEEPS_SOMETHING = {
-    "sort_by_priority", "kit_fasteners", "kit_shapes", "recycle", "sort_until_four", "tray_instruments",
+    "sort_by_priority", "kit_fasteners", "kit_shapes", "pick_in_order", "recycle", "sort_until_four",
+    "tray_instruments",
 }  # fmt: skip
 """Missions that are done while something is left on the table, which the ledger then calls rejected."""
 

@@ -199,7 +199,8 @@ def _check_compared_constants(
         port = context.skills[wire.skill].ports.get(name)
         if port is None or port.same_as != wire.port.name:
             continue
-        expected = replace(port, type=writer.type, refers_to=writer.refers_to)
+        # A field that names a bin may be empty.
+        expected = replace(port, type=writer.type, refers_to=writer.refers_to, default="")
         yield from find_unknown_names(context, wire.skill, expected, value)
         if not is_assignable(type(value.value), expected.type):
             kind = describe_values(expected.type, expected.refers_to)

@@ -1,0 +1,192 @@
+"""Missions that read fields of values, go through poses, bins, classes and items, and compare values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from executive.cells.fake.cell import FakeCell
+from executive.events import NodeEnded
+from executive.mission.findings import MissionError
+from executive.mission.load import load_mission
+from executive.mission.outline import make_outline
+from executive.plugins import load_skills
+from executive.run.assembly import RunOptions, assemble
+from executive.testing.conformance import list_conformance_checks
+from executive.testing.run_mission import MissionResult, run_mission
+from skills.is_equal import IsEqual
+
+HEAD = """\
+mission: m
+cell: cells/overhead.yaml
+library: library/sorting.yaml
+routes: {duck: yellow_bin, cube: red_bin}
+"""
+
+Execute = Callable[[str], MissionResult]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[[str], Path]:
+    """Write a mission with the given tree, and return its path."""
+
+    def write(text: str) -> Path:
+        path = tmp_path / "m.yaml"
+        path.write_text(HEAD + text)
+        return path
+
+    return write
+
+
+@pytest.fixture
+def execute(write: Callable[[str], Path]) -> Execute:
+    """Run a mission on a table with two cubes, a duck and a sphere."""
+
+    def put_four(cell: FakeCell) -> None:
+        cell.world.objects.clear()
+        for place in (("cube", 0.45, 0.1), ("cube", 0.6, 0.1), ("duck", 0.45, -0.1), ("sphere", 0.6, -0.1)):
+            cell.world.put(*place)
+
+    return lambda text: run_mission(write(text), arrange=put_four)
+
+
+def list_ends(result: MissionResult, skill: str) -> list[NodeEnded]:
+    """Return the ends of all nodes that run a skill."""
+    ends = (timed.event for timed in result.events if isinstance(timed.event, NodeEnded))
+    return [end for end in ends if end.skill == skill]
+
+
+def compare(value: str, to: str) -> str:
+    """Return a tree that selects an object and compares a value; the nearest object is a cube."""
+    return f"tree: [{{use: look}}, SelectTarget, {{IsEqual: {{value: {value}, to: {to}}}}}]"
+
+
+@pytest.mark.parametrize(
+    ("value", "to"),
+    [
+        ("$target.label", "cube"),
+        ("$target.item", "$item"),
+        ("$item.label", "$target.label"),
+        ("$item.state", "open"),
+        ("$item.attempts", "0"),
+        ("$item.bin", '""'),
+        ("$target.change_count", "0"),
+    ],
+)
+def test_a_skill_reads_a_field_of_a_variable(execute: Execute, value: str, to: str) -> None:
+    result = execute(compare(value, to))
+    assert (result.status, result.message) == ("SUCCESS", "")
+
+
+def test_different_values_are_not_equal(execute: Execute) -> None:
+    result = execute(compare("$target.label", "duck"))
+    assert (result.reason, result.message) == ("IsEqual.different", "the value is cube, not duck")
+
+
+def test_the_fields_of_an_item_are_read_from_the_ledger_when_the_skill_starts(execute: Execute) -> None:
+    result = execute(
+        "tree:\n"
+        "  - [{use: look}, SelectTarget, {IsEqual: {value: $item.deferrals, to: 0}}]\n"
+        "  - [Defer, {IsEqual: {value: $item.deferrals, to: 1}}]\n"
+        "  - [{IsEqual: {value: $item.state, to: deferred}}, {use: carry}]\n"
+        "  - [{IsEqual: {value: $item.state, to: placed}}, {IsEqual: {value: $item.bin, to: red_bin}}]\n"
+    )
+    assert (result.status, result.message, result.items["placed"]) == ("SUCCESS", "", 1)
+
+
+def test_an_argument_of_a_subtree_may_be_a_field_of_a_variable_of_the_caller(execute: Execute) -> None:
+    result = execute(
+        "tree: [{use: look}, SelectTarget, {use: another, with: {like: $target.label}}]\n"
+        "trees:\n"
+        "  another:\n"
+        "    args: [like]\n"
+        "    returns: []\n"
+        "    do:\n"
+        "      - [{use: look}, {SelectTarget: {wanted: $like}}]\n"
+        "      - IsEqual: {value: $target.label, to: $like}\n"
+    )
+    assert (result.status, result.message) == ("SUCCESS", "")
+
+
+def test_a_loop_goes_through_a_field_with_a_list(execute: Execute) -> None:
+    result = execute(
+        "tree:\n"
+        "  - [MoveToScan, Detect]\n"
+        "  - for_each:\n"
+        "      each: one\n"
+        "      in: $detections.confident\n"
+        "      do: {fallback: [{IsEqual: {value: $one.label, to: cube}}, succeed]}\n"
+    )
+    assert sorted(end.status for end in list_ends(result, "IsEqual")) == ["FAILURE"] * 2 + ["SUCCESS"] * 2
+
+
+@pytest.mark.parametrize(
+    ("word", "elements"),
+    [
+        ("poses", ["home", "aside"]),
+        ("bins", ["red_bin", "blue_bin", "yellow_bin"]),
+        ("classes", ["duck", "cube"]),
+        ("items", ["cube-1", "cube-2", "duck-1"]),
+    ],
+)
+def test_a_word_stands_for_a_list_of_names(execute: Execute, word: str, elements: list[str]) -> None:
+    result = execute(
+        "tree:\n"
+        "  - use: look\n"
+        f"  - for_each: {{each: one, in: {word}, do: {{try: {{IsEqual: {{value: $one, to: no}}}},"
+        " catch: [{on: [IsEqual.different], do: succeed}]}}\n"
+    )
+    messages = [end.message for end in list_ends(result, "IsEqual")]
+    assert sorted(messages) == sorted(f"the value is {element}, not no" for element in elements)
+
+
+def test_the_elements_of_loops_give_names_to_params(execute: Execute) -> None:
+    result = execute(
+        "tree:\n"
+        "  for_each:\n"
+        "    each: pose\n"
+        "    in: poses\n"
+        "    do: {for_each: {each: view, in: [table, full], do: [{MoveToScan: {pose: $pose}}, "
+        "{Detect: {view: $view, hidden: pass}}]}}\n"
+    )
+    assert (result.status, result.message) == ("SUCCESS", "")
+    assert len(list_ends(result, "Detect")) == 4
+    assert result.cell.arm.tool_pose.position == pytest.approx(result.cell.arm.poses["aside"].position)
+
+
+def test_a_param_reads_no_variable_of_its_own_name(write: Callable[[str], Path]) -> None:
+    path = write("tree: {for_each: {each: pose, in: [aside], do: [{Wait: {seconds: 0.1}}, MoveToScan]}}")
+    (warning,) = load_mission(path, load_skills()).warnings
+    assert warning.message == "no node in this for_each reads $pose"
+
+
+def test_a_field_is_shown_in_drawings(write: Callable[[str], Path]) -> None:
+    loaded = load_mission(write(compare("$target.label", "cube")), load_skills())
+    run = assemble(loaded, load_skills(), RunOptions(0, make_cell=FakeCell), [])
+    try:
+        (node,) = (node for node in make_outline(run.root) if node.skill == "IsEqual")
+    finally:
+        run.close()
+    assert node.detail == "to: cube, value: $target.label"
+    assert [(read.port, read.variable) for read in node.reads] == [("value", "target.label")]
+
+
+def test_a_word_is_no_mistake_if_the_cell_file_has_errors(tmp_path: Path) -> None:
+    (tmp_path / "broken.yaml").write_text("base: cells/overhead.yaml\nbins: 3\n")
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "mission: m\ncell: broken.yaml\nroutes: {}\n"
+        "tree: {for_each: {each: pose, in: poses, do: {MoveToScan: {pose: $pose}}}}\n"
+    )
+    with pytest.raises(MissionError) as error:
+        load_mission(path, load_skills())
+    assert {finding.path for finding in error.value.findings} == {str(tmp_path / "broken.yaml")}
+
+
+@pytest.mark.parametrize(
+    "check", list_conformance_checks(IsEqual, lambda scene: {"value": "a", "to": "a"}), ids=str
+)
+def test_is_equal_conforms(check: Callable[[], None]) -> None:
+    check()
