@@ -95,4 +95,5 @@ class Timeout(ControlNode):
     @property
     def counterpart(self) -> Counterpart | None:
         """`Timeout` of BehaviorTree.CPP, with the limit in whole milliseconds."""
-        return Counterpart("Timeout", {"msec": max(1, int(1000 * min(self.seconds, 1e6)))})
+        # A limit that is unknown during the export is infinite here.
+        return Counterpart("Timeout", {"msec": max(1, round(1000 * min(self.seconds, 1e6)))})

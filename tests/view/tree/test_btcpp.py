@@ -367,7 +367,7 @@ CASES: tuple[tuple[str, list[str]], ...] = (
     (f"{{retry: {{attempts: 3, recover: {WAIT}, do: Fail}}}}",
      ["retry attempts=3", "retry-recover", "Fail"]),
     (f"{{timeout: {{seconds: 1.25, do: {WAIT}}}}}", ["Timeout msec=1250"]),
-    (f"{{timeout: {{seconds: 1.0001, do: {WAIT}}}}}", ["Timeout msec=1000"]),
+    (f"{{timeout: {{seconds: 1.001, do: {WAIT}}}}}", ["Timeout msec=1001"]),
     (f"{{parallel: [Fail, {WAIT}]}}", ["ParallelAll max_failures=1", "Fail"]),
     (f"{{parallel: {{wait_for: any, do: [Fail, Fail, {WAIT}]}}}}",
      ["Parallel success_count=1 failure_count=3", "Fail", "Fail"]),
