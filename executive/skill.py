@@ -155,6 +155,8 @@ class Skill:
     Attributes:
         params: Declared params by name.
         ports: Declared ports by name.
+        one_of: Names of optional inputs of which a mission sets exactly one. Such an input reads a variable
+            only if the mission names the variable.
         reasons: Reasons with which the skill may fail.
         uses: Devices that no concurrent branch may use at the same time: `arm`, `tool`, `camera`.
         senses: True if the skill gets new information: an image, or a request of the operator.
@@ -172,6 +174,7 @@ class Skill:
 
     params: ClassVar[Mapping[str, Param]] = {}
     ports: ClassVar[Mapping[str, Port]] = {}
+    one_of: ClassVar[tuple[str, ...]] = ()
     reasons: ClassVar[tuple[str, ...]] = ()
     uses: ClassVar[tuple[str, ...]] = ()
     senses: ClassVar[bool] = False

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from executive.cell.detection import Detections
 from executive.cell.protocols import Cell, MinTimes, Steps
-from executive.errors import Crowded, Unavailable
+from executive.manipulation.looks import take_look
 from executive.manipulation.obstacles import is_detection_in_bin
 from executive.skill import Out, Skill, param, port
 
@@ -43,19 +43,7 @@ class Detect(Skill):
         camera = cell.camera
         if self.hidden == "fail" and not camera.sees_table():
             raise self.failure("hidden", f"the arm hides part of the workspace from camera {camera.name}")
-        detector = cell.detectors[self.detector or next(iter(cell.detectors))]
-        frame = camera.capture()
-        if displacement := camera.describe_displacement(frame):
-            raise self.failure("camera_moved", displacement)
-        request = detector.request(frame, self.view)
-        while not request.ready:
-            yield
-        try:
-            answer = request.result()
-        except Crowded as error:
-            raise self.failure("crowded", str(error)) from error
-        except Unavailable as error:
-            raise self.failure("unavailable", str(error)) from error
+        frame, answer = yield from take_look(self, cell, self.detector, self.view)
         on_table = (entry for entry in answer.doubtful if not is_detection_in_bin(cell, entry, frame))
         if not answer.confident and self.doubtful == "fail" and (best := next(on_table, None)):
             raise self.failure("unsure", answer.describe_doubt(best))

@@ -154,12 +154,13 @@ def measure_detector(
     """
     # Images of a dataset and of randomized scenes do not use the camera, table and localizer of the cell.
     cell_of_images = None if dataset is not None or scenes.is_randomized else detector.cell
+    camera = next(iter(cell_of_images.cameras.values())) if cell_of_images else None
     with _open_images(detector.cell, dataset, scenes, progress) as samples:
         cell_detector = CellDetector(
             detector.configs,
             detector.name,
             base=detector.base_folder,
-            camera=next(iter(cell_of_images.cameras.values())) if cell_of_images else None,
+            camera=camera,
             view=scenes.view,
             classes=tuple(detector.cell.objects) if detector.cell else None,
         )
@@ -168,6 +169,7 @@ def measure_detector(
                 cell_detector, _iterate_with_progress(samples, update), mistakes=worst_mistakes,
                 localizer=_build_localizer(cell_of_images) if cell_of_images else None,
                 table=cell_of_images.table if cell_of_images else None, threshold=threshold,
+                is_partial=camera is not None and camera.partial_views,
             )  # fmt: skip
 
 

@@ -30,7 +30,8 @@ class Frame:
         matrix: Camera matrix `(3, 3)` [pixel].
         X_WC: Camera pose in the world at capture, in the convention of OpenCV (z forward, y down).
         stamp: Capture time on the clock of the run [s].
-        visible: Mask `(H, W)`, False for pixels that the arm may occlude at its measured joint positions.
+        visible: Mask `(H, W)`, False for pixels that the arm may occlude at its measured joint positions, and
+            for pixels at the border of an image with a partial view (`CameraConfig.partial_views`).
         change_count: Number of robot actions that may have moved objects before the capture.
     """
 

@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from enum import Enum
 from typing import Protocol
 
 from executive.cell.detection import Detections, Observation
 from executive.cell.frame import Frame
 from executive.cell.objects import Item, KnownItem, ObjectClass, Target
 from executive.geometry import Array
+
+
+class Presence(Enum):
+    """Answer to the question whether an item is at the place where the ledger believes it to be."""
+
+    THERE = "there"
+    """A frame shows the item at its place."""
+    GONE = "gone"
+    """Enough frames show the place without the item."""
+    HIDDEN = "hidden"
+    """The frame does not show the place."""
+    UNSURE = "unsure"
+    """A detection at the place is doubtful, or too few frames show the place without the item."""
 
 
 class Ledger(Protocol):
@@ -81,10 +95,7 @@ class Ledger(Protocol):
         """Return the number of failed attempts to pick an item."""
 
     def count_objects_in(self, bin: str, label: str | None = None) -> int:
-        """Return the number of objects in a bin, which is also the index of the next free slot.
-
-        `label` restricts the count to one class.
-        """
+        """Return the number of objects in a bin; `label` restricts the count to one class."""
 
     def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
         """Return the number of items in the state `placed` or `rejected`.
@@ -96,6 +107,29 @@ class Ledger(Protocol):
         """Return the reason why the mission does not sort further objects of a class, or "".
 
         The class has no route, or the quotas of all its bins are reached.
+        """
+
+    def count_used_slots(self, bin: str) -> int:
+        """Return the index of the next free slot of a bin.
+
+        Slots are used in order, so the slots of objects that someone took out of the bin count as used until
+        the bin is empty.
+        """
+
+    def list_items_in(self, bin: str) -> Sequence[Item]:
+        """Return the items that were placed in a bin and are not gone."""
+
+    def verify(self, item: Item, detections: Detections, observations: Sequence[Observation]) -> Presence:
+        """Return whether an item is at its place, according to this frame and to earlier calls.
+
+        A frame may miss an item by chance. The item is gone if the probability of this is small enough, given
+        the miss rates of the detectors. Its position is then unknown: the item counts as dropped, until a
+        frame shows an object of its class at a new place.
+
+        Args:
+            item: The item.
+            detections: Detections in a frame that shows the whole image or the place; `observe` knows them.
+            observations: The same detections, localized in the world.
         """
 
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:

@@ -105,10 +105,13 @@ def _may_be_same_object(
     """Return True if a new item may be the same object as an old item that recent images no longer show.
 
     The robot may push an object anywhere, a person by at most `MAX_PUSH_DISTANCE`. An item that became a
-    phantom after an attempt to pick it may be an object that the attempt pushed away.
+    phantom after an attempt to pick it may be an object that the attempt pushed away. An item that left its
+    place may be anywhere; the new item then is at a position that a look found empty.
     """
     if old_item is new_item or old_item.look != new_item.look:
         return False
+    if old_item.state is State.DROPPED and old_item.is_missing:
+        return new_item.was_place_searched and new_item.first_stamp > old_item.stamp
     if old_item.state is State.DROPPED:
         return new_item.first_change_count > old_item.change_count
     change_number = staleness.find_change_number(old_item.position, old_item.change_count)

@@ -52,7 +52,8 @@ class Belief:
         is_proved: True if the item certainly exists, by the log odds or by a touch of the tool.
         miss_probability: Probability that all looks since the last detection missed the item by chance.
         uncertain_look_count: Number of looks with a doubtful detection since the last confident look.
-        last_label_by_viewpoint: Last detected class by viewpoint key; cleared if the item may have moved.
+        last_label_by_viewpoint: Last detected class by viewpoint key, "" after a miss during a verification;
+            cleared if the item may have moved.
         repeat_count: Number of looks that repeated the class of an earlier look from the same viewpoint.
         log_likelihoods: Log likelihood of each detected class, relative to a class that was never detected.
         label_counts: Number of looks by detected class.
@@ -156,10 +157,17 @@ class Belief:
         self.uncertain_look_count = 0
         self.is_proved = self.is_proved or self.log_odds >= MIN_LOG_ODDS_OF_PROOF
 
-    def add_miss(self, rates: ErrorRates) -> None:
-        """Update the existence with a look that shows the item's position, but does not detect the item."""
-        self.miss_probability *= rates.miss_rate
-        self.log_odds += math.log(rates.miss_rate)
+    def add_miss(self, rates: ErrorRates, viewpoint: str | None = None) -> None:
+        """Update the existence with a look that shows the item's position, but does not detect the item.
+
+        With a `viewpoint`, the miss is weak evidence if it repeats the last miss from this viewpoint.
+        """
+        is_repeated = viewpoint is not None and self.last_label_by_viewpoint.get(viewpoint) == ""
+        miss_rate = compute_repeat_probability(rates.miss_rate, rates.repeated if is_repeated else 0.0)
+        if viewpoint is not None:
+            self.last_label_by_viewpoint[viewpoint] = ""
+        self.miss_probability *= miss_rate
+        self.log_odds += math.log(miss_rate)
 
     def add_weight(self, log_ratios: Mapping[str, float], looks: Mapping[str, str]) -> None:
         """Update the class with a weighing, which distinguishes classes that look alike.

@@ -43,6 +43,7 @@ class BinContents:
         routes: Names of the permitted bins by class.
         records: All items.
         quotas: Maximum numbers of objects in the bins.
+        vacated_slot_counts: Number of objects that someone took out of each bin since it was empty, by name.
     """
 
     config: LedgerConfig
@@ -50,6 +51,7 @@ class BinContents:
     routes: Routes
     records: ItemRecords
     quotas: Quotas = field(default_factory=Quotas)
+    vacated_slot_counts: Counter[str] = field(default_factory=Counter)
 
     def count_objects_in(self, bin_name: str, label: str | None = None) -> int:
         """Return the number of items that were released in a bin or have probably fallen into the bin.
@@ -68,6 +70,22 @@ class BinContents:
             return "the mission has no route for it"
         subject, verb = ("quota", "is") if len(bin_names) == 1 else ("quotas", "are")
         return f"the {subject} of {', '.join(bin_names)} {verb} reached"
+
+    def count_used_slots(self, bin_name: str) -> int:
+        """Return the number of slots of a bin that were used since the bin was empty."""
+        return self.count_objects_in(bin_name) + self.vacated_slot_counts[bin_name]
+
+    def get_slot_position(self, record: ItemRecord) -> Array:
+        """Return the x and y of the slot of a placed item `(2,)` [m]; of the bin if the item fell into it."""
+        bin = self.bins[record.bin]
+        return bin.position[:2] if record.slot is None else bin.slots[record.slot % len(bin.slots)]
+
+    def take_out(self, record: ItemRecord) -> None:
+        """Record that someone took a placed item out of its bin; an empty bin has no used slots."""
+        self.vacated_slot_counts[record.bin] += 1
+        bin_name, record.bin, record.reason, record.slot = record.bin, "", "", None
+        if not self.count_objects_in(bin_name):
+            del self.vacated_slot_counts[bin_name]
 
     def find_bin_name(self, observation: Observation, bias_std: float) -> str | None:
         """Return the name of the bin in which an observed object lies, or None.

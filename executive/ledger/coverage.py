@@ -64,6 +64,8 @@ class Coverage:
         """Number of the last change of the table near each point `(N,)`."""
         self._searched_masks: dict[str, NDArray[np.bool_]] = {}
         """Masks `(N,)` of the points that earlier looks searched, by viewpoint and view."""
+        self._ever_searched_mask = np.zeros(len(self._points), dtype=bool)
+        """Mask `(N,)` of the points that any look searched, also before changes of the table."""
         self._full_look_count = 0
         self._last_full_look_numbers = np.full(len(self._points), -RECENT_FULL_LOOK_COUNT)
         """Number of the last look at the whole image that showed each point `(N,)`."""
@@ -87,6 +89,7 @@ class Coverage:
         self._miss_probabilities[searched_mask] *= miss_rates[searched_mask]
         self._miss_probabilities = self._miss_probabilities.clip(MIN_MISS_PROBABILITY)
         earlier_searched_mask |= searched_mask
+        self._ever_searched_mask |= searched_mask
         if look.view == "full":
             self._full_look_count += 1
             # Points at the border of the image do not count as visible, because no later look may show them.
@@ -107,6 +110,10 @@ class Coverage:
         nearest = int(np.argmin(distances))
         is_on_grid = distances[nearest] <= GRID_PITCH
         return float(self._miss_probabilities[nearest]) if is_on_grid else PRIOR_OUTSIDE_WORKSPACE
+
+    def was_searched(self, position: Array) -> bool:
+        """Return True if a look, at any time, searched the table at `position` `(3,)` [m]."""
+        return bool(self._ever_searched_mask[np.argmin(self._compute_distances(position))])
 
     def is_in_workspace(self, position: Array) -> bool:
         """Return True if `position` `(3,)` [m] is in the workspace or at most `WORKSPACE_TOLERANCE` away."""

@@ -33,8 +33,8 @@ class State(Enum):
     HELD = "held"
     """The tool holds the item."""
     DROPPED = "dropped"
-    """The tool lost the item, and no look has detected the item since. The next detection on the table sets
-    the state to SEEN, or to REJECTED if the item has a reason."""
+    """The tool lost the item, or looks showed that the item left its place, and no look has detected the item
+    since. The next detection on the table sets the state to SEEN, or to REJECTED if the item has a reason."""
     PLACED = "placed"
     """The item was released in a bin."""
     REJECTED = "rejected"
@@ -65,6 +65,7 @@ class ItemRecord:
         first_change_count: Number of changes of the table before the first detection.
         first_stamp: Capture time of the first detection [s].
         has_appeared: True if the position of the first detection was empty in earlier looks.
+        was_place_searched: True if a look had searched the position before the first detection.
         position: Mean of the positions measured since the last possible move of the item `(3,)` [m].
         standard_error: Standard error of `position` along each axis [m].
         bias_std: Standard deviation of the systematic error of `position` along each axis [m].
@@ -87,6 +88,8 @@ class ItemRecord:
         is_untracked: True if the tool may have moved the item while the journal was incomplete.
         deferral_count: Number of times that the item was deferred.
         turn: Rank among the deferred items; 0 if the item is not deferred.
+        is_missing: True for a dropped item that someone, and not the tool, took from its place.
+        slot: Index of the slot of the bin over which the item was released, or None.
     """
 
     item: str
@@ -95,6 +98,7 @@ class ItemRecord:
     first_change_count: int
     first_stamp: float
     has_appeared: bool
+    was_place_searched: bool = False
     position: Array = field(init=False)
     standard_error: float = math.inf
     bias_std: float = 0.0
@@ -117,6 +121,8 @@ class ItemRecord:
     is_untracked: bool = False
     deferral_count: int = 0
     turn: int = 0
+    is_missing: bool = False
+    slot: int | None = None
 
     def __post_init__(self) -> None:
         self.position = self.first_position
@@ -166,6 +172,13 @@ class ItemRecord:
     def set_state(self, state: State, reason: str) -> None:
         """Set the state and its reason."""
         self.state, self.reason = state, reason
+
+    def lose(self, change_count: int) -> None:
+        """Set the item to DROPPED, because looks showed that it left its place."""
+        self.state, self.is_missing, self.change_count = State.DROPPED, True, change_count
+        self.bin_log_odds.clear()
+        self.belief.miss_probability = 1.0
+        self.forget_viewpoints()
 
     def forget_viewpoints(self) -> None:
         """Forget earlier viewpoints, because looks at a moved item do not repeat earlier errors."""

@@ -190,7 +190,11 @@ class LookUpdate:
         belief, frame = Belief(observation.detection.label, math.log(prior_odds)), self.look.frame
         position = observation.position
         has_appeared = self.coverage.find_miss_probability(position) <= self.config.max_miss_probability
-        return self.records.add(belief, position, frame.change_count, frame.stamp, has_appeared=has_appeared)
+        record = self.records.add(
+            belief, position, frame.change_count, frame.stamp, has_appeared=has_appeared
+        )
+        record.was_place_searched = self.coverage.was_searched(position)
+        return record
 
     def _compute_expected_count(self, observation: Observation) -> float:
         """Return the expected number of objects at an observed position that earlier looks have missed."""

@@ -73,14 +73,19 @@ def discard_moved_items(records: Collection[ItemRecord], dropped: Collection[Ite
     """Set lost items that a person has moved elsewhere to PHANTOM, and return the phantoms.
 
     A lost item counts as moved if a new item of the same class appeared at an empty position after the last
-    detection of the lost item. The new item must be proved to exist, and replaces only one lost item.
+    detection of the lost item; one earlier look at the position suffices if the lost item is known to have
+    left its place. The new item must be proved to exist, and replaces only one lost item.
     Lost items in `dropped` do not count, because the tool held them after their last detection.
     """
-    proved_items = (record for record in records if record.belief.is_proved and record.state in FINAL_STATES)
-    new_items = [record for record in proved_items if record.has_appeared]
+    new_items = [record for record in records if record.belief.is_proved and record.state in FINAL_STATES]
     phantoms = []
     for lost_item in (record for record in records if record.state is State.LOST and record not in dropped):
-        later_items = (item for item in new_items if item.first_stamp > lost_item.stamp)
+        later_items = (
+            item
+            for item in new_items
+            if item.first_stamp > lost_item.stamp
+            and (item.has_appeared or (lost_item.is_missing and item.was_place_searched))
+        )
         if new_item := next((item for item in later_items if item.look == lost_item.look), None):
             lost_item.set_state(State.PHANTOM, f"it is {new_item.item}")
             new_items.remove(new_item)

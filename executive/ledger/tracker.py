@@ -12,6 +12,7 @@ from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.detection import Detections, Observation
 from executive.cell.frame import Frame, FrameCaptured
+from executive.cell.ledger import Presence
 from executive.cell.objects import Item, KnownItem, ObjectClass, Target
 from executive.cell.protocols import Routes
 from executive.cell.quotas import Quotas
@@ -27,6 +28,7 @@ from executive.ledger.item import ON_TABLE, ItemRecord, State
 from executive.ledger.look import LookUpdate, make_look_event
 from executive.ledger.records import ItemRecords
 from executive.ledger.staleness import Staleness
+from executive.ledger.verification import verify
 from executive.perception.evidence import compute_weight_log_ratios, describe_weight
 
 MIN_LOG_RATIO_OF_WEIGHT = math.log(0.01)
@@ -186,6 +188,25 @@ class Tracker:
         """Return the reason why the mission does not sort further objects of a class, or ""."""
         return self._bins.explain_exemption(label)
 
+    def count_used_slots(self, bin: str) -> int:
+        """Return the index of the next free slot of a bin."""
+        return self._bins.count_used_slots(bin)
+
+    def list_items_in(self, bin: str) -> Sequence[Item]:
+        """Return the items that were placed in a bin and are not gone."""
+        return [record.item for record in self._records if record.bin == bin]
+
+    def verify(self, item: Item, detections: Detections, observations: Sequence[Observation]) -> Presence:
+        """Return whether an item is at its place; the position of an item that is gone becomes unknown."""
+        record = self._records.find(item)
+        presence = verify(record, detections, observations, self._bins, self._config)
+        if presence is Presence.GONE and record.state in (State.PLACED, *ON_TABLE):
+            if record.state is State.PLACED:
+                self._bins.take_out(record)
+            record.lose(self.change_count)
+            self._records.emit(record)
+        return presence
+
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
         """Record a touch, and return False if the touch contradicts the class of the item.
 
@@ -247,7 +268,7 @@ class Tracker:
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
         """Record that the tool lost an item; `landing` is the predicted landing position `(3,)` [m]."""
         record = self._records.find(item)
-        record.is_untracked = False
+        record.is_untracked = record.is_missing = False
         self._records.change_state(record, State.DROPPED)
         self._bins.set_prior_log_odds(record, landing)
         record.attempt_count += 1
@@ -258,7 +279,7 @@ class Tracker:
         """Record that an item was released in a bin."""
         record = self._records.find(item)
         if record.state is State.HELD:
-            record.reason = ""
+            record.reason, record.slot = "", self._bins.count_used_slots(bin)
         self._records.set_placed(record, bin)
 
     def record_put_down(self, item: Item, position: Array) -> None:
@@ -306,7 +327,9 @@ class Tracker:
     def close(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the behaviour tree succeeded."""
         has_touched_item = any(record.touched_label for record in self.records)
-        dropped_items = self._records.filter_by_state(State.DROPPED)
+        dropped_items = [
+            record for record in self._records.filter_by_state(State.DROPPED) if not record.is_missing
+        ]
         for record in self.records:
             final_state = outcomes.find_final_state(
                 record, self._certainty, exemption=self._bins.explain_exemption(record.label),

@@ -48,6 +48,12 @@ def predict_object_count(
     return cell.ledger.count_objects_in(bin_name, label) + arriving_count
 
 
+def predict_used_slots(cell: Cell, bin_name: str, excluded_item: Item | None = None) -> int:
+    """Return the number of used slots of a bin, as `predict_object_count` returns the number of objects."""
+    vacated_count = cell.ledger.count_used_slots(bin_name) - cell.ledger.count_objects_in(bin_name)
+    return vacated_count + predict_object_count(cell, bin_name, excluded_item)
+
+
 def make_obstacle(cell: Cell, target: Target) -> Obstacle:
     """Return the bounding cylinder of a target as an obstacle."""
     x, y, z = map(float, target.position)
@@ -69,9 +75,9 @@ def _list_bin_obstacles(cell: Cell, excluded_item: Item | None) -> Iterator[Obst
     """Yield a cylinder up to the top layer for each slot with objects; `excluded_item` is not counted."""
     radius = max(object_class.radius for object_class in cell.classes.values()) + MAX_ROLL_DISTANCE
     for bin_name, bin in cell.bins.items():
-        object_count = predict_object_count(cell, bin_name, excluded_item)
-        for index, (x, y) in enumerate(bin.slots[:object_count]):
+        used_slots = predict_used_slots(cell, bin_name, excluded_item)
+        for index, (x, y) in enumerate(bin.slots[:used_slots]):
             # Objects fill the slots of a layer in order, before the next layer begins.
-            layer_count = math.ceil((object_count - index) / len(bin.slots))
+            layer_count = math.ceil((used_slots - index) / len(bin.slots))
             top = compute_layer_height(bin, layer_count, find_max_object_height(cell))
             yield Obstacle(float(x), float(y), radius, top, f"the objects in slot {index + 1} of {bin_name}")

@@ -19,6 +19,7 @@ from executive.manipulation.obstacles import (
     list_obstacles,
     make_obstacle,
     predict_object_count,
+    predict_used_slots,
 )
 
 DROP_HEIGHT = 0.01
@@ -143,9 +144,9 @@ def choose_bin(cell: Cell, label: str) -> str | None:
 
 def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
     """Return the goal of a transit: `item` in the tool, at `drop_height` [m] above the next slot of a bin."""
-    bin, object_count = cell.bins[bin_name], predict_object_count(cell, bin_name, item)
+    bin, used_slots = cell.bins[bin_name], predict_used_slots(cell, bin_name, item)
     height = cell.classes[cell.ledger.get_label(item)].height
-    return make_slot_goal(bin, object_count, height, find_max_object_height(cell), drop_height)
+    return make_slot_goal(bin, used_slots, height, find_max_object_height(cell), drop_height)
 
 
 def make_slot_goal(

@@ -13,6 +13,12 @@ from executive.cell.protocols import Clock
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import compute_calibration
 
+BORDER_FRACTION = 0.05
+"""Width of the ignored border of an image with a partial view, as a fraction of the height of the image.
+
+If the image cuts an object that spans at most a sixth of the height, over 30 % of its box lie in the border.
+"""
+
 
 class MountedCamera:
     """Base class of cameras, with frames numbered from 1; implements part of `cell.protocols.Camera`.
@@ -42,6 +48,11 @@ class MountedCamera:
         self.matrix, self._X_MC = compute_calibration(config)
         self._get_flange_pose = get_flange_pose
         self._frame_count = self._pose_count = 0
+        self._content_mask = np.ones((config.height, config.width), dtype=bool)
+        """Mask `(H, W)` of the pixels that are not in the ignored border of an image with a partial view."""
+        if config.partial_views:
+            width = round(BORDER_FRACTION * config.height)
+            self._content_mask = np.pad(self._content_mask[width:-width, width:-width], width)
 
     @property
     def scan_poses(self) -> Sequence[str]:
@@ -70,7 +81,7 @@ class MountedCamera:
             matrix=self.matrix,
             X_WC=X_WC,
             stamp=self._clock.now,
-            visible=self._compute_visibility_mask(X_WC),
+            visible=self._compute_visibility_mask(X_WC) & self._content_mask,
             change_count=self._get_change_count(),
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -44,11 +45,12 @@ class Bench:
     def __init__(self, labels_with_unique_height: Sequence[str] = ()) -> None:
         self.config = LedgerConfig()
         self.events: list[Event] = []
-        size, slots = np.array([0.22, 0.24, 0.06]), np.zeros((6, 2))
+        size = np.array([0.22, 0.24, 0.06])
+        slots = np.array([(x, y) for y in (0.08, 0.0, -0.08) for x in (-0.05, 0.05)])
+        positions = {"red_bin": (0.2, -0.44, 0), "pink_bin": (0.2, 0.44, 0), "grey_bin": (-0.2, 0.44, 0)}
         bins = {
-            "red_bin": Bin("red_bin", np.array([0.2, -0.44, 0]), size, slots),
-            "pink_bin": Bin("pink_bin", np.array([0.2, 0.44, 0]), size, slots),
-            "grey_bin": Bin("grey_bin", np.array([-0.2, 0.44, 0]), size, slots),
+            name: Bin(name, np.array(position), size, slots + position[:2])
+            for name, position in positions.items()
         }
         self.ledger = Tracker(
             self.config,
@@ -82,13 +84,20 @@ class Bench:
         )
         found = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label, _, _ in things)
         strange = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label in unknown)
-        return self.ledger.observe(
-            Detections(detector, found, by, unknown=strange, frame=frame, view=view, area=area_of(view)),
+        area = area_of(view)
+        self.last_look = (
+            Detections(detector, found, by, unknown=strange, frame=frame, view=view, area=area),
             [
                 *(self._observe(frame, by, thing, 0.4, contradiction) for thing in unsure),
                 *(self._observe(frame, by, thing, 0.9) for thing in things),
             ],
         )
+        return self.ledger.observe(*self.last_look)
+
+    def verify(self, item: str, *things: Thing, **options: Any) -> str:
+        """Look at the whole image, and return whether an item is at its place."""
+        self.look(*things, view="full", **options)
+        return self.ledger.verify(item, *self.last_look).value
 
     def _observe(
         self, frame: Frame, by: ErrorRates, thing: Thing, confidence: float, contradiction: str = ""

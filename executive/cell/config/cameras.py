@@ -115,6 +115,9 @@ class CameraConfig(Section):
     """Square region of the image that shows the workspace: left, top, right and bottom side [pixel]."""
     scan_poses: tuple[Name, ...] = Field(min_length=1)
     """Arm poses from which the camera sees the table, best first."""
+    partial_views: bool = False
+    """True if the camera shows only a part of the workspace from each scan pose, and all of it from all
+    scan poses together. Objects at the border of an image are then ignored, because the image cuts them."""
     noise: NoiseConfig = NoiseConfig()
     """Image noise."""
     depth: DepthConfig | None = None

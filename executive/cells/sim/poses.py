@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Iterator
 
+import cv2
 import numpy as np
 
 from executive.cell.arm import Goal
@@ -14,7 +16,7 @@ from executive.cell.layout import find_unreachable_places
 from executive.cell.workcell import KeyPath
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.arm_occlusion import ArmOcclusion
-from executive.cells.sim.camera import get_camera_pose
+from executive.cells.sim.camera import SimCamera, get_camera_pose
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.world import World
 from executive.geometry import Array
@@ -23,6 +25,8 @@ from executive.perception.camera_model import compute_calibration
 
 POINTS_PER_SIDE = 9
 """Number of positions of the flattest object along each side of the workspace for the check of occlusion."""
+GRID_PITCH = 0.02
+"""Maximum distance of the points of the workspace that a scan pose of a partial view must show [m]."""
 
 
 def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
@@ -51,7 +55,8 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message for each pose without clearance, and each pose or bin that occludes the table.
 
     In each named pose, arm and tool must keep the margin to table, bins and the arm itself, because otherwise
-    no motion can end in the pose. From each scan pose, the camera must see the whole workspace.
+    no motion can end in the pose. From each scan pose, the camera must see the whole workspace; a camera with
+    partial views must see it from all its scan poses together.
     """
     with contextlib.closing(ClearanceChecker(config)) as checker:
         for name, pose in config.arm.poses_deg.items():
@@ -67,6 +72,9 @@ def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator
     arm = SimArm(world, planner, config, StepClock(lambda: 0.0))
     occlusion = ArmOcclusion(arm, planner.kinematics, config)
     for name, camera in config.cameras.items():
+        if camera.partial_views:
+            yield from _find_uncovered_areas(config, world, occlusion, name)
+            continue
         matrix, _ = compute_calibration(camera)
         for index, pose in enumerate(camera.scan_poses):
             if pose not in config.arm.poses_deg:
@@ -82,10 +90,51 @@ def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator
                 yield ("bins", bin, "position"), message + f'"{pose}"; move or lower the bin'
 
 
+def _find_uncovered_areas(
+    config: CellConfig, world: World, occlusion: ArmOcclusion, name: str
+) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for each scan pose of a camera that shows nothing, and each area without a pose.
+
+    A pose shows a point if the image contains a whole object at the point that neither arm nor bin hides.
+    """
+    camera = config.cameras[name]
+    sides = config.table.x, config.table.y
+    xs, ys = (np.linspace(*side, 1 + math.ceil((side[1] - side[0]) / GRID_PITCH)) for side in sides)
+    height = min(model.height for model in config.objects.values()) / 2
+    points = np.array([(x, y, height) for x in xs for y in ys])
+    uncovered_mask = np.ones(len(points), dtype=bool)
+    sim_camera = SimCamera(world, name, camera, StepClock(lambda: 0.0), 0, occlusion=occlusion)
+    for index, pose in enumerate(camera.scan_poses):
+        if pose not in config.arm.poses_deg:
+            continue
+        world.set_joint_positions(np.radians(config.arm.poses_deg[pose]))
+        frame = sim_camera.capture()
+        mask = frame.compute_area_mask(points, camera.get_view_box("full"))
+        mask &= frame.compute_unoccluded_mask(points)
+        bodies = _find_nearest_bodies(world, points, frame.X_WC.position)
+        mask &= ~np.isin(bodies, list(world.bin_bodies.values()))
+        if not mask.any():
+            message = f'from the pose "{pose}" the camera {name} sees no part of the workspace'
+            yield ("cameras", name, "scan_poses", index), message
+        uncovered_mask &= ~mask
+    image = uncovered_mask.reshape(len(xs), len(ys)).astype(np.uint8)
+    for row in cv2.connectedComponentsWithStats(image)[2][1:]:
+        y, x, width, height = row[:4]  # Rows of the image are positions along x.
+        message = f"no scan pose of the camera {name} shows the workspace from x {xs[x]:.2f} to "
+        message += f"{xs[x + height - 1]:.2f} m and y {ys[y]:.2f} to {ys[y + width - 1]:.2f} m; add a pose, "
+        yield ("cameras", name, "scan_poses"), message + "or move the poses nearer to each other"
+
+
+def _find_nearest_bodies(world: World, points: Array, camera_position: Array) -> list[int]:
+    """Return the body that hides each point `(N, 3)` [m] from the camera; -1 for none."""
+    hits = world.client.rayTestBatch(points.tolist(), [tuple(camera_position)] * len(points))
+    return [hit[0] for hit in hits]
+
+
 def _find_occluding_bin(config: CellConfig, world: World, camera_position: Array) -> str | None:
     """Return a bin that occludes the centre of the flattest object somewhere in the workspace, or None."""
     xs, ys = (np.linspace(*side, POINTS_PER_SIDE) for side in (config.table.x, config.table.y))
     height = min(model.height for model in config.objects.values()) / 2
-    points = [(x, y, height) for x in xs for y in ys]
-    hit_bodies = {hit[0] for hit in world.client.rayTestBatch(points, [tuple(camera_position)] * len(points))}
+    points = np.array([(x, y, height) for x in xs for y in ys])
+    hit_bodies = {*_find_nearest_bodies(world, points, camera_position)}
     return next((name for name, body in world.bin_bodies.items() if body in hit_bodies), None)

@@ -45,6 +45,12 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
                 message = f'{node.skill} needs the param "{param.name}"'
                 hint = param.doc and f"{param.name}: {param.doc}."
                 yield make_error(node.span, "missing-param", message, hint)
+        given = [node.settings[name] for name in skill.one_of if name in node.settings]
+        if skill.one_of and len(given) != 1:
+            names = " or ".join(skill.one_of)
+            span = given[1].name_span if given else node.span
+            message = f"{node.skill} needs exactly one of its inputs {names}, not {len(given)}"
+            yield make_error(span, "exactly-one", message)
 
 
 def _check_reference(

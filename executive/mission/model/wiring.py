@@ -44,7 +44,8 @@ class Wire:
 def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator[Wire]:
     """Yield the connection of every port of a direction, except inputs with a constant.
 
-    A param with a name as its value counts as an input if the mission gives a variable.
+    A param with a name as its value counts as an input if the mission gives a variable. An input in `one_of`
+    of the skill is connected only if the mission sets it.
     """
     if direction is Direction.IN:
         for name, setting in node.settings.items():
@@ -55,6 +56,8 @@ def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Ite
         if port.direction is not direction:
             continue
         port_setting = node.settings.get(port.name)
+        if port_setting is None and port.name in skill.one_of:
+            continue
         if port_setting is None or (direction is Direction.OUT and isinstance(port_setting.value, Literal)):
             # `check_settings` reports a constant for an output.
             variable = node.variables_by_port.get(port.name, port.name)

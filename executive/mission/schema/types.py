@@ -84,21 +84,22 @@ def make_settings_schema(name: str, skill: type[Skill]) -> Schema:
     params = {key: _make_param_schema(param) for key, param in skill.params.items()}
     ports = {key: _make_port_schema(port) for key, port in skill.ports.items()}
     mapping = {
-        "type": "object" if required else ["object", "null"],
+        "type": "object" if required or skill.one_of else ["object", "null"],
         "properties": {**params, **ports},
         "required": required,
         "additionalProperties": False,
+        **({"oneOf": [{"required": [key]} for key in skill.one_of]} if skill.one_of else {}),
     }
     # Due to `allOf`, editors insert only the name of the skill, which is valid as an item and as a key.
     return {"title": name, **_document_skill(skill), "allOf": [mapping]}
 
 
 def make_name_schemas(skills: Mapping[str, type[Skill]]) -> list[Schema]:
-    """Return the schemas of skills that may be written as a name only: they require no params."""
+    """Return the schemas of skills that may be written as a name only: they require no setting."""
     return [
         {"const": name, "title": name, **_document_skill(skill), **NO_ITEM_SUGGESTION}
         for name, skill in skills.items()
-        if not any(param.is_required for param in skill.params.values())
+        if not (skill.one_of or any(param.is_required for param in skill.params.values()))
     ]
 
 

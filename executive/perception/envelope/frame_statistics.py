@@ -14,6 +14,9 @@ from executive.perception.visibility import compute_hull_mask
 
 MIN_PIXELS = 400
 """Minimum number of visible pixels of the workspace for the computation of statistics."""
+MIN_FRACTION_OF_PARTIAL_VIEW = 0.03
+"""Minimum fraction of an image that shows the workspace if the image may show only a part of it; objects then
+cover less than half of the pixels, and the medians are those of the table."""
 ABSOLUTE_TOLERANCE = 6.0
 """Minimum tolerance below and above the measured range of a statistic [grey level]."""
 RELATIVE_TOLERANCE = 0.08
@@ -67,12 +70,18 @@ class FrameRange(Section):
         return "; ".join(differences)
 
 
-def compute_frame_statistics(frame: Frame, table: TableConfig) -> FrameStatistics | None:
-    """Return the statistics of the workspace; None if a corner is not in view or few pixels are visible."""
+def compute_frame_statistics(
+    frame: Frame, table: TableConfig, *, is_partial: bool = False
+) -> FrameStatistics | None:
+    """Return the statistics of the workspace; None if a corner is not in view or few pixels are visible.
+
+    With `is_partial`, the corners may be out of view, but a larger part of the image must show the workspace.
+    """
     height, width = frame.image.shape[:2]
     corners = np.array([(x, y, 0.0) for x in table.x for y in table.y])
-    mask = compute_hull_mask(corners, frame.matrix, frame.X_WC, (width, height))
-    if mask is None or np.count_nonzero(mask := mask & frame.visible) < MIN_PIXELS:
+    mask = compute_hull_mask(corners, frame.matrix, frame.X_WC, (width, height), may_be_cut=is_partial)
+    min_pixels = MIN_FRACTION_OF_PARTIAL_VIEW * width * height if is_partial else MIN_PIXELS
+    if mask is None or np.count_nonzero(mask := mask & frame.visible) < min_pixels:
         return None
     # Image noise would increase the contrast; the mean of 3 x 3 pixels removes most of the noise.
     colours = cv2.blur(frame.image, (3, 3))[mask].astype(float)

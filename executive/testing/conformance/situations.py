@@ -112,7 +112,8 @@ def prepare_scene(
         raise ArrangementFailed(f"the function `arrange` raised {type(error).__name__}: {error}") from error
     declarations: list[Param | Port] = [*skill.params.values(), *list_input_ports(skill)]
     for entry in declarations:
-        needs_value = entry.is_required or (situation.has_all_inputs and isinstance(entry, Port))
+        is_needed = entry.is_required or entry.name in skill.one_of[:1]
+        needs_value = is_needed or (situation.has_all_inputs and isinstance(entry, Port))
         if needs_value and entry.name not in values and (value := _generate_value(entry, scene)) is not None:
             values[entry.name] = value
     if missing := [entry for entry in declarations if entry.is_required and entry.name not in values]:

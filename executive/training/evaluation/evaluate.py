@@ -38,7 +38,7 @@ MODEL_NAME = "model"
 def evaluate(
     detector: CellDetector, samples: Iterable[LabelledImage], *, threshold: float | None = None,
     localizer: Localizer | None = None, mistakes: WorstMistakes | None = None,
-    table: TableConfig | None = None,
+    table: TableConfig | None = None, is_partial: bool = False,
 ) -> Evaluation:  # fmt: skip
     """Return the accuracy of a detector on labelled images; ignored objects do not count.
 
@@ -49,6 +49,7 @@ def evaluate(
         localizer: Computes positions, which are compared with the true positions; None: no comparison.
         mistakes: Collects the missed objects and detections with the worst errors; None: no collection.
         table: Workspace whose brightness, contrast and colours are measured; None: no measurement.
+        is_partial: True if the images may show only a part of the workspace.
     """
     errors, repeated_errors = ErrorStatistics(localizer), RepeatedErrors(localizer)
     average_precision = AveragePrecision()
@@ -74,7 +75,9 @@ def evaluate(
                 second_answer, _ = detector.detect(replace(frame, image=sample.second_image))
                 second_matches = _match_confident(second_answer, sample, min_confidence)
                 repeated_errors.add(matches, second_matches, sample, frame)
-        if table is not None and (frame_statistics := compute_frame_statistics(frame, table)):
+        if table is not None and (
+            frame_statistics := compute_frame_statistics(frame, table, is_partial=is_partial)
+        ):
             statistics_of_frames.append(frame_statistics)
         if mistakes is not None:
             mistakes.add(matches, sample)

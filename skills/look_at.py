@@ -1,0 +1,71 @@
+"""Skill that verifies that an item, or the items in a bin, are where the ledger believes them to be."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping
+from typing import Any, ClassVar
+
+from executive.cell.detection import Detections
+from executive.cell.ledger import Presence
+from executive.cell.objects import Item
+from executive.cell.protocols import Cell, MinTimes, Steps
+from executive.errors import NoDepth
+from executive.manipulation.looks import take_look
+from executive.skill import In, Skill, param, port
+
+
+class LookAt(Skill):
+    """Verify with the camera that an item, or each item in a bin, is where the ledger believes it to be.
+
+    The skill does not move the arm: move to a pose from which the camera sees the place first. The skill
+    succeeds if an image shows every item at its place. It fails with `gone` if enough images show the place
+    without the item; the position of the item is then unknown, and the item may be sorted again if a later
+    look finds an object of its class on the table. The skill fails with `hidden` if the place is outside the
+    image or occluded, or if `looks` images do not suffice for an answer, given the miss rate of the detector.
+    """
+
+    item: In[Item | None] = port(default=None, refers_to="item", doc="the item to verify")
+    bin: In[str | None] = port(default=None, refers_to="bin", doc="the bin whose items are verified")
+    detector: str = param("", refers_to="detector", doc="a detector of the cell; empty: the first detector")
+    view: str = param("full", choices=("table", "full"), doc="`table`: the workspace; `full`: entire image")
+    looks: int = param(10, ge=1, le=100, doc="maximum number of images")
+    one_of: ClassVar = ("item", "bin")
+    reasons: ClassVar = ("gone", "hidden", "unavailable", "crowded", "camera_moved")
+    uses: ClassVar = ("camera",)
+    senses: ClassVar = True
+
+    @classmethod
+    def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
+        """Return the minimum time from the frame to the answer of the detector [s]."""
+        return min_times.get_answer_time(values["detector"])
+
+    def run(self, cell: Cell) -> Steps:
+        """Take looks until all answers are certain, or until a place is not in view."""
+        items = [self.item] if self.item else list(cell.ledger.list_items_in(self.bin or ""))
+        unsure_items: list[Item] = []
+        for _ in range(self.looks):
+            answers = yield from self._look(cell, items)
+            found = {answer: [item for item in items if answers[item] is answer] for answer in Presence}
+            if gone_items := ", ".join(found[Presence.GONE]):
+                raise self.failure("gone", f"not at its place any more: {gone_items}")
+            if hidden_items := ", ".join(found[Presence.HIDDEN]):
+                raise self.failure("hidden", f"the camera does not see the place of {hidden_items}")
+            if not (unsure_items := found[Presence.UNSURE]):
+                return
+        message = f"{self.looks} images are not enough to tell whether these items are at their places: "
+        raise self.failure("hidden", message + ", ".join(unsure_items))
+
+    def _look(self, cell: Cell, items: list[Item]) -> Generator[None, None, dict[Item, Presence]]:
+        """Take a look, update the ledger, and return the answer for each item."""
+        frame, answer = yield from take_look(self, cell, self.detector, self.view)
+        area = cell.camera.get_view_box(self.view)
+        detections = Detections(**vars(answer), frame=frame, view=self.view, area=area)
+        try:
+            # Objects may have moved since the capture while another branch of a `parallel` used the tool.
+            observations = cell.localizer.localize(detections) if cell.ledger.is_current(frame) else None
+        except NoDepth:
+            observations = None
+        if observations is None:
+            return dict.fromkeys(items, Presence.UNSURE)
+        cell.ledger.observe(detections, observations)
+        return {item: cell.ledger.verify(item, detections, observations) for item in items}

@@ -1,0 +1,190 @@
+"""Answers to the question whether an item is at its place, and items that left their place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from ledger_bench import EYE, Bench
+
+CUBE, ELSEWHERE = ("cube", 0.5, 0.0), ("cube", 0.6, 0.15)
+SLOT_1, SLOT_2 = ("cube", 0.15, -0.36), ("cube", 0.25, -0.36)
+
+
+@pytest.fixture
+def placed(bench: Bench) -> Bench:
+    """A ledger whose only item, cube-1, was placed in the red bin."""
+    for _ in range(3):
+        bench.look(CUBE)
+    bench.place("cube-1")
+    return bench
+
+
+@pytest.fixture
+def gone(placed: Bench) -> Bench:
+    """A ledger whose only item, cube-1, was placed in the red bin and is gone."""
+    placed.look(view="full")
+    assert [placed.verify("cube-1"), placed.verify("cube-1")] == ["unsure", "gone"]
+    return placed
+
+
+def test_an_item_that_a_look_shows_in_its_bin_is_there(placed: Bench) -> None:
+    assert placed.verify("cube-1", SLOT_1) == "there"
+    assert placed.states() == {"cube-1": ("placed", "red_bin")}
+
+
+def test_an_item_is_gone_only_after_enough_looks(placed: Bench) -> None:
+    rates = replace(EYE, repeated=0.6)
+    answers = [placed.verify("cube-1", by=rates) for _ in range(8)]
+    # 0.03 for the first miss, and 0.612 for each repeated one.
+    assert answers == ["unsure"] * 7 + ["gone"]
+
+
+def test_a_detection_between_two_misses_refutes_the_first_one(placed: Bench) -> None:
+    assert placed.verify("cube-1") == "unsure"
+    assert placed.verify("cube-1", SLOT_1) == "there"
+    assert placed.verify("cube-1") == "unsure"
+
+
+def test_an_item_that_is_gone_is_open_and_not_placed(gone: Bench) -> None:
+    assert gone.states() == {"cube-1": ("dropped", "")}
+    assert gone.ledger.is_open("cube-1")
+    assert gone.ledger.count_objects_in("red_bin") == 0
+
+
+def test_an_item_that_reappears_on_the_table_keeps_its_identity(gone: Bench) -> None:
+    for _ in range(2):  # Two looks make the class certain.
+        gone.look(ELSEWHERE)
+    assert gone.states() == {"cube-1": ("seen", ""), "cube-2": ("phantom", "it is cube-1")}
+    assert [target.item for target in gone.ledger.find_targets()] == ["cube-1"]
+    gone.place("cube-1")
+    assert gone.end()["cube-1"] == ("placed", "red_bin")
+    assert gone.ledger.count_states()["seen"] == 1
+
+
+def test_an_item_keeps_its_identity_if_it_was_seen_on_the_table_before_it_was_known_to_be_gone(
+    placed: Bench,
+) -> None:
+    placed.look(view="full")
+    for _ in range(2):
+        placed.verify("cube-1", ELSEWHERE)
+    placed.look(ELSEWHERE)
+    assert placed.states() == {"cube-1": ("seen", ""), "cube-2": ("phantom", "it is cube-1")}
+
+
+def test_an_object_at_a_place_that_no_look_searched_before_is_another_item(placed: Bench) -> None:
+    for _ in range(2):
+        placed.verify("cube-1", hidden=slice(0, 250))
+    for _ in range(2):
+        placed.look(("cube", 0.5, 0.36), view="full")
+    assert placed.states() == {"cube-1": ("dropped", ""), "cube-2": ("seen", "")}
+
+
+def test_an_item_that_is_gone_and_never_found_is_lost(gone: Bench) -> None:
+    assert gone.end() == {"cube-1": ("lost", "known to exist, not found again")}
+
+
+def test_an_item_that_was_sorted_again_under_another_name_counts_once(placed: Bench) -> None:
+    placed.look(view="full")
+    for _ in range(3):
+        placed.look(ELSEWHERE)
+    placed.place("cube-2")
+    answers = [placed.verify("cube-1", SLOT_2) for _ in range(2)]
+    assert (answers, placed.verify("cube-2", SLOT_2)) == (["unsure", "gone"], "there")
+    assert placed.end() == {"cube-1": ("phantom", "it is cube-2"), "cube-2": ("placed", "red_bin")}
+
+
+def test_an_item_that_was_taken_for_gone_is_placed_again_once_a_look_shows_it(gone: Bench) -> None:
+    gone.look(SLOT_1, view="full")
+    gone.look(SLOT_1, view="full")
+    assert gone.states() == {"cube-1": ("placed", "red_bin")}
+    assert gone.verify("cube-1") == "unsure"
+
+
+@pytest.mark.parametrize("hidden", [slice(0, 640), slice(400, 640)])
+def test_a_bin_behind_the_arm_is_hidden(placed: Bench, hidden: slice) -> None:
+    assert placed.verify("cube-1", hidden=hidden) == "hidden"
+
+
+def test_a_bin_outside_of_the_searched_region_is_hidden(placed: Bench) -> None:
+    placed.look()
+    assert placed.ledger.verify("cube-1", *placed.last_look).value == "hidden"
+
+
+@pytest.mark.parametrize("unsure", [SLOT_1, ("duck", 0.2, -0.44)])
+def test_a_doubtful_detection_in_the_bin_may_be_the_item(placed: Bench, unsure: tuple) -> None:
+    assert [placed.verify("cube-1", unsure=[unsure]) for _ in range(5)] == ["unsure"] * 5
+
+
+def test_an_object_of_another_class_in_the_bin_may_be_the_item(placed: Bench) -> None:
+    assert [placed.verify("cube-1", ("duck", 0.2, -0.44)) for _ in range(5)] == ["unsure"] * 5
+
+
+def test_of_two_items_the_one_whose_slot_is_empty_is_gone(placed: Bench) -> None:
+    for _ in range(3):
+        placed.look(ELSEWHERE)
+    placed.place("cube-2")
+    assert [placed.verify(item, SLOT_1) for item in ("cube-1", "cube-2")] == ["there", "unsure"]
+    assert [placed.verify(item, SLOT_2) for item in ("cube-2", "cube-1")] == ["there", "unsure"]
+
+
+def test_the_slot_of_an_item_that_is_gone_stays_used_until_the_bin_is_empty(placed: Bench) -> None:
+    for _ in range(3):
+        placed.look(ELSEWHERE)
+    placed.place("cube-2")
+    for _ in range(2):
+        placed.verify("cube-1", SLOT_2)
+    assert placed.states()["cube-1"] == ("dropped", "")
+    assert (placed.ledger.count_objects_in("red_bin"), placed.ledger.count_used_slots("red_bin")) == (1, 2)
+    for _ in range(2):
+        placed.verify("cube-2")
+    assert (placed.ledger.count_objects_in("red_bin"), placed.ledger.count_used_slots("red_bin")) == (0, 0)
+
+
+def test_in_a_bin_with_two_layers_no_item_is_gone(bench: Bench) -> None:
+    places = [("cube", 0.44 + 0.09 * (number % 3), 0.09 * (number // 3) - 0.12) for number in range(7)]
+    for _ in range(3):
+        bench.look(*places)
+    for number in range(7):
+        bench.place(f"cube-{number + 1}")
+    assert {bench.verify("cube-1", SLOT_2) for _ in range(5)} == {"unsure"}
+
+
+def test_an_item_on_the_table_is_there_unsure_or_gone(bench: Bench) -> None:
+    for _ in range(3):
+        bench.look(CUBE)
+    assert bench.verify("cube-1", CUBE) == "there"
+    assert [bench.verify("cube-1") for _ in range(2)] == ["unsure", "gone"]
+    assert bench.states() == {"cube-1": ("dropped", "")}
+
+
+def test_an_item_that_a_person_moved_far_on_the_table_keeps_its_identity(bench: Bench) -> None:
+    for _ in range(3):
+        bench.look(CUBE, view="full")
+    for _ in range(2):
+        bench.verify("cube-1")
+    for _ in range(2):
+        bench.look(ELSEWHERE)
+    assert bench.states()["cube-1"] == ("seen", "")
+
+
+def test_a_rejected_item_stays_rejected_after_it_was_gone(bench: Bench) -> None:
+    for _ in range(3):
+        bench.look(CUBE, view="full")
+    bench.ledger.reject("cube-1", "no")
+    for _ in range(2):
+        bench.verify("cube-1")
+    for _ in range(2):
+        bench.look(ELSEWHERE)
+    assert bench.states()["cube-1"] == ("rejected", "no")
+
+
+def test_an_item_on_the_table_behind_the_arm_is_hidden(bench: Bench) -> None:
+    bench.look(CUBE)
+    assert bench.verify("cube-1", hidden=slice(0, 640)) == "hidden"
+
+
+def test_an_item_in_the_tool_is_hidden(bench: Bench) -> None:
+    bench.look(CUBE)
+    bench.ledger.record_grasp("cube-1")
+    assert bench.verify("cube-1") == "hidden"
