@@ -36,7 +36,7 @@ def verify(
         config: Thresholds of the ledger.
     """
     if record.state is State.PLACED:
-        presence = _find_presence_in_bin(record, look, observations, bins)
+        presence = _find_presence_in_bin(record, look, observations, bins, config.gate)
         if presence is Presence.THERE:
             record.stamp, record.belief.miss_probability = look.frame.stamp, 1.0
             record.forget_viewpoints()
@@ -55,13 +55,15 @@ def verify(
 
 
 def _find_presence_in_bin(
-    record: ItemRecord, look: Detections, observations: Sequence[Observation], bins: BinContents
+    record: ItemRecord, look: Detections, observations: Sequence[Observation], bins: BinContents, gate: float
 ) -> Presence:
     """Return whether one look shows an item in its bin; the look may have missed a `GONE` item by chance.
 
-    If the look shows fewer objects of the class than the bin contains, the missing items are those whose
-    slots are farthest from the shown objects. The answer is `UNSURE` if another detection in the bin may be
-    the item, or if the bin has more than one layer of objects, because a layer hides the layer below.
+    A doubtful detection of the class of an item at the slot of the item shows the item, because the item is
+    known to have been there. If the look shows fewer objects of the class than the bin contains, the missing
+    items are those whose slots are farthest from the shown objects. The answer is `UNSURE` if another
+    detection in the bin may be the item, or if the bin has more than one layer of objects, because a layer
+    hides the layer below.
     """
     if not bins.is_floor_visible(record.bin, look):
         return Presence.HIDDEN
@@ -69,16 +71,20 @@ def _find_presence_in_bin(
     same_class = [item for item in items if item.look == record.look]
     bias_std = look.error_rates.bias
     shown = [entry for entry in observations if bins.find_bin_name(entry, bias_std) == record.bin]
-    positions = [
-        entry.position[:2] for entry in shown if entry.is_confident and entry.detection.label == record.look
-    ]
+    same_look = [entry for entry in shown if entry.detection.label == record.look]
+    confident = [entry for entry in same_look if entry.is_confident]
 
-    def measure_distance(item: ItemRecord) -> float:
+    def measure_distance(item: ItemRecord, entries: Sequence[Observation]) -> float:
         slot = bins.get_slot_position(item)
-        return min((float(np.linalg.norm(slot - position)) for position in positions), default=np.inf)
+        return min((float(np.linalg.norm(slot - entry.position[:2])) for entry in entries), default=np.inf)
 
-    ranked = sorted(same_class, key=measure_distance, reverse=True)
-    rank, missing_count = ranked.index(record), len(same_class) - len(positions)
+    distances = {item: measure_distance(item, confident) for item in same_class}
+    missing_count = len(same_class) - len(confident)
+    for item, distance in distances.items():
+        if distance > gate and measure_distance(item, same_look) <= gate:
+            distances[item], missing_count = 0.0, missing_count - 1
+    ranked = sorted(same_class, key=lambda item: distances[item], reverse=True)
+    rank = ranked.index(record)
     if rank >= missing_count:
         return Presence.THERE
     has_layers = bins.count_used_slots(record.bin) > len(bins.bins[record.bin].slots)

@@ -111,7 +111,21 @@ def test_a_bin_outside_of_the_searched_region_is_hidden(placed: Bench) -> None:
     assert placed.ledger.verify("cube-1", *placed.last_look).value == "hidden"
 
 
-@pytest.mark.parametrize("unsure", [SLOT_1, ("duck", 0.2, -0.44)])
+def test_a_doubtful_detection_of_its_class_at_its_slot_shows_the_item(placed: Bench) -> None:
+    assert placed.verify("cube-1", unsure=[SLOT_1]) == "there"
+
+
+def test_two_doubtful_boxes_at_one_slot_show_one_item(placed: Bench) -> None:
+    for _ in range(3):
+        placed.look(ELSEWHERE)
+    placed.place("cube-2")
+    assert [placed.verify(item, unsure=[SLOT_1, SLOT_1]) for item in ("cube-1", "cube-2")] == [
+        "there",
+        "unsure",
+    ]
+
+
+@pytest.mark.parametrize("unsure", [SLOT_2, ("duck", 0.2, -0.44)])
 def test_a_doubtful_detection_in_the_bin_may_be_the_item(placed: Bench, unsure: tuple) -> None:
     assert [placed.verify("cube-1", unsure=[unsure]) for _ in range(5)] == ["unsure"] * 5
 

@@ -113,7 +113,9 @@ def placed(path: Path) -> Counter[str]:
 MISSIONS = ("sort_overhead", "sort_wrist", "kit_fasteners", "pick_on_request")
 WITHIN_A_STEP = [(444, 7), (1203, 3), (2100, 11)]
 CASES = [(name, after, 1) for name in MISSIONS for after in (1, 333, 700, 1100)] + [
-    ("sort_overhead", *cut) for cut in WITHIN_A_STEP
+    *(("sort_overhead", *cut) for cut in WITHIN_A_STEP),
+    *(("sort_and_verify", after, 1) for after in (900, 1500, 2100)),
+    ("sort_two_halves", 900, 1),
 ]
 QUICK = ("sort_overhead", 700, 1)
 

@@ -68,7 +68,8 @@ def test_a_bin_behind_the_arm_is_hidden(fake: FakeCell, placed: str) -> None:
     assert (result.reason, result.message) == ("hidden", "the camera does not see the place of cube-1")
 
 
-def test_a_doubtful_detection_in_the_bin_is_no_answer(fake: FakeCell, placed: str) -> None:
+def test_a_doubtful_detection_beside_the_slot_is_no_answer(fake: FakeCell, placed: str) -> None:
+    fake.world.objects[0].position[1] += 0.1
     fake.detector.make_answer = lambda look, true: [replace(one, confidence=0.4) for one in true]
     result = look_at(fake, bin="red_bin", looks=3)
     assert (result.reason, result.commands.count("camera.capture")) == ("hidden", 3)
