@@ -67,7 +67,6 @@ class Param:
         choices: Allowed values, or None for any value.
         refers_to: Kind of the name (`bin`, `detector`, `pose`, `class`) if the value is a name; otherwise "".
         doc: Description of the param.
-        same_as: Unused; see `Port`.
     """
 
     name: str
@@ -79,7 +78,6 @@ class Param:
     choices: tuple[Any, ...] | None
     refers_to: str
     doc: str
-    same_as: str = ""
 
     @property
     def is_required(self) -> bool:
@@ -136,7 +134,8 @@ def param(
 
 def port(*, default: Any = ..., refers_to: str = "", doc: str = "", same_as: str = "") -> Any:
     """Declare a port of a skill; `Port` describes the arguments."""
-    return replace(param(default, refers_to=refers_to, doc=doc), same_as=same_as)
+    # `Skill.__init_subclass__` sets name, type and direction.
+    return Port("", None, Direction.IN, default, refers_to, doc, same_as)
 
 
 class SkillFailed(Exception):
@@ -205,16 +204,15 @@ class Skill:
             declaration = cls.__dict__.get(attribute)
             direction = next((value for value in metadata if isinstance(value, Direction)), None)
             if direction is not None:
-                entry = declaration if isinstance(declaration, Param) else port()
-                settings = entry.default, entry.refers_to, entry.doc, entry.same_as
-                ports[name] = Port(name, value_type, direction, *settings)
+                entry = declaration if isinstance(declaration, Port) else port()
+                ports[name] = replace(entry, name=name, type=value_type, direction=direction)
             elif isinstance(declaration, Param):
                 unit = next((value for value in metadata if isinstance(value, str)), "")
                 params[name] = replace(declaration, name=name, type=value_type, unit=unit)
             else:
                 place = f"{cls.__qualname__}.{attribute}"
                 raise TypeError(f"{place}: attributes of a skill are In[...], Out[...] or param(...)")
-            if isinstance(declaration, Param):
+            if isinstance(declaration, Param | Port):
                 delattr(cls, attribute)
         cls.params, cls.ports = params, ports
 
@@ -285,7 +283,7 @@ def _require_annotations(skill: type[Skill]) -> None:
         TypeError: A declaration has no annotation.
     """
     for name, declaration in vars(skill).items():
-        if isinstance(declaration, Param) and name not in skill.__annotations__:
+        if isinstance(declaration, Param | Port) and name not in skill.__annotations__:
             has_simple_type = isinstance(declaration.default, bool | int | float | str)
             type_name = type(declaration.default).__name__ if has_simple_type else "int"
             raise TypeError(

@@ -16,6 +16,7 @@ class AllConditions(Sequence):
     """
 
     keyword = "all"
+    keyword_hints: ClassVar = {"and": "Write all."}
     symbol, shape = "&", "ellipse"
     is_condition = True
     # Conditions decide within one tick, so that the key `memory` of the sequence would have no effect.

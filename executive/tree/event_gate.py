@@ -10,7 +10,7 @@ from executive.events import Emit, Event
 from executive.tree.keys import Child
 from executive.tree.node import TreeNode
 
-_COMPARED_ATTRIBUTES = ("node", "status", "reason", "choice")
+_COMPARED_ATTRIBUTES = ("node", "status", "reason", "choice", "item", "outputs")
 """Attributes of events by which two runs of a node are compared; messages may contain changing numbers."""
 
 

@@ -144,6 +144,8 @@ class Repeat(Loop):
         names = {name for name, _ in self._limits}
         if names != {"placed"} or self._expected_reasons or self.times is not None or analysis.is_concurrent:
             return
+        if any(limit == 0 for _, limit in self._limits):
+            return
         skills = analysis.list_skills()
         if not any(skill is None or _may_release(skill) for skill in skills):
             message = "this loop never succeeds: its body releases no object, so `placed` does not increase"

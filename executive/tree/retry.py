@@ -153,7 +153,7 @@ class Retry(Loop):
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield a warning if nothing changes between the attempts, or if there is only one attempt."""
         skills = analysis.list_skills()
-        may_change = any(skill is None or skill.senses or skill.moves for skill in skills)
+        may_change = any(skill is None or skill.senses or skill.moves or skill.waits for skill in skills)
         if not self.backoff and skills and not may_change:
             message = "this retry changes nothing between its attempts: no node in it looks, moves or waits"
             hint = "Put a look or a motion into do or recover, or wait with backoff."

@@ -139,7 +139,8 @@ class SkillLeaf(TreeNode):
         for value in values.values():
             if isinstance(value, Target):
                 return value.item
-        return next((str(values[port]) for port in self._item_ports if values.get(port)), "")
+        items = (values.get(port) for port in self._item_ports)
+        return next((item for item in items if isinstance(item, str) and item), "")
 
     def _succeed(self, port_values: Mapping[str, object]) -> None:
         outputs = {port: port_values[port] for port in self.wiring.outputs}

@@ -44,6 +44,9 @@ def _read_limit(
             message = f"{name} must be a number, but ${value.name} is no param"
             reader.add_error(value.span, "unknown-param", message, hint)
             return None
+        if value.field:
+            reader.add_error(value.span, "unknown-field", f"{name} must be a number; params have no fields")
+            return None
         origin = f"${value.name} in line {value.span.line}"
         value = replace(params[value.name].value, origin=origin)
     if value is None:
