@@ -13,7 +13,8 @@ class Defer(Skill):
     """Put an item back: `SelectTarget` selects the item only after every other candidate.
 
     The item stays open, so no item is lost. Deferred items are selected in the order of their deferral. The
-    skill fails with `exhausted` if the item was deferred `times` times already.
+    skill fails with `exhausted` if the item was deferred `times` times already. An item in the tool or in a
+    bin keeps its state; the deferral has an effect if the item returns to the table.
     """
 
     item: In[Item] = port(refers_to="item", doc="the item to put back")

@@ -20,8 +20,9 @@ class LookAt(Skill):
     The skill does not move the arm: move to a pose from which the camera sees the place first. The skill
     succeeds if an image shows every item at its place. It fails with `gone` if enough images show the place
     without the item; the position of the item is then unknown, and the item may be sorted again if a later
-    look finds an object of its class on the table. The skill fails with `hidden` if the place is outside the
-    image or occluded, or if `looks` images do not suffice for an answer, given the miss rate of the detector.
+    look finds an object of its class on the table. The skill fails with `hidden` if the item is in the tool,
+    if its place is outside the image or occluded, or if `looks` images do not suffice for an answer, given
+    the miss rate of the detector.
     """
 
     item: In[Item | None] = port(default=None, refers_to="item", doc="the item to verify")
@@ -49,6 +50,8 @@ class LookAt(Skill):
             if gone_items := ", ".join(found[Presence.GONE]):
                 raise self.failure("gone", f"not at its place any more: {gone_items}")
             if hidden_items := ", ".join(found[Presence.HIDDEN]):
+                if (held := cell.ledger.find_held_item()) in found[Presence.HIDDEN]:
+                    raise self.failure("hidden", f"{held} is in the tool")
                 raise self.failure("hidden", f"the camera does not see the place of {hidden_items}")
             if not (unsure_items := found[Presence.UNSURE]):
                 return

@@ -11,6 +11,9 @@ from executive.manipulation.tool_goals import choose_bin, list_free_bins, sort_p
 from executive.perception.evidence import describe_unknown_labels
 from executive.skill import In, Out, Skill, SkillFailed, param, port
 
+NOT_OPEN = ("held", "placed", "rejected", "skipped")
+"""States of an item that cannot be selected."""
+
 
 class SelectTarget(Skill):
     """Select the next target to pick, and its bin.
@@ -21,7 +24,8 @@ class SelectTarget(Skill):
     refers to the tool or, while the arm moves, to the destination of the arm; `surest` refers to the
     confidence of the last detection; `least_tried` selects the item with the fewest failed attempts, and of
     several the nearest. A deferred item comes after all others (see `Defer`). With `among`, the skill fails
-    with `no_candidate` as soon as none of these items is open.
+    with `no_candidate` as soon as none of these items is open or lost; with `same`, if the item is placed,
+    rejected, skipped or in the tool.
     """
 
     targets: In[list[Target]] = port(doc="the known targets")
@@ -77,18 +81,29 @@ class SelectTarget(Skill):
 
     def _is_nothing_left(self, cell: Cell) -> bool:
         """Return True if no requested item is left, or if none of the items in `among` is open."""
+        # An object that looks like an object of the wanted class may belong to it, until it is weighed.
+        looks = {other.look for other in cell.classes.values() if other.label == self.wanted}
+        labels, ignored_items = {self.wanted, *looks}, self.not_ or ()
         if self.among is None:
-            # An object that looks like an object of the wanted class may belong to it, until it is weighed.
-            looks = {other.look for other in cell.classes.values() if other.label == self.wanted}
-            labels, ignored_items = {self.wanted, *looks}, self.not_ or ()
             return self.same is None and all(
                 cell.ledger.is_table_empty(label, ignored_items) for label in labels
             )
-        known_items = [item for item in cell.ledger.list_known_items() if self._is_requested(cell, item.item)]
-        return not any(item.is_open or item.state == "lost" for item in known_items)
+        return not any(
+            (known.is_open or known.state == "lost")
+            and (self.wanted is None or known.label in labels)
+            and list_free_bins(cell, known.label)
+            for known in cell.ledger.list_known_items()
+            if known.item in self.among
+            and known.item not in ignored_items
+            and self.same in (None, known.item)
+        )
 
     def _explain_missing_candidate(self, cell: Cell) -> SkillFailed:
         """Return the failure with the reason why there is no candidate."""
+        if self.same and (state := cell.ledger.describe(self.same).state) in NOT_OPEN:
+            exemption = cell.ledger.explain_exemption(cell.ledger.get_label(self.same))
+            cause = f": {exemption}" if state == "skipped" else ""
+            return self.failure("no_candidate", f"{self.same} is {state}{cause}")
         if names := self._list_uncertain(cell):
             return self.failure("doubtful", f"not enough looks agree on {names} yet; look again")
         name = self.same or self.wanted or "object to sort"

@@ -45,5 +45,6 @@ class Weigh(Skill):
             raise self.failure("contradicted", f"{self.held} is of no certain class: {contradiction}")
         label = ledger.get_label(self.held)
         if (bin := choose_bin(cell, label)) is None:
-            raise self.failure("no_bin", f"{self.held} is a {label}, for which no bin is free")
+            explanation = ledger.explain_exemption(label) or "no bin is free"
+            raise self.failure("no_bin", f"{self.held} is a {label}: {explanation}")
         self.bin = bin

@@ -68,6 +68,11 @@ def test_a_bin_behind_the_arm_is_hidden(fake: FakeCell, placed: str) -> None:
     assert (result.reason, result.message) == ("hidden", "the camera does not see the place of cube-1")
 
 
+def test_an_item_in_the_tool_is_at_no_place(fake: FakeCell, held: str) -> None:
+    result = look_at(fake, item=held)
+    assert (result.reason, result.message) == ("hidden", "cube-1 is in the tool")
+
+
 def test_a_doubtful_detection_beside_the_slot_is_no_answer(fake: FakeCell, placed: str) -> None:
     fake.world.objects[0].position[1] += 0.1
     fake.detector.make_answer = lambda look, true: [replace(one, confidence=0.4) for one in true]

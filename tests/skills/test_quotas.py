@@ -85,6 +85,19 @@ def test_without_a_free_quota_no_candidate_is_left_at_once() -> None:
     )
 
 
+def test_a_surplus_item_that_is_requested_again_is_skipped() -> None:
+    fake = make_cell({("red_bin", "sphere"): 1}, "sphere", "sphere")
+    place_all(fake, look(fake))
+    placed, surplus = sorted(("sphere-1", "sphere-2"), key=fake.ledger.is_open)
+    expected = {
+        placed: f"{placed} is placed",
+        surplus: f"{surplus} is skipped: the quota of red_bin is reached",
+    }
+    for item, message in expected.items():
+        result = select(fake, look(fake), same=item)
+        assert (result.reason, result.message) == ("no_candidate", message)
+
+
 def test_the_end_of_one_class_does_not_hide_another() -> None:
     fake = make_cell({("red_bin", "sphere"): 1}, "sphere", "sphere", "cube")
     assert place_all(fake, look(fake))[-1] == "unseen", "a hidden cube may be left"

@@ -98,7 +98,7 @@ def test_a_class_without_a_declared_mass_is_weighed_without_a_conclusion() -> No
 def test_a_class_without_a_route_has_no_bin() -> None:
     fake = make_fake({"bottle": ("red_bin",)})
     result = weigh(fake, pick(fake, "full_bottle"))
-    expected = "bottle-1 is a full_bottle, for which no bin is free"
+    expected = "bottle-1 is a full_bottle: the mission has no route for it"
     assert (result.reason, result.message) == ("no_bin", expected)
 
 
@@ -123,6 +123,16 @@ def test_no_full_bottle_is_left_only_if_no_bottle_is_left_that_was_not_weighed()
     fake.world.objects.clear()
     for _ in range(4):
         at_hand.look(fake, "full")
+    assert run_skill(select, fake).reason == "no_candidate"
+
+
+def test_a_look_alike_in_the_list_may_be_of_the_wanted_class() -> None:
+    fake = make_fake()
+    fake.world.put("full_bottle", 0.5, 0.0)
+    targets = [at_hand.look(fake, "full") for _ in range(4)][-1]
+    select = SelectTarget(targets=targets, wanted="full_bottle", among=["bottle-1"])
+    assert run_skill(select, fake).reason == "unseen"
+    fake.ledger.reject("bottle-1", "slippery")
     assert run_skill(select, fake).reason == "no_candidate"
 
 
