@@ -34,5 +34,7 @@ class ConfirmGrasp(Skill):
         if item is not None:
             cell.ledger.record_drop(item)
             raise self.failure("empty", f"the sensor detects no seal; {item} was dropped")
+        if is_sealed:
+            cell.ledger.invalidate_positions()
         seal = "a seal, but the ledger knows no held item; the tool was opened" if is_sealed else "no seal"
         raise self.failure("empty", f"the sensor detects {seal}")

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, MinTimes, Steps
 from executive.manipulation.motions import transport
-from executive.manipulation.tool_goals import DROP_HEIGHT, make_bin_goal
+from executive.manipulation.tool_goals import DROP_HEIGHT, explain_uncertain_bin, make_bin_goal
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port
 
 
@@ -17,6 +17,9 @@ class Transit(Skill):
 
     The arm makes one motion: up, over all walls, and down into the bin. The accelerations are so low that the
     seal holds with a safety factor of two. The skill reads the vacuum sensor during the whole motion.
+
+    The skill fails with `blocked` if the bin depends on the weight of the item, and no weighing made the
+    class of the item certain.
     """
 
     held: In[Item] = port(refers_to="item", doc="the item in the tool")
@@ -35,5 +38,7 @@ class Transit(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Plan the motion, and follow it while the seal holds."""
+        if doubt := explain_uncertain_bin(cell, self.bin, self.held):
+            raise self.failure("blocked", doubt)
         goal = make_bin_goal(cell, self.bin, self.held, self.drop)
         yield from transport(self, cell, self.held, goal, self.bin)

@@ -82,6 +82,9 @@ class Ledger(Protocol):
         table.
         """
 
+    def is_weighed(self, item: Item) -> bool:
+        """Return True if the class of an item is certain according to its last weighing."""
+
     def get_label(self, item: Item) -> str:
         """Return the most probable class of an item."""
 

@@ -60,6 +60,7 @@ class Belief:
         max_confusion_rate: Largest confusion rate of the detectors that detected the item, 0 to 1.
         looks: After a weighing: for each class of the cell, the class that it looks like. Before, empty:
             every class stands for all classes that look like it.
+        weight_log_ratios: Log likelihood ratio of the last weighing by class, part of `log_likelihoods`.
     """
 
     first_label: str
@@ -73,6 +74,7 @@ class Belief:
     label_counts: Counter[str] = field(default_factory=Counter)
     max_confusion_rate: float = 0.0
     looks: Mapping[str, str] = field(default_factory=dict)
+    weight_log_ratios: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def look_count(self) -> int:
@@ -172,6 +174,8 @@ class Belief:
     def add_weight(self, log_ratios: Mapping[str, float], looks: Mapping[str, str]) -> None:
         """Update the class with a weighing, which distinguishes classes that look alike.
 
+        A weighing replaces the last one, because a weight off by a constant error is off in both.
+
         Args:
             log_ratios: For each class of the cell, log likelihood of the measured weight, relative to an
                 object of another class.
@@ -182,7 +186,8 @@ class Belief:
             known = {label: detected[look] for label, look in looks.items() if look in detected}
             self.log_likelihoods, self.looks = defaultdict(float, known), looks
         for label in self.log_likelihoods:
-            self.log_likelihoods[label] += log_ratios[label]
+            self.log_likelihoods[label] += log_ratios[label] - self.weight_log_ratios.get(label, 0.0)
+        self.weight_log_ratios = {label: log_ratios[label] for label in self.log_likelihoods}
 
     def merge(self, duplicate: Belief) -> None:
         """Add the detections of a duplicate item, which is the same object and was never weighed."""

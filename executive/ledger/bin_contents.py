@@ -129,7 +129,7 @@ class BinContents:
                 if is_visible or self.is_floor_visible(bin_name, look):
                     update_bin_log_odds(record, bin_name, look.error_rates, is_visible=is_visible)
                 if record.bin_log_odds[bin_name] >= -math.log(self.config.max_miss_probability):
-                    record.bin = bin_name
+                    record.bin, record.stamp, record.is_missing = bin_name, look.frame.stamp, False
                     record.set_state(State.PLACED, "")
                     placed_records.append(record)
                     break

@@ -72,7 +72,7 @@ class ItemRecord:
         was_moved: True if the item was detected after a possible move.
         change_count: Number of changes of the table before the last detection.
         frame_id: Number of the frame of the last detection.
-        stamp: Capture time of the last detection [s].
+        stamp: Capture time of the last detection or, after a placement, of the last look before it [s].
         confidence: Confidence of the last detection, 0 to 1.
         state: State of the item.
         bin: Name of the bin that contains the item, or "".
@@ -220,7 +220,7 @@ class ItemRecord:
     def merge(self, new_item: ItemRecord) -> None:
         """Add the evidence and the position of `new_item`, which is the same object after a move."""
         self.belief.merge(new_item.belief)
-        self.empty_probe_count = 0
+        self.empty_probe_count, self.is_missing = 0, False
         # `first_position` stays the position before the move.
         self.position, self.standard_error, self.was_moved = new_item.position, new_item.standard_error, True
         self.change_count, self.frame_id = new_item.change_count, new_item.frame_id

@@ -73,7 +73,7 @@ class ItemRecords:
 
     def set_placed(self, record: ItemRecord, bin_name: str) -> None:
         """Set the state of an item to PLACED in a bin, and emit the item."""
-        record.bin = bin_name
+        record.bin, record.is_missing = bin_name, False
         self.change_state(record, State.PLACED)
 
     def reject(self, record: ItemRecord, reason: str) -> None:

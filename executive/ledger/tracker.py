@@ -28,7 +28,7 @@ from executive.ledger.item import ON_TABLE, ItemRecord, State
 from executive.ledger.look import LookUpdate, make_look_event
 from executive.ledger.records import ItemRecords
 from executive.ledger.staleness import Staleness
-from executive.ledger.verification import verify
+from executive.ledger.verification import confirm_placed_items, verify
 from executive.perception.evidence import compute_weight_log_ratios, describe_weight
 
 MIN_LOG_RATIO_OF_WEIGHT = math.log(0.01)
@@ -68,6 +68,8 @@ class Tracker:
         self._bin_recovery: BinRecovery | None = None
         """Recovery of the contents of the bins from `lose_track` to `record_bin_contents`; otherwise None."""
         self._last_frame_id = self._last_turn = 0
+        self._last_stamp = 0.0
+        """Capture time of the last look [s]."""
         self.unknown_labels: Counter[str] = Counter()
         self.assumption_reasons: list[str] = []
 
@@ -91,7 +93,7 @@ class Tracker:
         if reason and not any(known.startswith(reason_start) for known in self.assumption_reasons):
             self.assumption_reasons.append(reason)
         if frame.id != self._last_frame_id:
-            self._last_frame_id = frame.id
+            self._last_frame_id, self._last_stamp = frame.id, frame.stamp
             self._update(detections, observations)
         self._emit(FrameCaptured(frame))
         self._emit(make_look_event(detections, observations))
@@ -157,6 +159,12 @@ class Tracker:
         visible_items = [record for record in possible_items if self._coverage.is_visible(record.position)]
         # An item without a confident detection counts as an object of every class.
         return not any(item.label in labels or not item.belief.look_count for item in visible_items)
+
+    def is_weighed(self, item: Item) -> bool:
+        """Return True if the class of an item is certain according to its last weighing."""
+        belief = self._records.find(item).belief
+        fits = belief.weight_log_ratios.get(belief.label, -math.inf) >= MIN_LOG_RATIO_OF_WEIGHT
+        return fits and belief.class_error <= self._config.max_class_error
 
     def get_label(self, item: Item) -> str:
         """Return the most probable class of an item."""
@@ -231,9 +239,8 @@ class Tracker:
         record = self._records.find(item)
         log_ratios = compute_weight_log_ratios(weight, std, classes)
         record.belief.add_weight(log_ratios, {label: other.look for label, other in classes.items()})
-        fits = log_ratios[record.label] >= MIN_LOG_RATIO_OF_WEIGHT
         contradiction = ""
-        if not fits or record.belief.class_error > self._config.max_class_error:
+        if not self.is_weighed(item):
             contradiction = record.last_contradiction = describe_weight(weight, record.label, classes)
         self._records.emit(record)
         return contradiction
@@ -262,7 +269,7 @@ class Tracker:
             )
         record = self._records.find(item)
         self._records.change_state(record, State.HELD)
-        record.belief.is_proved = True
+        record.belief.is_proved, record.is_missing = True, False
         self._invalidate_near(record.position, self._config.neighbourhood)
 
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
@@ -280,6 +287,9 @@ class Tracker:
         record = self._records.find(item)
         if record.state is State.HELD:
             record.reason, record.slot = "", self._bins.count_used_slots(bin)
+        # An object that a look showed before the placement is no item that left the bin later.
+        record.stamp, record.belief.miss_probability = self._last_stamp, 1.0
+        record.forget_viewpoints()
         self._records.set_placed(record, bin)
 
     def record_put_down(self, item: Item, position: Array) -> None:
@@ -368,6 +378,7 @@ class Tracker:
         if detections.view == "full" and self._bin_recovery is not None:
             self._bin_recovery.add_look(detections, bin_names)
         elif detections.view == "full":
+            confirm_placed_items(detections, observations, self._bins, self._config)
             self._records.emit(*self._bins.place_dropped_items(detections, bin_names))
 
     def _describe(self, record: ItemRecord) -> KnownItem:
@@ -377,7 +388,7 @@ class Tracker:
         """Set items to DROPPED, so that later looks search for them on the table and in the bins."""
         assert self._bin_recovery is not None, "items are marked as dropped after `lose_track`"
         for record in records:
-            record.change_count, record.is_untracked = self.change_count, True
+            record.change_count, record.is_untracked, record.is_missing = self.change_count, True, False
             record.bin_log_odds.clear()
             self._records.change_state(record, State.DROPPED)
         self.invalidate_positions()

@@ -54,6 +54,15 @@ def verify(
     return Presence.GONE if is_gone else Presence.UNSURE
 
 
+def confirm_placed_items(
+    look: Detections, observations: Sequence[Observation], bins: BinContents, config: LedgerConfig
+) -> None:
+    """Set the time of the last detection of each placed item that a look shows in its bin."""
+    for record in bins.records.filter_by_state(State.PLACED):
+        if _find_presence_in_bin(record, look, observations, bins, config.gate) is Presence.THERE:
+            record.stamp = look.frame.stamp
+
+
 def _find_presence_in_bin(
     record: ItemRecord, look: Detections, observations: Sequence[Observation], bins: BinContents, gate: float
 ) -> Presence:

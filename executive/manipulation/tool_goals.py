@@ -142,6 +142,23 @@ def choose_bin(cell: Cell, label: str) -> str | None:
     return next(limited_bins, fewest)
 
 
+def explain_uncertain_bin(cell: Cell, bin_name: str, item: Item) -> str:
+    """Return why a bin may be wrong for `item`, or "".
+
+    Several classes look like the item, the bin is permitted for a part of them, and no weighing made the
+    class certain. A bin that is permitted for none of these classes is a decision of the mission.
+    """
+    look = cell.classes[cell.ledger.get_label(item)].look
+    labels = [label for label, other in cell.classes.items() if other.look == look]
+    other_labels = [label for label in labels if bin_name not in cell.routes.get(label, ())]
+    if len(other_labels) in (0, len(labels)) or cell.ledger.is_weighed(item):
+        return ""
+    return (
+        f"{item} may be a {' or a '.join(labels)}, which look alike, and {bin_name} is not permitted for a "
+        f"{' or a '.join(other_labels)}; weigh the item before the transit"
+    )
+
+
 def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
     """Return the goal of a transit: `item` in the tool, at `drop_height` [m] above the next slot of a bin."""
     bin, used_slots = cell.bins[bin_name], predict_used_slots(cell, bin_name, item)

@@ -202,3 +202,55 @@ def test_an_item_in_the_tool_is_hidden(bench: Bench) -> None:
     bench.look(CUBE)
     bench.ledger.record_grasp("cube-1")
     assert bench.verify("cube-1") == "hidden"
+
+
+def test_an_object_that_was_on_the_table_before_the_placement_is_another_item(bench: Bench) -> None:
+    for _ in range(3):
+        bench.look(CUBE, view="full")
+    bench.ledger.record_grasp("cube-1")
+    for _ in range(3):
+        bench.look(ELSEWHERE, view="full")
+    bench.ledger.record_placement("cube-1", "red_bin")
+    bench.place("cube-2")
+    for _ in range(2):
+        bench.verify("cube-1", SLOT_2)
+    assert bench.end() == {
+        "cube-1": ("lost", "known to exist, not found again"),
+        "cube-2": ("placed", "red_bin"),
+    }
+
+
+def test_an_object_that_a_look_shows_together_with_the_placed_item_is_another_item(placed: Bench) -> None:
+    placed.look(view="full")
+    placed.look(ELSEWHERE)
+    for _ in range(2):
+        placed.look(ELSEWHERE, SLOT_1, view="full")
+    for _ in range(2):
+        placed.verify("cube-1", ELSEWHERE)
+    placed.look(ELSEWHERE)
+    assert {item: state for item, (state, _) in placed.states().items()} == {
+        "cube-1": "dropped",
+        "cube-2": "seen",
+    }
+
+
+def test_looks_before_the_placement_are_no_evidence_that_the_item_left_the_bin(bench: Bench) -> None:
+    for _ in range(3):
+        bench.look(CUBE)
+    bench.look()
+    bench.place("cube-1")
+    assert bench.verify("cube-1") == "unsure"
+
+
+@pytest.mark.parametrize("found_by", ["look on the table", "look in the bin", "grasp", "loss of track"])
+def test_an_item_that_was_found_again_is_missing_no_more(gone: Bench, found_by: str) -> None:
+    record = gone.ledger._records.find("cube-1")
+    assert record.is_missing
+    if found_by == "grasp":
+        gone.ledger.record_grasp("cube-1")
+    elif found_by == "loss of track":
+        gone.ledger.lose_track()
+    for _ in range(2):
+        if found_by.startswith("look"):
+            gone.look(ELSEWHERE if found_by == "look on the table" else SLOT_1, view="full")
+    assert not record.is_missing

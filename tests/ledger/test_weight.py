@@ -116,3 +116,14 @@ def test_each_weighing_is_reported_as_an_event() -> None:
     bench.ledger.record_weight("cube-1", 0.20 * GRAVITY, STD, CLASSES)
     (event,) = bench.events
     assert (event.item, event.label, event.state) == ("cube-1", "full_cube", "held")
+
+
+def test_a_second_weighing_with_the_same_error_leaves_the_class_as_uncertain() -> None:
+    bench = seen_bench()
+    near = {
+        "cube": LIGHT,
+        "full_cube": ObjectClass("full_cube", 0.05, 0.0354, mass=0.06, mass_std=0.0, looks_like="cube"),
+    }
+    answers = {bench.ledger.record_weight("cube-1", 0.058 * GRAVITY, STD, near) for _ in range(6)}
+    assert answers == {"it weighs 0.57 N, and a cube 0.49 N and a full_cube 0.59 N"}
+    assert not bench.ledger.is_weighed("cube-1")

@@ -10,6 +10,7 @@ from executive.geometry import GRAVITY
 from executive.skill import SkillFailed
 from executive.testing.run_skill import SkillResult, run_skill
 from skills.select_target import SelectTarget
+from skills.transit import Transit
 from skills.weigh import Weigh
 
 ROUTES = {"bottle": ("red_bin",), "full_bottle": ("blue_bin",), "jar": ("yellow_bin",), "duck": ("red_bin",)}
@@ -153,3 +154,29 @@ def test_an_item_that_falls_during_the_measurement_is_dropped_and_not_weighed() 
         "the seal on bottle-1 broke during the weighing, near (0.50, 0.00"
     )
     assert fake.ledger.find_held_item() is None
+
+
+@pytest.mark.parametrize("load_error", [None, 0.07 * GRAVITY])
+def test_the_bin_of_one_of_two_classes_that_look_alike_is_blocked_until_the_weight_is_certain(
+    load_error: float | None,
+) -> None:
+    fake = make_fake()
+    item = pick(fake, "full_bottle")
+    if load_error is not None:
+        fake.tool.load_error = load_error
+        assert weigh(fake, item).reason == "contradicted"
+    result = run_skill(Transit(held=item, bin="red_bin"), fake)
+    assert (result.status, result.reason) == ("FAILURE", "blocked")
+    assert result.message == (
+        "bottle-1 may be a bottle or a full_bottle, which look alike, and red_bin is not permitted for a "
+        "full_bottle; weigh the item before the transit"
+    )
+    fake.tool.load_error = 0.0
+    weigh(fake, item)
+    assert run_skill(Transit(held=item, bin="blue_bin"), fake).status == "SUCCESS"
+
+
+@pytest.mark.parametrize("bin", ["red_bin", "yellow_bin"])
+def test_an_item_that_was_not_weighed_gets_into_a_bin_of_all_classes_or_of_none(bin: str) -> None:
+    fake = make_fake({"bottle": ("red_bin",), "full_bottle": ("red_bin", "blue_bin")})
+    assert run_skill(Transit(held=pick(fake, "bottle"), bin=bin), fake).status == "SUCCESS"
