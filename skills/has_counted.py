@@ -11,10 +11,10 @@ from executive.skill import In, Skill, param, port
 class HasCounted(Skill):
     """Check that at least a number of items are placed or rejected.
 
-    `wanted` restricts the count to one class, `inside` to one bin. No rejected item is in a bin.
+    `of_class` restricts the count to one class, `inside` to one bin. No rejected item is in a bin.
     """
 
-    wanted: In[str | None] = port(default=None, refers_to="class", doc="only items of this class")
+    of_class: In[str | None] = port(default=None, refers_to="class", doc="only items of this class")
     inside: In[str | None] = port(default=None, refers_to="bin", doc="only items in this bin")
     counter: str = param("placed", choices=("placed", "rejected"), doc="the state of the counted items")
     at_least: int = param(ge=1, doc="minimum number of items")
@@ -23,9 +23,9 @@ class HasCounted(Skill):
 
     def run(self, cell: Cell) -> None:
         """Count the items once."""
-        count = cell.ledger.count_items(self.counter, self.wanted, self.inside)
+        count = cell.ledger.count_items(self.counter, self.of_class, self.inside)
         if count < self.at_least:
-            objects = f"items of class {self.wanted}" if self.wanted else "items"
+            objects = f"items of class {self.of_class}" if self.of_class else "items"
             place = f" in {self.inside}" if self.inside else ""
             message = f"{count} of {self.at_least} required {objects} are {self.counter}{place}"
             raise self.failure("too_few", message)

@@ -148,6 +148,8 @@ def _skill_row(entry: Declaration) -> list[str]:
     value = KINDS.get(entry["type"], f"`{entry['type']}`")
     if entry["refers"]:
         value = f"name of {'an' if entry['refers'][0] in 'aeiou' else 'a'} {entry['refers']}"
+        if entry["type"].startswith("list["):
+            value = f"list of names of {entry['refers']}s"
     if entry.get("choices"):
         value = f"{_listed(entry['choices'])}{', or ' + value if entry['refers'] else ''}"
     value += f" [{entry['unit']}]" if entry.get("unit") else ""

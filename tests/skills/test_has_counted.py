@@ -26,11 +26,11 @@ def counted(fake: FakeCell, look: Any) -> FakeCell:
     ("values", "count"),
     [
         ({}, 3),
-        ({"wanted": "cube"}, 2),
+        ({"of_class": "cube"}, 2),
         ({"inside": "red_bin"}, 2),
-        ({"wanted": "cube", "inside": "red_bin"}, 1),
-        ({"wanted": "sphere", "counter": "rejected"}, 1),
-        ({"wanted": "cube", "counter": "rejected"}, 0),
+        ({"of_class": "cube", "inside": "red_bin"}, 1),
+        ({"of_class": "sphere", "counter": "rejected"}, 1),
+        ({"of_class": "cube", "counter": "rejected"}, 0),
     ],
 )
 def test_it_succeeds_up_to_the_number_of_counted_items(counted: FakeCell, values: Any, count: int) -> None:
@@ -39,5 +39,5 @@ def test_it_succeeds_up_to_the_number_of_counted_items(counted: FakeCell, values
 
 
 def test_the_failure_states_what_was_counted(counted: FakeCell) -> None:
-    result = run_skill(HasCounted(at_least=2, wanted="cube", inside="red_bin"), counted)
+    result = run_skill(HasCounted(at_least=2, of_class="cube", inside="red_bin"), counted)
     assert result.message == "1 of 2 required items of class cube are placed in red_bin"
