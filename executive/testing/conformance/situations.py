@@ -152,7 +152,7 @@ def _generate_value(declared: Param | Port, scene: SkillScene) -> Any:
 def _find_value_of_type(value_type: Any, refers_to: str, scene: SkillScene) -> Any:
     """Return a value of this type from the scene; None if the scene has none."""
     if value_type is str:
-        return _find_name_in_scene(refers_to, scene)
+        return _find_name_in_scene(refers_to, scene) if refers_to else "some text"
     if get_origin(value_type) in (Union, types.UnionType):
         return _find_value_of_type(get_args(value_type)[0], refers_to, scene)
     if value_type == list[Target]:
