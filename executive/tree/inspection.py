@@ -64,11 +64,8 @@ class NodeAnalysis(Protocol):
     def list_skill_times(self, child: Child) -> Sequence[tuple[str, float]]:
         """Return the name and the minimum time [s] of each skill in the subtree of a child."""
 
-    def list_actions(self, child: Child) -> Sequence[str]:
-        """Return the names of the skills in the subtree of a child that are no conditions."""
-
-    def list_skills(self) -> Sequence[type[Skill] | None]:
-        """Return the skills in the subtree of the node; None stands for a skill that is not installed."""
+    def list_skills(self, child: Child | None = None) -> Mapping[str, type[Skill] | None]:
+        """Return the skills below a child, by default below the node, by name; None: not installed."""
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,8 @@ def check_reactive_children(children: Children, analysis: NodeAnalysis) -> Itera
         message = "without memory, this node does the same as with memory: no child takes time"
         yield NodeFinding("memory", "useless-reactive", message, is_warning=True)
     for index in range(slow_indices[0] if len(slow_indices) == 1 else 0):
-        if actions := analysis.list_actions(children[index]):
+        skills = analysis.list_skills(children[index]).items()
+        if actions := [name for name, skill in skills if skill is not None and not skill.is_condition]:
             message = (
                 f"{actions[0]} is no condition, but runs again at every tick of {names[slow_indices[0]]}"
             )

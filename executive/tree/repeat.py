@@ -146,7 +146,7 @@ class Repeat(Loop):
             return
         if any(limit == 0 for _, limit in self._limits):
             return
-        skills = analysis.list_skills()
+        skills = analysis.list_skills().values()
         if not any(skill is None or _may_release(skill) for skill in skills):
             message = "this loop never succeeds: its body releases no object, so `placed` does not increase"
             yield NodeFinding("", "endless", message, "Add a reason or elapsed to until, or add times.")

@@ -152,7 +152,7 @@ class Retry(Loop):
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield a warning if nothing changes between the attempts, or if there is only one attempt."""
-        skills = analysis.list_skills()
+        skills = analysis.list_skills().values()
         may_change = any(skill is None or skill.senses or skill.moves or skill.waits for skill in skills)
         if not self.backoff and skills and not may_change:
             message = "this retry changes nothing between its attempts: no node in it looks, moves or waits"

@@ -8,7 +8,7 @@ from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, make_error
 from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode, iterate_keys, list_nodes
-from executive.skill import Direction, Skill
+from executive.skill import ANY, Direction, Skill
 
 
 def find_non_conditions(context: CheckContext) -> Iterator[Finding]:
@@ -29,21 +29,20 @@ def _find_problem(context: CheckContext, node: Node) -> str:
             return problem and f'in the subtree "{node.name}", {problem}'
         case SkillNode() if node.skill in context.skills:
             skill = context.skills[node.skill]
-            return "" if skill.is_condition else f"{node.skill} {_describe_effect(skill)}"
+            effects = [*list_effects(skill), "does not declare that it changes nothing"]
+            return "" if skill.is_condition else f"{node.skill} {effects[0]}"
         case InnerNode() if not node.declaring_class.is_condition:
             return "a list is a sequence" if node.is_list else f"{get_type_name(node)} is no condition"
     return ""
 
 
-def _describe_effect(skill: type[Skill]) -> str:
-    """Return the reason why a skill is no condition, as the predicate of a sentence."""
-    if skill.moves:
-        return "moves the arm"
-    if outputs := [name for name, port in skill.ports.items() if port.direction is Direction.OUT]:
-        return f"writes ${outputs[0]}"
-    if skill.uses:
-        return f"uses the {skill.uses[0]}"
-    return f"takes time ({skill.waits})" if skill.waits else "does not declare that it changes nothing"
+def list_effects(skill: type[Skill]) -> list[str]:
+    """Return the declarations that no condition may have, as predicates of sentences."""
+    effects = ["moves the arm"] if skill.moves else []
+    effects += [f"writes ${name}" for name, port in skill.ports.items() if port.direction is Direction.OUT]
+    effects += [f"uses the {device}" for device in skill.uses]
+    effects += [f"takes time ({skill.waits})"] if skill.waits else []
+    return effects + (["requires a state of the tool"] if skill.tool_state[0] is not ANY else [])
 
 
 def _make_hint(context: CheckContext) -> str:

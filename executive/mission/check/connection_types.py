@@ -161,7 +161,8 @@ def _select_field(writers: Iterable[Writer], field: str) -> Iterator[Writer]:
         if not field:
             yield writer
         elif found := find_fields(writer.type, writer.refers_to).get(field):
-            yield replace(writer, type=found.type, refers_to=found.refers_to)
+            field_type, refers_to = found
+            yield replace(writer, type=field_type, refers_to=refers_to)
 
 
 def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iterator[Finding]:

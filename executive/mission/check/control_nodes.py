@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import cast
 
 from executive.mission.check.context import CheckContext
@@ -138,13 +138,8 @@ class CheckerAnalysis:
         skills = [node for node in get_mission_node(child).walk() if isinstance(node, SkillNode)]
         return [(node.skill, compute_min_time(self._context, node)) for node in skills]
 
-    def list_actions(self, child: Child) -> Sequence[str]:
-        """Return the names of the installed skills in and below a child that are no conditions."""
-        names = [node.skill for node in get_mission_node(child).walk() if isinstance(node, SkillNode)]
-        skills = self._context.skills
-        return [name for name in names if name in skills and not skills[name].is_condition]
-
-    def list_skills(self) -> Sequence[type[Skill] | None]:
-        """Return the skills below the node; None stands for a skill that is not installed."""
-        nodes = [node for node in self._node.walk() if isinstance(node, SkillNode)]
-        return [self._context.skills.get(node.skill) for node in nodes]
+    def list_skills(self, child: Child | None = None) -> Mapping[str, type[Skill] | None]:
+        """Return the skills below a child, by default below the node, by name; None: not installed."""
+        root = self._node if child is None else get_mission_node(child)
+        names = [node.skill for node in root.walk() if isinstance(node, SkillNode)]
+        return {name: self._context.skills.get(name) for name in names}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import types
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, is_dataclass
-from typing import Annotated, Any, NoReturn, Union, get_args, get_origin, get_type_hints
+from dataclasses import fields, is_dataclass
+from typing import Any, NoReturn, Union, get_args, get_origin, get_type_hints
 
 from executive.cell.objects import KnownItem, RefersTo
 
@@ -45,28 +45,23 @@ def find_element_type(declared_type: object) -> object:
     return Union[tuple(arguments)] if arguments else Any  # noqa: UP007 - the number of types varies
 
 
-@dataclass(frozen=True)
-class FieldType:
-    """Type of a field, and the kind of names that the field contains; "" if the field contains no names."""
+def find_fields(declared_type: object, refers_to: str) -> dict[str, tuple[object, str]]:
+    """Return type and kind of names of each field of the values of a type, by name.
 
-    type: object
-    refers_to: str
-
-
-def find_fields(declared_type: object, refers_to: str) -> dict[str, FieldType]:
-    """Return the fields of the values of a type by name; an item has the fields of `KnownItem`."""
+    The kind is "" for a field without names. An item has the fields of `KnownItem`.
+    """
     value_type = KnownItem if refers_to == "item" and declared_type is str else declared_type
     if not (isinstance(value_type, type) and is_dataclass(value_type)):
         return {}
-    hints = get_type_hints(value_type, include_extras=True)
-    return {field.name: _make_field_type(hints[field.name]) for field in fields(value_type)}
+    hints, annotations = get_type_hints(value_type), get_type_hints(value_type, include_extras=True)
+    return {
+        field.name: (hints[field.name], _find_kind(annotations[field.name])) for field in fields(value_type)
+    }
 
 
-def _make_field_type(annotation: object) -> FieldType:
-    if get_origin(annotation) is not Annotated:
-        return FieldType(annotation, "")
-    field_type, *markers = get_args(annotation)
-    return FieldType(field_type, next((mark.kind for mark in markers if isinstance(mark, RefersTo)), ""))
+def _find_kind(annotation: object) -> str:
+    markers = getattr(annotation, "__metadata__", ())
+    return next((marker.kind for marker in markers if isinstance(marker, RefersTo)), "")
 
 
 def describe_type(declared_type: object) -> str:

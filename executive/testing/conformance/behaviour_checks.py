@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from typing import Any, Union, get_args, get_origin
 
+from executive.mission.check.conditions import list_effects
 from executive.mission.model.port_types import describe_type, find_element_type
-from executive.skill import ANY, EMPTY, HOLDING, Direction, Skill, ToolState
+from executive.skill import ANY, EMPTY, HOLDING, Skill, ToolState
 from executive.testing.conformance.declaration_checks import HALT
 from executive.testing.conformance.situations import ArrangementFailed
 from executive.testing.conformance.skill_runs import SkillRuns, TickNotReturned
@@ -141,15 +142,8 @@ def decides_without_effect(runs: SkillRuns) -> Iterator[str]:
     skill, name = runs.skill, runs.name
     if not skill.is_condition:
         return
-    declarations = {
-        "an output": any(port.direction is Direction.OUT for port in skill.ports.values()),
-        "a device in uses": bool(skill.uses),
-        "moves": skill.moves,
-        "a required state of the tool": skill.tool_state[0] is not ANY,
-    }
-    for text, is_declared in declarations.items():
-        if is_declared:
-            yield f"{name} declares {text}, and is_condition. Remove one of the two."
+    for effect in list_effects(skill):
+        yield f"{name} {effect}, and declares is_condition. Remove one of the two."
     calls = [call.name for test_run in runs.unhalted_runs for call in test_run.cell_calls]
     for call in dict.fromkeys(calls):
         if not call.partition(".")[2].startswith(_QUERY_PREFIXES):

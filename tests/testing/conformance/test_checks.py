@@ -71,8 +71,8 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         unraised("self._tire"), unraised("self.failure"), unmade("follow"), unmade("cell.clock.sleep"),
     ]),
     ("decides_without_effect", faulty.BusyCondition, [
-        *(f"BusyCondition declares {text}, and is_condition. Remove one of the two." for text in (
-            "an output", "a device in uses", "a required state of the tool",
+        *(f"BusyCondition {text}, and declares is_condition. Remove one of the two." for text in (
+            "writes $count", "uses the camera", "requires a state of the tool",
         )),
         *(f"BusyCondition calls cell.{call}, and declares is_condition. A condition may only read the cell."
           for call in ("camera.capture", "ledger.invalidate_positions")),
