@@ -8,7 +8,6 @@ from py_trees.common import Status
 
 from executive.events import Emit, Event
 from executive.tree.keys import Child
-from executive.tree.node import TreeNode
 
 _COMPARED_ATTRIBUTES = ("node", "status", "reason", "choice", "item", "outputs")
 """Attributes of events by which two runs of a node are compared; messages may contain changing numbers."""
@@ -20,44 +19,35 @@ class EventGate:
     Without a gate, a condition that is checked at every tick would fill the journal with equal events.
 
     Args:
-        root: The node; the gate receives the events of this node and of all nodes below it.
+        node: The node; the gate receives the events of this node and of all nodes below it.
+        tick_child: Function that ticks the node and returns its status.
         emit: Function that emits the events that pass the gate.
     """
 
-    def __init__(self, root: Child, emit: Emit) -> None:
-        self._root, self._emit = root, emit
+    def __init__(self, node: Child, tick_child: Callable[[Child], Status], emit: Emit) -> None:
+        self._node, self._tick_child, self._emit = node, tick_child, emit
         self._held_events: list[Event] | None = None
         self._last_result: list[tuple[object, ...]] | None = None
-        for node in root.iterate():
-            if isinstance(node, TreeNode):
-                self._receive_events(node)
 
-    def _receive_events(self, node: TreeNode) -> None:
-        """Receive the events of a node, or of the outermost gate that receives them already."""
-        sender: TreeNode | EventGate = node
-        while isinstance(gate := getattr(sender._emit, "__self__", None), EventGate):
-            sender = gate
-        if sender is not self:
-            sender._emit = self._handle
-
-    def _handle(self, event: Event) -> None:
+    def hold(self, event: Event) -> bool:
+        """Hold an event until the end of the first tick of a run; return False if the gate is open."""
         if self._held_events is None:
-            self._emit(event)
-        else:
-            self._held_events.append(event)
+            return False
+        self._held_events.append(event)
+        return True
 
     def forget(self) -> None:
         """Forget the last result, so that the events of the next run pass."""
         self._last_result = None
 
-    def tick(self, tick_child: Callable[[Child], Status]) -> Status:
-        """Tick the node with `tick_child`, and return its status; discard its events if it ends as before."""
-        if self._root.status is Status.RUNNING:
-            return tick_child(self._root)
+    def tick(self) -> Status:
+        """Tick the node, and return its status; discard its events if it ends as before."""
+        if self._node.status is Status.RUNNING:
+            return self._tick_child(self._node)
         events = self._held_events = []
         status = Status.RUNNING
         try:
-            status = tick_child(self._root)
+            status = self._tick_child(self._node)
         finally:
             self._held_events = None
             result = [tuple(getattr(event, name, "") for name in _COMPARED_ATTRIBUTES) for event in events]

@@ -7,19 +7,13 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.tree.counterpart import Counterpart
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
-from executive.tree.inspection import MinTimeFunction, NodeAnalysis, NodeFinding, PropagatedFailure
+from executive.tree.inspection import Counterpart, MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Child, Children, key
-from executive.tree.node import ControlNode, NodeContext
-from executive.tree.reactive_children import (
-    ReactiveChildren,
-    check_reactive_children,
-    compute_reactive_flow,
-)
+from executive.tree.ordered import OrderedNode
 
 
-class Fallback(ControlNode):
+class Fallback(OrderedNode):
     """Run the children in order until a child succeeds; fail with the failure of the last child.
 
     With memory, a child that failed is not run again. Without memory, every tick begins with the first child
@@ -34,55 +28,18 @@ class Fallback(ControlNode):
     keyword = "fallback"
     keyword_hints: ClassVar = {"selector": "Write fallback."}
     symbol, shape = "?", "octagon"
+    passed_status = Status.FAILURE
 
-    memory: bool = key(
-        default=True,
-        doc="False to run all children again in every tick, from the first to the running child.",
-    )
     do: Children = key(shorthand=True, doc="Alternatives, in order.")
 
-    def __init__(self, context: NodeContext, **values: object) -> None:
-        super().__init__(context, **values)
-        self._reactive_children = None if self.memory else ReactiveChildren(self.do, context.emit)
-
-    def start(self) -> None:
-        """Begin with the first child."""
-        self._child_index = 0
-        if self._reactive_children is not None:
-            self._reactive_children.start()
-
-    def step(self) -> Status:
-        """Tick the current child; after a failure, tick the next child in the same tick."""
-        if self._reactive_children is not None:
-            return self._step_without_memory(self._reactive_children)
-        while True:
-            child = self.do[self._child_index]
-            status = self.tick_child(child)
-            if status is not Status.FAILURE:
-                return status
-            failure = self.get_failure(child)
-            self._child_index += 1
-            if self._child_index == len(self.do):
-                return self.fail(failure)
-            self.report_choice(f"choice {self._child_index + 1} of {len(self.do)}", failure)
-
-    def _step_without_memory(self, children: ReactiveChildren) -> Status:
-        index, status = children.tick(self.tick_child, continues_after=Status.FAILURE)
-        self.halt_children(children.list_running_except(index))
-        if index > 0 and index != self._child_index:
+    def report_next(self, index: int) -> None:
+        """Report the number of the next child, and the failure of the child before it."""
+        if index > 0:
             failure = self.get_failure(self.do[index - 1])
             self.report_choice(f"choice {index + 1} of {len(self.do)}", failure)
-        self._child_index = index
-        return self.fail(self.get_failure(self.do[index])) if status is Status.FAILURE else status
 
-    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
+    def compute_pass(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the outcomes; each child starts in the states after failures of the previous child."""
-        if not self.memory:
-            return compute_reactive_flow(lambda entry: self._compute_pass(get_flow, entry), state)
-        return self._compute_pass(get_flow, state)
-
-    def _compute_pass(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the outcomes of one pass through the children."""
         success = halted = None
         failures: Mapping[PossibleFailure, FlowState] = {}
         entry: FlowState | None = state
@@ -98,10 +55,6 @@ class Fallback(ControlNode):
     def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the shortest minimum time of a child [s]."""
         return min(map(get_min_time, self.do))
-
-    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
-        """Yield mistakes in the use of a fallback without memory."""
-        return iter(()) if self.memory else check_reactive_children(self.do, analysis)
 
     def explain_unreachable(self, child: Child) -> str:
         """Return a text that explains why `child` never runs: an earlier child cannot fail."""

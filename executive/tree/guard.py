@@ -7,10 +7,14 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.errors import Fault
-from executive.tree.counterpart import Counterpart
-from executive.tree.event_gate import EventGate
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
-from executive.tree.inspection import MinTimeFunction, NodeAnalysis, NodeFinding, PropagatedFailure
+from executive.tree.inspection import (
+    Counterpart,
+    MinTimeFunction,
+    NodeAnalysis,
+    NodeFinding,
+    PropagatedFailure,
+)
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode, NodeContext
 
@@ -35,7 +39,7 @@ class Guard(ControlNode):
 
     def __init__(self, context: NodeContext, **values: object) -> None:
         super().__init__(context, **values)
-        self._gate = EventGate(self.holds, context.emit)
+        self._gate = self.make_gate(self.holds)
 
     def start(self) -> None:
         """Let the events of the first check pass."""
@@ -47,7 +51,7 @@ class Guard(ControlNode):
         Raises:
             Fault: The condition did not decide within the tick.
         """
-        status = self._gate.tick(self.tick_child)
+        status = self._gate.tick()
         if status is Status.RUNNING:
             raise Fault(f"{self.holds.name} is a condition, but it did not decide within one tick", self.path)
         if status is Status.FAILURE:

@@ -1,9 +1,9 @@
-"""Arguments and results of the methods of control nodes that the checker and the diagnosis call."""
+"""Arguments and results of the methods of control nodes for the checker, the diagnosis and the export."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
 from executive.skill import Skill
@@ -113,6 +113,20 @@ class Advice:
     text: str
     key: str = ""
     child: Child | None = None
+
+
+@dataclass(frozen=True)
+class Counterpart:
+    """Node type that BehaviorTree.CPP 4 registers, with the semantics of a control node.
+
+    Attributes:
+        name: Name of the node type.
+        ports: Value of each port: the name of a key that the mission sets and whose value the port has, or
+            a number that the control node has computed from its constants.
+    """
+
+    name: str
+    ports: Mapping[str, str | int] = field(default_factory=dict)
 
 
 def format_reasons(reasons: Sequence[object]) -> str:

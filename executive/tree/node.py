@@ -18,13 +18,20 @@ from pydantic import ValidationError
 from executive.cell.counters import CounterName
 from executive.cell.protocols import Clock
 from executive.errors import Fault, InputError
-from executive.events import BranchChosen, Emit, NodeEnded, NodeStarted, discard_event
+from executive.events import BranchChosen, Emit, Event, NodeEnded, NodeStarted, discard_event
 from executive.tree.blackboard import Blackboard
-from executive.tree.counterpart import Counterpart
+from executive.tree.event_gate import EventGate
 from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.halting import halt
-from executive.tree.inspection import Advice, MinTimeFunction, NodeAnalysis, NodeFinding, PropagatedFailure
+from executive.tree.inspection import (
+    Advice,
+    Counterpart,
+    MinTimeFunction,
+    NodeAnalysis,
+    NodeFinding,
+    PropagatedFailure,
+)
 from executive.tree.keys import Child, KeyKind, KeyOwner, KeySection
 
 
@@ -59,9 +66,11 @@ class TreeNode(Behaviour):
         label: Label of the node in the mission, or "".
         blackboard: Variables of the run.
         subtree_names: Names of the subtrees with this node as root, the outermost first.
+        event_gate: Gate of the events of this node and of all nodes below it, or None.
     """
 
     subtree_names: tuple[str, ...] = ()
+    event_gate: EventGate | None = None
 
     def __init__(self, context: NodeContext, name: str) -> None:
         super().__init__(context.label or name)
@@ -69,7 +78,7 @@ class TreeNode(Behaviour):
         self._failure: Failure | None = None
         self._visited_nodes: list[Behaviour] | None = None
         """Nodes below this node that the current call of `tick` has ticked; None outside of `tick`."""
-        self._emit = context.emit
+        self._emit_from_root = context.emit
 
     @property
     def failure(self) -> Failure | None:
@@ -80,6 +89,13 @@ class TreeNode(Behaviour):
     def failure(self, failure: Failure | None) -> None:
         self._failure = failure
         self.feedback_message = f"{failure}: {failure.message}" if failure else ""
+
+    def emit(self, event: Event) -> None:
+        """Emit an event of this node or of a node below, unless a gate on the way to the root holds it."""
+        if self.event_gate is not None and self.event_gate.hold(event):
+            return
+        emit = self.parent.emit if isinstance(self.parent, TreeNode) else self._emit_from_root
+        emit(event)
 
     def update(self) -> Status:
         """Continue by one tick and return the status."""
@@ -238,6 +254,13 @@ class ControlNode(KeyOwner, TreeNode):
             raise Fault(f"{child.name} was ticked but has no status", self.path)
         return status
 
+    def make_gate(self, child: Child) -> EventGate:
+        """Return a gate of the events of a child; its method `tick` replaces `tick_child`."""
+        gate = EventGate(child, self.tick_child, self.emit)
+        if isinstance(child, TreeNode):
+            child.event_gate = gate
+        return gate
+
     def halt_children(self, children: Iterable[Child]) -> None:
         """Halt the children and all running nodes below the children, one child after the other.
 
@@ -266,7 +289,7 @@ class ControlNode(KeyOwner, TreeNode):
     def report_choice(self, choice: str, cause: Failure | None = None) -> None:
         """Emit an event with a decision of the node, and with the failure that caused the decision."""
         reason, message = (str(cause), cause.message) if cause else ("", "")
-        self._emit(BranchChosen(self.path, choice, reason, message))
+        self.emit(BranchChosen(self.path, choice, reason, message))
 
     # Methods of the py_trees interface.
 
@@ -275,7 +298,7 @@ class ControlNode(KeyOwner, TreeNode):
         if self.status is not Status.RUNNING:
             self.failure = None
             self.status = Status.RUNNING
-            self._emit(NodeStarted(self.path))
+            self.emit(NodeStarted(self.path))
             self.start()
         status = self.step()
         if status is not Status.RUNNING:
@@ -294,7 +317,7 @@ class ControlNode(KeyOwner, TreeNode):
             self.status = new_status
             if was_running:
                 self.clean_up()
-                self._emit(NodeEnded(self.path, new_status.value))
+                self.emit(NodeEnded(self.path, new_status.value))
 
     def _end(self, status: Status) -> None:
         """Set the final status, clean up, and emit `NodeEnded`."""
@@ -302,7 +325,7 @@ class ControlNode(KeyOwner, TreeNode):
         self.clean_up()
         failure = self.failure if status is Status.FAILURE else None
         reason, message, origin = (str(failure), failure.message, failure.path) if failure else ("", "", "")
-        self._emit(NodeEnded(self.path, status.value, reason=reason, message=message, origin=origin))
+        self.emit(NodeEnded(self.path, status.value, reason=reason, message=message, origin=origin))
 
     def _check_constants(self) -> None:
         """Raise an InputError if a constant has another type than declared, or is out of bounds."""

@@ -7,7 +7,6 @@ from typing import Literal
 
 from py_trees.common import Status
 
-from executive.tree.counterpart import Counterpart
 from executive.tree.failure import Failure
 from executive.tree.flow import (
     Flow,
@@ -18,7 +17,7 @@ from executive.tree.flow import (
     find_end_tool_states,
     join_states,
 )
-from executive.tree.inspection import MinTimeFunction, PropagatedFailure
+from executive.tree.inspection import Counterpart, MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
 

@@ -9,10 +9,10 @@ from py_trees.common import Status
 
 from executive.cell.counters import CounterName
 from executive.skill import Skill, ToolState
-from executive.tree.counterpart import Counterpart
 from executive.tree.failure import Reason
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.inspection import (
+    Counterpart,
     MinTimeFunction,
     NodeAnalysis,
     NodeFinding,

@@ -10,11 +10,11 @@ from py_trees.common import Status
 
 from executive.cell.protocols import Steps
 from executive.skill import Seconds
-from executive.tree.counterpart import Counterpart
 from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, find_fixed_point, join_states
 from executive.tree.inspection import (
     Advice,
+    Counterpart,
     MinTimeFunction,
     NodeAnalysis,
     NodeFinding,

@@ -115,7 +115,7 @@ class SkillLeaf(TreeNode):
         self.status = Status.RUNNING
         inputs = self._read_inputs()
         self._item = self._find_item(inputs)
-        self._emit(NodeStarted(self.path, self.skill_name, self._item))
+        self.emit(NodeStarted(self.path, self.skill_name, self._item))
         self._run = SkillRun(self.skill_type(**self.wiring.constants, **inputs), self._cell)
         return self._run
 
@@ -162,7 +162,7 @@ class SkillLeaf(TreeNode):
     ) -> None:
         self.status, self._run = status, None
         event = NodeEnded(self.path, status.value, self.skill_name, self._item, reason, message, "", outputs)
-        self._emit(event)
+        self.emit(event)
 
 
 def _format_value(value: object) -> str:

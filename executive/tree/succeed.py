@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.counterpart import Counterpart
 from executive.tree.flow import Flow, FlowFunction, FlowState, join_states
+from executive.tree.inspection import Counterpart
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 

@@ -7,9 +7,15 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.skill import Seconds
-from executive.tree.counterpart import Counterpart
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure
-from executive.tree.inspection import Advice, MinTimeFunction, NodeAnalysis, NodeFinding, PropagatedFailure
+from executive.tree.inspection import (
+    Advice,
+    Counterpart,
+    MinTimeFunction,
+    NodeAnalysis,
+    NodeFinding,
+    PropagatedFailure,
+)
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 

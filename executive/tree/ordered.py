@@ -1,0 +1,102 @@
+"""Base class of the control nodes that run their children in order: sequence and fallback."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+from py_trees.common import Status
+
+from executive.tree.flow import Flow, FlowFunction, FlowState
+from executive.tree.inspection import NodeAnalysis, NodeFinding
+from executive.tree.keys import Children, key
+from executive.tree.node import ControlNode, NodeContext
+
+
+class OrderedNode(ControlNode):
+    """Run the children in order until a child takes time, or ends with another status than `passed_status`.
+
+    Without memory, every tick begins with the first child. A child that runs again and ends as before emits
+    no events. The semantics are those of ReactiveSequence and ReactiveFallback of BehaviorTree.CPP 4.
+
+    Attributes:
+        passed_status: Status of a child after which the next child is ticked in the same tick.
+    """
+
+    passed_status: ClassVar[Status]
+
+    memory: bool = key(
+        default=True,
+        doc="False to run all children again in every tick, from the first to the running child.",
+    )
+    do: Children
+
+    def __init__(self, context: NodeContext, **values: object) -> None:
+        super().__init__(context, **values)
+        self._gates = [] if self.memory else [self.make_gate(child) for child in self.do]
+
+    def start(self) -> None:
+        """Begin with the first child."""
+        self._child_index = 0
+        for gate in self._gates:
+            gate.forget()
+
+    def step(self) -> Status:
+        """Tick the children in order until one of them decides the status of the tick."""
+        previous_index = index = self._child_index
+        status = self.passed_status
+        for index in range(previous_index if self.memory else 0, len(self.do)):
+            if index > previous_index:
+                self.report_next(index)
+            status = self.tick_child(self.do[index]) if self.memory else self._gates[index].tick()
+            if status is not self.passed_status:
+                break
+        if index < previous_index:
+            self.halt_children([self.do[previous_index]])
+            self.report_next(index)
+        self._child_index = index
+        return self.fail(self.get_failure(self.do[index])) if status is Status.FAILURE else status
+
+    def report_next(self, index: int) -> None:
+        """Report that the child at `index` follows the child before it, if this is a decision of the node."""
+
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible outcomes.
+
+        Without memory, a pass through the children also begins in the states while a child is running.
+        """
+        while True:
+            flow = self.compute_pass(get_flow, state)
+            joined_state = state if self.memory else state.join(flow.halted or state)
+            if joined_state == state:
+                return flow
+            state = joined_state
+
+    def compute_pass(self, get_flow: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible outcomes of one pass through the children."""
+        raise NotImplementedError
+
+    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+        """Yield a warning for each use of `memory: false` without effect or with a wrong effect."""
+        if self.memory:
+            return
+        flows = [analysis.get_flow(child) for child in self.do]
+        slow = [child for child, flow in zip(self.do, flows, strict=True) if flow and flow.halted is not None]
+        if not slow:
+            message = "without memory, this node does the same as with memory: no child takes time"
+            yield NodeFinding("memory", "useless-reactive", message, is_warning=True)
+            return
+        name = analysis.get_name(slow[0])
+        for child in slow[1:]:
+            message = (
+                f"{analysis.get_name(child)} takes time, and so does {name}: without memory, every tick "
+                f"runs {name} again, which halts {analysis.get_name(child)}"
+            )
+            hint = "Only one child may take time: put these nodes into a list, which is one child."
+            yield NodeFinding(child, "two-running", message, hint, is_warning=True)
+        for child in self.do[: self.do.index(slow[0])] if len(slow) == 1 else ():
+            skills = analysis.list_skills(child).items()
+            if actions := [name for name, skill in skills if skill is not None and not skill.is_condition]:
+                message = f"{actions[0]} is no condition, but runs again at every tick of {name}"
+                hint = "Put it before this node, or use a condition."
+                yield NodeFinding(child, "repeated-action", message, hint, is_warning=True)
