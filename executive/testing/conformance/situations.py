@@ -152,12 +152,13 @@ def _generate_value(declared: Param | Port, scene: SkillScene) -> Any:
 def _find_value_of_type(value_type: Any, refers_to: str, scene: SkillScene) -> Any:
     """Return a value of this type from the scene; None if the scene has none."""
     if value_type is str:
-        return _find_name_in_scene(refers_to, scene) if refers_to else "some text"
+        return _find_name_in_scene(refers_to, scene)
     if get_origin(value_type) in (Union, types.UnionType):
-        return _find_value_of_type(get_args(value_type)[0], refers_to, scene)
+        values = (_find_value_of_type(member, refers_to, scene) for member in get_args(value_type))
+        return next((value for value in values if value is not None), None)
     if value_type == list[Target]:
         return list(scene.targets)
-    return {Target: scene.targets[0], Detections: scene.detections}.get(value_type)
+    return {Target: scene.targets[0], Detections: scene.detections, int: 1}.get(value_type)
 
 
 def _find_name_in_scene(refers_to: str, scene: SkillScene) -> str | None:
