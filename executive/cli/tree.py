@@ -88,7 +88,7 @@ def _load_outline(
 
     skills = load_skills()
     loaded_mission = load_mission(mission, skills, overrides)
-    # Building the tree without running it requires only the clock of a cell.
-    placeholder_cell = cast("Cell", SimpleNamespace(clock=SimpleNamespace(now=0.0)))
+    # No node of the tree is executed, so that none needs a clock or a ledger.
+    placeholder_cell = cast("Cell", SimpleNamespace(clock=None, ledger=None))
     tree = build_tree(loaded_mission, skills, placeholder_cell, Blackboard(), discard_event)
     return loaded_mission, skills, make_outline(tree)

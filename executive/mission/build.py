@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from functools import partial
 
-from executive.cell.counters import read_counter
 from executive.cell.protocols import Cell
 from executive.errors import InputError
 from executive.events import Emit
@@ -67,9 +65,8 @@ class TreeBuilder:
     def build_node(self, node: Node) -> TreeNode:
         """Return the behaviour for a node of the mission, with the behaviours of all nodes below it."""
         context = NodeContext(
-            node.path, self.cell.clock, self.blackboard, node.label, self.emit, self._list_open_items,
-            partial(read_counter, self.cell),
-        )  # fmt: skip
+            node.path, self.cell.clock, self.cell.ledger, self.blackboard, node.label, self.emit
+        )
         match node:
             case SkillNode():
                 return self._build_skill_leaf(context, node)
@@ -82,9 +79,6 @@ class TreeBuilder:
                 root.subtree_names = (node.name, *root.subtree_names)
                 return root
         raise AssertionError(f"a checked mission contains no {type(node).__name__}")
-
-    def _list_open_items(self) -> list[str]:
-        return [known.item for known in self.cell.ledger.list_known_items() if known.is_open]
 
     def _build_skill_leaf(self, context: NodeContext, node: SkillNode) -> TreeNode:
         skill = self.skills[node.skill]

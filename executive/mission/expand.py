@@ -62,7 +62,7 @@ def expand(
 ) -> ExpandedMission:
     """Return the mission with expanded subtrees, params, arguments and words for lists.
 
-    `names_by_word` contains the names for which an `ElementWord` stands; without an entry, a word remains.
+    `names_by_word` contains the names that replace each word; a word without an entry remains.
     """
     expander = _Expander(mission, skills, names_by_word)
     tree = None if mission.tree is None else expander.expand_tree(mission.tree, expander.params)

@@ -27,7 +27,6 @@ from executive.mission.parse.validate import find_span
 from executive.mission.text.file_search import find_mission, get_shipped_folder
 from executive.perception.envelope.rated_detectors import find_unmeasured_detectors
 from executive.skill import Skill
-from executive.tree.keys import ElementWord
 from executive.tree.node_registry import load_control_nodes
 
 CellKindFinder = Callable[[str], CellKind]
@@ -141,9 +140,9 @@ def load_mission(
 def _list_names_by_word(mission: Mission, config: CellConfig) -> dict[str, Sequence[str]]:
     """Return the names for which each word for a constant list stands."""
     return {
-        ElementWord.POSES.value: next(iter(config.cameras.values())).scan_poses,
-        ElementWord.BINS.value: list(config.bins),
-        ElementWord.CLASSES.value: [route.label for route in mission.routes],
+        "poses": next(iter(config.cameras.values())).scan_poses,
+        "bins": list(config.bins),
+        "classes": [route.label for route in mission.routes],
     }
 
 

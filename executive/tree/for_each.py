@@ -10,7 +10,7 @@ from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.inspection import MinTimeFunction, PropagatedFailure
-from executive.tree.keys import Child, Elements, ElementWord, VariableName, key
+from executive.tree.keys import Child, Elements, VariableName, key
 from executive.tree.loop import Loop
 
 
@@ -36,12 +36,11 @@ class ForEach(Loop):
     @property
     def detail(self) -> str:
         """The variable of the current element and the list, as a text."""
-        if isinstance(self.in_, ElementWord):
-            return f"${self.each} in {self.in_.value}"
         if isinstance(self.in_, VariableName):
             field = f".{self.in_.field}" if self.in_.field else ""
             return f"${self.each} in ${self.in_}{field}"
-        return f"${self.each} in [{', '.join(map(str, self.in_))}]"
+        elements = self.in_ if self.in_ == "items" else f"[{', '.join(map(str, self.in_))}]"
+        return f"${self.each} in {elements}"
 
     def start(self) -> None:
         """Read the list, and write its first element to the variable `each`.
@@ -82,10 +81,10 @@ class ForEach(Loop):
 
     def _read_list(self) -> tuple[object, ...]:
         variable = self.in_
-        if isinstance(variable, ElementWord):
-            return tuple(self.list_open_items())
         if not isinstance(variable, VariableName):
-            return variable
+            if variable != "items":
+                return variable
+            return tuple(known.item for known in self.ledger.list_known_items() if known.is_open)
         value = self.blackboard.get(variable)
         if variable.field and value is not None:
             value = getattr(value, variable.field)

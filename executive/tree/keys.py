@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 from functools import cache
-from typing import Annotated, Any, ClassVar, TypeAlias, Union, cast, get_args, get_origin, get_type_hints
+from inspect import get_annotations
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, Union, cast, get_args, get_origin
 
 from py_trees.behaviour import Behaviour
 from pydantic import Field, TypeAdapter
@@ -34,25 +35,15 @@ class VariableName(str):
         return variable
 
 
-class ElementWord(Enum):
-    """Word that stands for a list of names."""
-
-    POSES = "poses"
-    """The scan poses of the camera."""
-    BINS = "bins"
-    """The bins of the cell."""
-    CLASSES = "classes"
-    """The classes with a route."""
-    ITEMS = "items"
-    """The items that still have to be sorted at the start of the node; all other words are constant lists."""
-
-
 Children: TypeAlias = tuple[Child, ...]
 """Type of a key with a list of nodes."""
 Reasons: TypeAlias = tuple[Reason, ...]
 """Type of a key with a list of reasons."""
-Elements: TypeAlias = tuple[object, ...] | VariableName | ElementWord
-"""Type of a key with a list of values, the name of a variable that holds a list, or a word for a list."""
+Elements: TypeAlias = tuple[object, ...] | VariableName | Literal["items"]
+"""Type of a key with a list of values, the name of a variable that holds a list, or `items`: the items that
+still have to be sorted."""
+ELEMENT_WORDS = ("poses", "bins", "classes", "items")
+"""Words for lists of names. Lists replace all words except `items` before the tree is built."""
 
 
 class KeyKind(Enum):
@@ -160,7 +151,7 @@ class KeyOwner:
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
         declarations = {name: value for name, value in vars(cls).items() if isinstance(value, Key)}
-        annotations = get_type_hints(cls, include_extras=True) if declarations else {}
+        annotations = get_annotations(cls, eval_str=True) if declarations else {}
         keys = dict(cls.keys)
         for attribute, declaration in declarations.items():
             if attribute not in annotations:

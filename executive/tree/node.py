@@ -7,15 +7,15 @@ and `explain` for the diagnosis.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, cast
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from pydantic import ValidationError
 
-from executive.cell.counters import CounterName
+from executive.cell.ledger import Ledger
 from executive.cell.protocols import Clock
 from executive.errors import Fault, InputError
 from executive.events import BranchChosen, Emit, Event, NodeEnded, NodeStarted, discard_event
@@ -42,20 +42,23 @@ class NodeContext:
     Attributes:
         path: Unique path from the root of the tree.
         clock: Clock of the run.
+        ledger: Ledger of the run.
         blackboard: Variables of the run.
         label: Label of the node in the mission, or "".
         emit: Function that emits the events of the node.
-        list_open_items: Function that returns the names of the items that still have to be sorted.
-        read_counter: Function that returns the value of a counter of the run; by default always 0.
     """
 
     path: str
     clock: Clock
+    ledger: Ledger
     blackboard: Blackboard
     label: str = ""
     emit: Emit = discard_event
-    list_open_items: Callable[[], Sequence[str]] = tuple
-    read_counter: Callable[[CounterName], float] = lambda _: 0.0
+
+
+def make_inspection_context(path: str = "", label: str = "") -> NodeContext:
+    """Return the context of a node that is inspected but never executed, so that it needs no run."""
+    return NodeContext(path, cast("Clock", None), cast("Ledger", None), Blackboard(), label)
 
 
 class TreeNode(Behaviour):
@@ -127,8 +130,7 @@ class ControlNode(KeyOwner, TreeNode):
         is_condition: True if the node is a condition, because its children must be conditions.
         keyword_hints: Hints for authors, by the wrong keyword that an author writes instead of `keyword`.
         clock: Clock of the run.
-        list_open_items: Function that returns the names of the items that still have to be sorted.
-        read_counter: Function that returns the value of a counter of the run.
+        ledger: Ledger of the run.
     """
 
     keyword: ClassVar[str] = ""
@@ -141,8 +143,7 @@ class ControlNode(KeyOwner, TreeNode):
 
     def __init__(self, context: NodeContext, **values: object) -> None:
         super().__init__(context, self.keyword)
-        self.clock, self.list_open_items = context.clock, context.list_open_items
-        self.read_counter = context.read_counter
+        self.clock, self.ledger = context.clock, context.ledger
         self.set_key_values(values)
         self.children = [child for key in self.keys for child in self.list_children(key)]
         for child in self.children:

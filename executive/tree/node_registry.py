@@ -5,13 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from functools import cache
-from typing import TypeAlias, cast
+from typing import TypeAlias
 
-from executive.cell.protocols import Clock
 from executive.errors import InputError
 from executive.plugins import PluginEntry, list_entries
-from executive.tree.blackboard import Blackboard
-from executive.tree.node import ControlNode, NodeContext
+from executive.tree.node import ControlNode, make_inspection_context
 
 ENTRY_POINT_GROUP = "executive.control_nodes"
 """Group of the entry points of control nodes."""
@@ -52,7 +50,7 @@ def _find_problem(keyword: str, node_class: object) -> str:
         if getattr(node_class, method) is getattr(ControlNode, method):
             return f"has no method {method}"
     # A behaviour of py_trees sets attributes in `__init__`, so that only an instance has all reserved names.
-    instance = ControlNode(NodeContext("", cast("Clock", None), Blackboard()))
+    instance = ControlNode(make_inspection_context())
     for key in node_class.keys.values():
         # The key `as` is reserved for the label of a node.
         if key.name == "as" or hasattr(instance, key.attribute):

@@ -7,8 +7,7 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.cell.counters import CounterName
-from executive.skill import Skill, ToolState
+from executive.skill import ANY, EMPTY, HOLDING
 from executive.tree.failure import Reason
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.inspection import (
@@ -35,18 +34,10 @@ class CounterLimits(KeySection):
     def __str__(self) -> str:
         return ", ".join(f"{name}: {limit:g}" for name, limit in self.list_limits())
 
-    def list_limits(self) -> list[tuple[CounterName, float]]:
+    def list_limits(self) -> list[tuple[str, float]]:
         """Return the counters that have a limit, with their limits."""
-        limits: list[tuple[CounterName, float | None]] = [
-            ("placed", self.placed), ("rejected", self.rejected), ("elapsed", self.elapsed),
-        ]  # fmt: skip
+        limits = [(name, getattr(self, name)) for name in self.keys]
         return [(name, limit) for name, limit in limits if limit is not None]
-
-
-def _may_release(skill: type[Skill]) -> bool:
-    """Return True if a skill may release a held object."""
-    state_before, state_after = skill.tool_state
-    return state_before is not ToolState.EMPTY and state_after is ToolState.EMPTY
 
 
 class Repeat(Loop):
@@ -107,9 +98,14 @@ class Repeat(Loop):
         return [end for end in self.until if isinstance(end, Reason)]
 
     @property
-    def _limits(self) -> list[tuple[CounterName, float]]:
+    def _limits(self) -> list[tuple[str, float]]:
         """Counters that have a limit, with their limits."""
         return [limit for end in self.until if isinstance(end, CounterLimits) for limit in end.list_limits()]
+
+    @property
+    def _is_empty(self) -> bool:
+        """True if the body never runs."""
+        return self.times == 0 or any(limit == 0 for _, limit in self._limits)
 
     def _is_complete(self) -> bool:
         """Return True if no further iteration may begin."""
@@ -117,12 +113,15 @@ class Repeat(Loop):
 
     def _find_reached_limit(self) -> str:
         """Return the first limit that a counter has reached, as a text: `placed: 4`; "" without one."""
-        limits = (f"{name}: {limit:g}" for name, limit in self._limits if self.read_counter(name) >= limit)
+        limits = (f"{name}: {limit:g}" for name, limit in self._limits if self._read_counter(name) >= limit)
         return next(limits, "")
+
+    def _read_counter(self, name: str) -> float:
+        return self.clock.now if name == "elapsed" else self.ledger.count_items(name)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes; the next iteration starts in the state after success of the body."""
-        if self.times == 0 or any(limit == 0 for _, limit in self._limits):
+        if self._is_empty:
             return Flow(state, {}, None)
         body, entry = find_fixed_point(
             get_flow, self.do, state, lambda body: None if self.times == 1 else body.success
@@ -141,13 +140,11 @@ class Repeat(Loop):
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield an error if the loop can succeed only by placed items, and its body places none."""
-        names = {name for name, _ in self._limits}
-        if names != {"placed"} or self._expected_reasons or self.times is not None or analysis.is_concurrent:
-            return
-        if any(limit == 0 for _, limit in self._limits):
+        has_only_placed = {name for name, _ in self._limits} == {"placed"} and not self._expected_reasons
+        if not has_only_placed or self._is_empty or self.times or analysis.is_concurrent:
             return
         skills = analysis.list_skills().values()
-        if not any(skill is None or _may_release(skill) for skill in skills):
+        if not any(skill is None or skill.tool_state in ((HOLDING, EMPTY), (ANY, EMPTY)) for skill in skills):
             message = "this loop never succeeds: its body releases no object, so `placed` does not increase"
             yield NodeFinding("", "endless", message, "Add a reason or elapsed to until, or add times.")
 

@@ -121,7 +121,8 @@ def build_ours(nodes: int, last_skill: type[Skill], *observers: Observer) -> Beh
             observer(timed)
 
     def make_site(name: str) -> NodeContext:
-        return NodeContext(f"tree/repeat/do/{next(number)}:{name}", cell.clock, blackboard, emit=emit)
+        path = f"tree/repeat/do/{next(number)}:{name}"
+        return NodeContext(path, cell.clock, cell.ledger, blackboard, emit=emit)
 
     skills = [*[_SucceedAtOnce] * (nodes - 4), last_skill]
     leaves = [SkillLeaf(make_site(skill.__name__), "leaf", skill, Wiring(), cell) for skill in skills]

@@ -49,7 +49,7 @@ trees:
 def built(load: Callable[..., LoadedMission], skills: dict[str, type[Skill]]) -> Any:
     def built(text: str, scope: Blackboard | None = None, emit: Any = discard_event) -> Any:
         clock = SimpleNamespace(now=0.0)
-        cell: Any = SimpleNamespace(clock=clock)
+        cell: Any = SimpleNamespace(clock=clock, ledger=None)
         return build_tree(load(text), skills, cell, Blackboard() if scope is None else scope, emit)
 
     return built
@@ -108,7 +108,7 @@ def test_two_trees_of_one_mission_share_nothing(
 ) -> None:
     loaded = load(HEAD + "tree: Look\n")
     first, second = Blackboard(), Blackboard()
-    cell: Any = SimpleNamespace(clock=None)
+    cell: Any = SimpleNamespace(clock=None, ledger=None)
     one, two = (build_tree(loaded, skills, cell, scope, discard_event) for scope in (first, second))
     one.tick_once()
     one.tick_once()

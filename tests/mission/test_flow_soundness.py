@@ -40,7 +40,7 @@ class World:
         self.dice = random.Random(seed)
         self.ticks = 0
         self.holding = False
-        self.clock = self
+        self.clock, self.ledger = self, None
 
     @property
     def now(self) -> float:

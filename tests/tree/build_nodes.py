@@ -33,7 +33,8 @@ Names = Iterable[tuple[str, str]]
 def make_site(
     path: str = "node", label: str = "", emit: Emit = discard_event, clock: Any = None
 ) -> NodeContext:
-    return NodeContext(path, clock or Clock(), Blackboard(), label, emit)
+    ledger: Any = None
+    return NodeContext(path, clock or Clock(), ledger, Blackboard(), label, emit)
 
 
 def names_of(pairs: Names) -> tuple[Reason, ...]:

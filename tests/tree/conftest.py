@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from hand_set_clock import Clock
@@ -13,6 +14,9 @@ from scripted_leaf import Leaf
 from executive.events import Event
 from executive.tree.blackboard import Blackboard
 from executive.tree.node import NodeContext
+
+LEDGER: Any = None
+"""The nodes of these tests read no items."""
 
 
 @pytest.fixture
@@ -42,7 +46,7 @@ def scope() -> Blackboard:
 
 @pytest.fixture
 def site(events: list[Event], clock: Clock, scope: Blackboard) -> Callable[..., NodeContext]:
-    return lambda path="node", label="": NodeContext(path, clock, scope, label, events.append)
+    return lambda path="node", label="": NodeContext(path, clock, LEDGER, scope, label, events.append)
 
 
 @pytest.fixture

@@ -81,7 +81,7 @@ def trees(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Node]:
 def run_ticks(case: Case, tree: Node, ticks: list[str]) -> dict[str, str]:
     """Return the letters of each node at each tick."""
     clock = Clock()
-    cell: Any = SimpleNamespace(clock=clock)
+    cell: Any = SimpleNamespace(clock=clock, ledger=None)
     for name, skill in SKILLS.items():
         skill.words, skill.letters = case.scripts.get(name, "S").split(), ""
     builder = TreeBuilder(SKILLS, cell, Blackboard(), discard_event, {}, NODE_CLASSES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,9 +20,22 @@ def counts() -> dict[str, float]:
     return {"placed": 0, "rejected": 0, "elapsed": 0.0}
 
 
+class ElapsedClock:
+    """Clock that shows the counter `elapsed`."""
+
+    def __init__(self, counts: dict[str, float]) -> None:
+        self.counts = counts
+
+    @property
+    def now(self) -> float:
+        return self.counts["elapsed"]
+
+
 @pytest.fixture
 def counting_site(site: Callable[..., NodeContext], counts: dict[str, float]) -> NodeContext:
-    return replace(site("here"), read_counter=counts.__getitem__)
+    ledger: Any = SimpleNamespace(count_items=counts.__getitem__)
+    clock: Any = ElapsedClock(counts)
+    return replace(site("here"), ledger=ledger, clock=clock)
 
 
 def choices(events: list[Any]) -> list[str]:

@@ -19,7 +19,6 @@ from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import Wire, find_control_node_outputs, find_literals
 from executive.mission.source import Span
 from executive.skill import Direction, Param
-from executive.tree.keys import ElementWord
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ class ElementLoop:
     def find_list_writers(self, writers: WritersByVariable) -> Sequence[Writer]:
         """Return the writers of the list; the control node itself counts as the writer of a constant list."""
         if isinstance(self.elements, Literal):
-            if self.elements.value == ElementWord.ITEMS.value:
+            if self.elements.value == "items":
                 return [Writer(self.keyword, self.span, list[Item], "item")]
             values = ((self.elements.value, self.elements.span),)
             return [Writer(self.keyword, self.span, list[Any], "", values)]

@@ -18,11 +18,8 @@ from executive.skill import Skill
 from executive.tree.failure import Reason
 from executive.tree.flow import Flow
 from executive.tree.inspection import NodeFinding
-from executive.tree.keys import Child, ElementWord, Key, KeyKind
+from executive.tree.keys import ELEMENT_WORDS, Child, Key, KeyKind
 from executive.tree.node import ControlNode
-
-ELEMENT_WORDS = tuple(word.value for word in ElementWord)
-"""Words that stand for a list of names."""
 
 
 def check_constants(context: CheckContext) -> Iterator[Finding]:

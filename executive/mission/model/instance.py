@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Mapping
-from typing import cast, get_args
+from typing import get_args
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.cell.protocols import Clock
 from executive.mission.model.conversion import WrongType, convert_constant
 from executive.mission.model.nodes import InnerNode, KeyValue, Node, NodeOrSection, NodeSection, list_nodes
 from executive.mission.model.values import FailureName, Literal, LocatedName, Reference
-from executive.tree.blackboard import Blackboard
-from executive.tree.keys import Child, ElementWord, Key, KeyKind, VariableName
-from executive.tree.node import ControlNode, NodeContext
+from executive.tree.keys import Child, Key, KeyKind, VariableName
+from executive.tree.node import ControlNode, NodeContext, make_inspection_context
 
 BuildChild = Callable[[Node], Child]
 """Function that returns the child of a control node for a mission node."""
@@ -45,8 +43,7 @@ def make_inspection_instance(node: InnerNode) -> ControlNode:
 
     Valid constants replace invalid constants of the mission, which `check_constants` reports.
     """
-    context = NodeContext(node.path, cast("Clock", None), Blackboard(), node.label)
-    return make_instance(node, context, ChildPlaceholder)
+    return make_instance(node, make_inspection_context(node.path, node.label), ChildPlaceholder)
 
 
 def make_instance(node: InnerNode, context: NodeContext, build_child: BuildChild) -> ControlNode:
@@ -95,7 +92,7 @@ def _make_value(owner: NodeOrSection, key: Key, value: KeyValue | None, build_ch
             return VariableName(value.name, value.field)
         elements = value.value if isinstance(value, Literal) else None
         # `check_constants` reports other values.
-        return tuple(elements) if isinstance(elements, list) else ElementWord.ITEMS
+        return tuple(elements) if isinstance(elements, list) else "items"
     if key.kind is not KeyKind.CONSTANT:
         return ()
     try:

@@ -9,9 +9,8 @@ from py_trees.behaviour import Behaviour
 
 from executive.mission.outline import Connection, OutlineNode, list_child_indices, make_outline
 from executive.skill import In, Metres, Out, Skill, param, port
-from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Reason
-from executive.tree.node import NodeContext
+from executive.tree.node import NodeContext, make_inspection_context
 from executive.tree.retry import Retry
 from executive.tree.sequence import Sequence
 from executive.tree.skill_leaf import SkillLeaf, Wiring
@@ -36,7 +35,7 @@ class Pick(Skill):
 
 
 def make_site(path: str, label: str = "") -> NodeContext:
-    return NodeContext(path, CELL, Blackboard(), label)
+    return make_inspection_context(path, label)
 
 
 def pick(path: str, label: str = "", wiring: Wiring | None = None) -> SkillLeaf:
