@@ -116,6 +116,9 @@ CASES = [(name, after, 1) for name in MISSIONS for after in (1, 333, 700, 1100)]
     *(("sort_overhead", *cut) for cut in WITHIN_A_STEP),
     *(("sort_and_verify", after, 1) for after in (900, 1500, 2100)),
     ("sort_two_halves", 900, 1),
+    # During a transit with a guard, during a weighing, and during the transit of a weighed object.
+    ("sort_guarded", 638, 1),
+    *(("weigh_and_sort", after, 1) for after in (724, 874)),
 ]
 QUICK = ("sort_overhead", 700, 1)
 
