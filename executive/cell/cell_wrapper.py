@@ -1,8 +1,8 @@
-"""Wrapper of a work cell that calls a function after each control step."""
+"""Wrapper of a work cell: base class of work cells that change some methods of another work cell."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,11 +17,9 @@ class CellWrapper:
 
     Attributes:
         inner: The wrapped work cell.
-        after_step: Function that is called after every control step.
     """
 
     inner: Workcell
-    after_step: Callable[[], None] = lambda: None
 
     @property
     def cell(self) -> Cell:
@@ -48,9 +46,8 @@ class CellWrapper:
         self.inner.log_to(path)
 
     def advance(self) -> None:
-        """Execute one control step, then call `after_step`."""
+        """Execute one control step."""
         self.inner.advance()
-        self.after_step()
 
     def visuals(self) -> Visuals | None:
         """Return the shapes and poses of the bodies for displays, or None if the cell has no visuals."""

@@ -92,7 +92,7 @@ def command(
         from executive.cli.cells import find_cell, load_cells
         from executive.cli.progress import report_polygons, show_progress
         from executive.training.evaluation.worst_mistakes import WorstMistakes
-        from executive.view.results.detector_results import print_metrics
+        from executive.view.detector_results import print_metrics
 
         worst_mistakes = WorstMistakes()
         scene_settings = evaluation.SceneSettings(images, seed, varied, view, workers, scene)

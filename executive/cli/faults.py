@@ -50,11 +50,11 @@ def command(
     has_conflict = sum((pairs is not None, fault_numbers is not None, list_only)) > 1
     options.check_usage((has_conflict, "--pairs, --fault and --list exclude each other; give one of them"))
     with keep_stdout_clean():
+        from executive.campaign.faults import results as fault_results
         from executive.campaign.faults.campaign import Campaign
         from executive.campaign.faults.trial import record_trial
         from executive.campaign.mission_under_test import load_mission_under_test
         from executive.cli.progress import print_halt, show_progress
-        from executive.view.results import fault_results
 
         mission_under_test = load_mission_under_test(mission, overrides, oracle, seed)
         with show_progress("faults", quiet=as_json or list_only or fault_numbers is not None) as progress:

@@ -29,7 +29,7 @@ from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_mission import run_mission
 from executive.testing.substitutes import make_substitute
 from skills.is_holding import IsHolding
-from tests.benchmarks.halts import COMMANDS_BEFORE_STOP, measure_braking
+from tests.benchmarks.halts import COMMANDS_BEFORE_STOP, WatchedCell, measure_braking
 from tests.benchmarks.report import Figures, run_command
 
 MAX_REST_TIME = 0.42
@@ -115,7 +115,7 @@ class _Watch:
     def wrap(self, workcell: Any) -> CellWrapper:
         """Return the cell, with a record of each command of its arm."""
         self._cell = workcell
-        return CellWrapper(workcell, self._keep_command)
+        return WatchedCell(workcell, before=lambda: None, after=self._keep_command)
 
     def observe(self, timed: TimedEvent) -> None:
         """Note the motion and the step at which the guard breaks."""

@@ -146,16 +146,17 @@ def measure_distance(q: Array, trajectory: Trajectory) -> float:
     return float(np.abs(trajectory.state_at((low + high) / 2).q - q).max())
 
 
-class _WatchedCell(CellWrapper):
-    """A work cell with a call before every control step, too."""
+class WatchedCell(CellWrapper):
+    """A work cell with a call before and after every control step."""
 
     def __init__(self, inner: Workcell, before: Callable[[], None], after: Callable[[], None]) -> None:
-        super().__init__(inner, after)
-        self._before = before
+        super().__init__(inner)
+        self._before, self._after = before, after
 
     def advance(self) -> None:
         self._before()
         super().advance()
+        self._after()
 
 
 class _RunWithHalts:
@@ -177,7 +178,7 @@ class _RunWithHalts:
         kind = subject.make_cell or load_cell_kind(config.kind)
 
         def make_cell(*args: Any, **options: Any) -> CellWrapper:
-            return _WatchedCell(
+            return WatchedCell(
                 kind(*args, **options), before=self._fork_and_halt_if_due, after=self._keep_command
             )
 

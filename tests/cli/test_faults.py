@@ -9,14 +9,16 @@ from types import SimpleNamespace
 import pytest
 from click.testing import CliRunner, Result
 
+from executive.campaign.faults.planned_fault import PlannedFault, SkillFault
+from executive.campaign.faults.results import Branch, FaultCampaignResults, Trial
 from executive.cli.main import main
-from executive.view.results.fault_results import Branch, FaultCampaignResults, Trial
 
 FAKE = ("sort_overhead", "--set", "cell.kind=fake")
-TRIAL = Trial(
-    (1,), ("tree/Grasp missed, first: the suction cup cannot seal",), "Grasp", "sort.yaml:7", "missed",
-    "first", have_occurred=True, status="SUCCESS",
+FAULT = PlannedFault(
+    "tree/Grasp", "Grasp", "sort.yaml:7", "missed", "first", "the suction cup cannot seal",
+    SkillFault("tree/Grasp", "fails", "missed"),
 )  # fmt: skip
+TRIAL = Trial("SUCCESS", "", "", "", True, "", 10, 1.0, faults={1: FAULT}, have_occurred=True)
 
 
 def invoke(*words: str) -> Result:

@@ -6,19 +6,18 @@ import math
 import random
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from functools import partial
 
 from executive.campaign.faults.fault_list import list_faults
 from executive.campaign.faults.nominal_run import execute_nominal_run
 from executive.campaign.faults.planned_fault import PlannedFault
-from executive.campaign.faults.trial import FaultsByNumber, make_empty_trial, run_trial
+from executive.campaign.faults.results import Branch, FaultCampaignResults, Trial
+from executive.campaign.faults.trial import FaultsByNumber, run_trial
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.campaign.pool import run_jobs
 from executive.errors import InputError
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SubtreeNode
-from executive.view.results.fault_results import Branch, FaultCampaignResults, Trial
 
 MAX_FAULTS_PER_RUN = 4
 """Maximum number of faults in a run: the fault under test, and the faults that activate its node."""
@@ -159,7 +158,7 @@ class Campaign:
 def _make_aborted_trial(faults: FaultsByNumber, error: BaseException) -> Trial:
     """Return the trial of a run that raised an exception or whose process died."""
     problem = f"the run was aborted: {type(error).__name__}: {error}"
-    return replace(make_empty_trial(faults), status="FAULT", problems=(problem,))
+    return Trial("FAULT", "", "", "", False, "", 0, 0.0, faults=faults, problems=(problem,))
 
 
 def find_branches(tree: Node, trials: Sequence[Trial]) -> tuple[Branch, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
@@ -10,8 +9,9 @@ from dataclasses import dataclass
 from executive.campaign.faults.trial_checks import format_counts
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.errors import InputError
-from executive.events import NodeEnded, NodeStarted, TimedEvent
 from executive.record.audit_comparison import is_confirmed_by_audit
+from executive.record.timeline.activation import group_by_node
+from executive.record.timeline.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 
 MIN_TIMEOUT = 60.0
@@ -40,30 +40,6 @@ class NominalRun:
         return MIN_TIMEOUT + TIMEOUT_FACTOR * self.duration
 
 
-class ActivationRecorder:
-    """Observer that records the activations of nodes.
-
-    Attributes:
-        start_counts: Number of activations, by path of the node.
-        start_ticks: Tick of the start of each running node, by path.
-        step_counts: Number of control steps of each ended activation, by path.
-    """
-
-    def __init__(self) -> None:
-        self.start_counts: Counter[str] = Counter()
-        self.start_ticks: dict[str, int] = {}
-        self.step_counts: dict[str, list[int]] = defaultdict(list)
-
-    def __call__(self, timed: TimedEvent) -> None:
-        """Record the start or the end of a node."""
-        match timed.event:
-            case NodeStarted(node):
-                self.start_counts[node] += 1
-                self.start_ticks[node] = timed.tick
-            case NodeEnded(node) if node in self.start_ticks:
-                self.step_counts[node].append(timed.tick - self.start_ticks.pop(node))
-
-
 def execute_nominal_run(mission: MissionUnderTest) -> NominalRun:
     """Execute a mission without faults and return the results.
 
@@ -71,9 +47,9 @@ def execute_nominal_run(mission: MissionUnderTest) -> NominalRun:
         InputError: The mission does not succeed, or ledger and ground truth disagree.
         KeyboardInterrupt: The user halted the run.
     """
-    activations = ActivationRecorder()
+    timeline = Timeline()
     options = RunOptions(mission.seed, mission.requests, make_cell=mission.make_cell)
-    run = assemble(mission.loaded, mission.skills, options, [activations])
+    run = assemble(mission.loaded, mission.skills, options, [timeline])
     with closing(run):
         end = run.execute()
         if end.status == "HALTED":
@@ -90,5 +66,8 @@ def execute_nominal_run(mission: MissionUnderTest) -> NominalRun:
             f"{description} ends with a wrong ledger: the ledger says {format_counts(items)}; the audit "
             f"{format_counts(audit)}; choose another seed, or a mission that observes the whole table"
         )
-    steps_by_path = {path: tuple(counts) for path, counts in activations.step_counts.items()}
+    steps_by_path = {
+        path: tuple(each.end_tick - each.start_tick for each in activations)
+        for path, activations in group_by_node(timeline.activations).items()
+    }
     return NominalRun(end.robot_time, items["placed"], steps_by_path)

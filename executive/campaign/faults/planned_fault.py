@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from executive.cell.protocols import Cell, Steps
-from executive.events import NodeEnded
 from executive.manipulation.drop_detection import detect_and_record_drop
+from executive.record.timeline.activation import Activation
 from executive.skill import EMPTY, Skill
 from executive.testing.faults.script import ScheduledFault
 from executive.testing.substitutes import make_raising, make_raising_when_halted, make_substitute
@@ -77,13 +77,13 @@ class PlannedFault:
         """True if the fault simulates a bug, after which the run must end with the status FAULT."""
         return isinstance(self.injected, SkillFault) and self.injected.kind != "fails"
 
-    def is_cause_of(self, end: NodeEnded) -> bool:
-        """Return True if a node ended with the injected error, or with the reason of the fault."""
+    def is_cause_of(self, activation: Activation) -> bool:
+        """Return True if an activation ended with the injected error, or with the reason of the fault."""
         if self.is_bug:
-            return end.status == "INVALID" and InjectedError.__name__ in end.message
-        is_failure = (end.status, end.reason) == ("FAILURE", self.kind)
+            return activation.status == "INVALID" and InjectedError.__name__ in activation.message
+        is_failure = (activation.status, activation.reason) == ("FAILURE", self.kind)
         is_cell_fault = isinstance(self.injected, ScheduledFault)
-        return is_failure and (is_cell_fault or end.message == INJECTED_MESSAGE)
+        return is_failure and (is_cell_fault or activation.message == INJECTED_MESSAGE)
 
     def __str__(self) -> str:
         """Return a description of the fault."""

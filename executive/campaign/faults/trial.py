@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from executive.campaign.end_checks import check_arm_at_rest, check_held_item, check_journal
 from executive.campaign.faults import trial_checks
 from executive.campaign.faults.fault_list import list_skill_nodes
-from executive.campaign.faults.nominal_run import ActivationRecorder, NominalRun
+from executive.campaign.faults.nominal_run import NominalRun
 from executive.campaign.faults.planned_fault import PlannedFault, SkillFault, make_substitutes
+from executive.campaign.faults.results import Trial
 from executive.campaign.mission_under_test import MissionUnderTest
-from executive.cell.cell_wrapper import CellWrapper
-from executive.cell.workcell import Workcell
-from executive.events import InputRead, NodeEnded, RunEnded, TimedEvent
+from executive.events import InputRead, RunEnded, TimedEvent
 from executive.plugins import load_cell_kind
 from executive.record.recorded_run import RecordedRun, make_run_directory
 from executive.record.recorder import Recorder
+from executive.record.timeline.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.faults import FaultyCell, ScheduledFault, with_faults
 from executive.view.report.page import try_write_report
-from executive.view.results.fault_results import Trial
 
 FaultsByNumber = Mapping[int, PlannedFault]
 """Faults of a run by number; the last fault is under test, and the earlier faults activate its node."""
@@ -54,49 +53,40 @@ def record_trial(
         recorded_run = RecordedRun(run, loaded, mission.skills, directory, Recorder(directory))
         result = recorded_run.execute(mission.seed, start_time)
         try_write_report(result.run)
-        return trial_run.make_trial(trial_run.run_end), directory.path
-
-
-def make_empty_trial(faults: FaultsByNumber) -> Trial:
-    """Return a trial with these faults and without results."""
-    fault = list(faults.values())[-1]
-    descriptions = tuple(map(str, faults.values()))
-    return Trial(tuple(faults), descriptions, fault.name, fault.mission_line, fault.kind, fault.occasion)
+        assert trial_run.timeline.ended is not None, "every run emits its end"
+        return trial_run.make_trial(trial_run.timeline.ended), directory.path
 
 
 class _TrialRun:
-    """A run with injected faults, its events, and the checks of its end."""
+    """A run with injected faults, its events and their timeline, and the checks of its end."""
 
     def __init__(self, mission: MissionUnderTest, nominal_run: NominalRun, faults: FaultsByNumber) -> None:
         self._mission, self._nominal_run, self._faults = mission, nominal_run, faults
         self._events: list[TimedEvent] = []
         injected_faults = [fault.injected for fault in faults.values()]
         self._skill_faults = [fault for fault in injected_faults if isinstance(fault, SkillFault)]
-        self._recorder = ActivationRecorder()
+        self.timeline = Timeline()
         self._is_stopped = False
         cell_faults = [fault for fault in injected_faults if isinstance(fault, ScheduledFault)]
         skills_by_path = {node.path: mission.skills[node.skill] for node in list_skill_nodes(mission)}
+        make_cell = mission.make_cell or load_cell_kind(mission.loaded.cell_config.kind)
         self.options = RunOptions(
             mission.seed,
             mission.requests,
-            make_cell=with_faults(self._make_cell, cell_faults, timeout=nominal_run.timeout),
+            make_cell=with_faults(make_cell, cell_faults, timeout=nominal_run.timeout),
             substitutes=make_substitutes(self._skill_faults, skills_by_path),
         )
-        self.run = assemble(mission.loaded, mission.skills, self.options, [self._store_event, self._recorder])
+        self.run = assemble(mission.loaded, mission.skills, self.options, [self._store_event, self.timeline])
         assert isinstance(self.run.workcell, FaultyCell)
         self._workcell = self.run.workcell
         self.run.add_observer(self._workcell.on_event)
-
-    @property
-    def run_end(self) -> RunEnded:
-        """Recorded `RunEnded` event of the run."""
-        return next(timed.event for timed in reversed(self._events) if isinstance(timed.event, RunEnded))
+        self.run.control.call_between_ticks(self._stop_run_for_halt_error)
 
     def make_trial(self, run_end: RunEnded) -> Trial:
         """Check the ended run and return the trial."""
         run = self.run
         items, audit = run.count_items(), run.count_ground_truth()
-        removed_count = trial_checks.count_injected_faults(self._events, "object_removed")
+        removed_count = trial_checks.count_injected_faults(self.timeline, "object_removed")
         faults, objects = tuple(self._faults.values()), self._workcell.world.objects
         bins = self._workcell.cell.bins.values()
         unobserved = trial_checks.count_unobserved_objects(objects, bins, self._events)
@@ -106,32 +96,24 @@ class _TrialRun:
             *trial_checks.check_tree(run.root),
             *check_journal(self._events, run_end),
             *trial_checks.check_ledger(run_end, items, audit, removed_count, unobserved),
-            *trial_checks.check_detection(run_end, audit, self._events),
-            *trial_checks.check_losses(audit, self._events),
+            *trial_checks.check_detection(run_end, audit, self.timeline),
+            *trial_checks.check_losses(audit, self.timeline),
             *check_held_item(run_end, self._workcell),
             *check_arm_at_rest(self._workcell),
         ]
-        return replace(
-            make_empty_trial(self._faults),
+        return Trial(
+            **asdict(run_end),
+            faults=self._faults,
             have_occurred=all(map(self._has_occurred, faults)),
             had_effect=self._has_effect(faults[-1]),
             is_halted_by_user=run_end.status == "HALTED" and not self._is_stopped,
-            status=run_end.status,
-            reason=run_end.reason,
-            message=run_end.message,
-            node=run_end.node,
             missing_count=self._nominal_run.placed_count - items["placed"],
             items=items,
             audit=audit,
-            robot_time=run_end.robot_time,
-            entered_paths=frozenset(self._recorder.start_counts),
+            entered_paths=frozenset(self.timeline.activation_by_path),
             problems=tuple(problems),
             remark=trial_checks.describe_unexpected_reason(run_end, faults),
         )
-
-    def _make_cell(self, *args: Any, **options: Any) -> Workcell:
-        make_inner_cell = self._mission.make_cell or load_cell_kind(self._mission.loaded.cell_config.kind)
-        return CellWrapper(make_inner_cell(*args, **options), after_step=self._stop_run_for_halt_error)
 
     def _store_event(self, timed: TimedEvent) -> None:
         if not isinstance(timed.event, InputRead):
@@ -140,11 +122,12 @@ class _TrialRun:
     def _stop_run_for_halt_error(self) -> None:
         """Halt the run while a skill runs whose injected bug raises an error during a halt."""
         for skill_fault in self._skill_faults:
-            start_tick = self._recorder.start_ticks.get(skill_fault.node)
-            if skill_fault.kind != "raises when halted" or start_tick is None:
+            activation = self.timeline.activation_by_path.get(skill_fault.node)
+            if skill_fault.kind != "raises when halted" or activation is None:
                 continue
-            is_affected = self._recorder.start_counts[skill_fault.node] in skill_fault.activations
-            if is_affected and self.run.tick >= start_tick + skill_fault.delay_steps:
+            number = self.timeline.end_counts.get(skill_fault.node, Counter()).total() + 1
+            is_affected = activation.status == "RUNNING" and number in skill_fault.activations
+            if is_affected and self.run.tick > activation.start_tick + skill_fault.delay_steps:
                 self._is_stopped = True
                 self.run.control.stop()
 
@@ -152,11 +135,11 @@ class _TrialRun:
         """Return True if a fault was injected into the cell or into a skill."""
         if isinstance(fault.injected, SkillFault):
             return self._has_effect(fault)
-        return trial_checks.count_injected_faults(self._events, fault.injected.effect.name) > 0
+        return trial_checks.count_injected_faults(self.timeline, fault.injected.effect.name) > 0
 
     def _has_effect(self, fault: PlannedFault) -> bool:
         """Return True if the node of the fault ended as planned, by this fault or by another fault."""
         if not (fault.is_bug or fault.is_failure_reason):
             return True
-        ends = [timed.event for timed in self._events if isinstance(timed.event, NodeEnded)]
-        return any(end.node == fault.location and fault.is_cause_of(end) for end in ends)
+        activations = self.timeline.activations
+        return any(each.node == fault.location and fault.is_cause_of(each) for each in activations)

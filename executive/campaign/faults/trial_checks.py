@@ -12,11 +12,12 @@ from py_trees.common import Status
 from executive.campaign.faults.planned_fault import InjectedError, PlannedFault
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.frame import Frame, FrameCaptured
-from executive.events import FaultInjected, FrameSearched, ItemChanged, RunEnded, TimedEvent
+from executive.events import FrameSearched, ItemChanged, RunEnded, TimedEvent
 from executive.geometry import Array
 from executive.ledger.item import State
 from executive.ledger.outcomes import is_balanced
 from executive.mission.flow_analysis import UnhandledFailure
+from executive.record.timeline.timeline import Timeline
 from executive.testing.faults.world_access import TrueObject
 
 DISPLACING_EFFECTS = frozenset({"object_removed", "object_moved", "seal_breaks"})
@@ -137,20 +138,17 @@ def check_ledger(
         yield f"{ledger_text}; the audit {format_counts(audit)}"
 
 
-def check_detection(
-    run_end: RunEnded, audit: Mapping[str, int] | None, events: Sequence[TimedEvent]
-) -> Iterator[str]:
+def check_detection(run_end: RunEnded, audit: Mapping[str, int] | None, timeline: Timeline) -> Iterator[str]:
     """Yield a problem if detectors were used and the run succeeded, but some objects were never detected."""
-    has_searched = any(isinstance(timed.event, FrameSearched) for timed in events)
     has_tree_succeeded = run_end.status in ("SUCCESS", "INCOMPLETE")
-    if has_searched and has_tree_succeeded and audit is not None and audit["unseen"]:
+    if timeline.items.look is not None and has_tree_succeeded and audit is not None and audit["unseen"]:
         counts = format_counts(audit)
         yield f"the run succeeded, but {audit['unseen']} objects were never seen; the audit {counts}"
 
 
-def check_losses(audit: Mapping[str, int] | None, events: Sequence[TimedEvent]) -> Iterator[str]:
+def check_losses(audit: Mapping[str, int] | None, timeline: Timeline) -> Iterator[str]:
     """Yield a problem if more objects are out of reach than the faults have displaced."""
-    displaced_count = sum(count_injected_faults(events, name) for name in DISPLACING_EFFECTS)
+    displaced_count = sum(count_injected_faults(timeline, name) for name in DISPLACING_EFFECTS)
     if audit is not None and audit["elsewhere"] > displaced_count:
         yield f"{audit['elsewhere']} objects are out of reach, but the faults displaced {displaced_count}"
 
@@ -163,9 +161,9 @@ def _is_visible(position: Array, frame: Frame) -> bool:
     return bool((is_inside & frame.compute_unoccluded_mask(positions))[0])
 
 
-def count_injected_faults(events: Sequence[TimedEvent], name: str) -> int:
+def count_injected_faults(timeline: Timeline, name: str) -> int:
     """Return the number of injected faults with this name."""
-    return sum(isinstance(timed.event, FaultInjected) and timed.event.name == name for timed in events)
+    return sum(fault == name for _, fault in timeline.faults)
 
 
 def describe_unexpected_reason(run_end: RunEnded, faults: Sequence[PlannedFault]) -> str:

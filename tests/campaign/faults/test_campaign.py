@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 
 from executive.campaign.faults.campaign import Campaign, find_branches
+from executive.campaign.faults.results import FaultCampaignResults, Trial
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
-from executive.view.results.fault_results import FaultCampaignResults, Trial
 
 MISSION = """\
 mission: small
@@ -88,8 +88,8 @@ def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: F
         ("catch on Approach.blocked", "17"),
     ]  # fmt: skip
     assert figures.unentered_branches == ()
-    behind = next(trial for trial in figures.trials if trial.affected_part == "RejectTarget")
-    assert (len(behind.fault_numbers), behind.descriptions[0].rpartition("/")[2]) == (
+    behind = next(trial for trial in figures.trials if trial.tested_fault.name == "RejectTarget")
+    assert (len(behind.fault_numbers), str(next(iter(behind.faults.values()))).rpartition("/")[2]) == (
         2, "Grasp missed, first: the suction cup cannot seal",
     )  # fmt: skip
 
@@ -97,8 +97,10 @@ def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: F
 def test_a_recovery_without_a_run_is_listed_with_its_position(
     figures: FaultCampaignResults, small: MissionUnderTest
 ) -> None:
-    without = [trial for trial in figures.trials if "Grasp missed" not in " ".join(trial.descriptions)]
-    without = [trial for trial in without if not trial.fault_kind.startswith("no seal")]
+    without = [
+        trial for trial in figures.trials if "Grasp missed" not in " ".join(map(str, trial.faults.values()))
+    ]
+    without = [trial for trial in without if not trial.tested_fault.kind.startswith("no seal")]
     assert [
         branch.name for branch in find_branches(small.loaded.tree, without) if not branch.trial_count
     ] == ["catch on Grasp.missed"]

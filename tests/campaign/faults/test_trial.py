@@ -9,13 +9,13 @@ import pytest
 
 from executive.campaign.faults.campaign import Campaign
 from executive.campaign.faults.planned_fault import SkillFault, make_substitutes
+from executive.campaign.faults.results import Trial
 from executive.campaign.faults.trial import record_trial, run_trial
 from executive.cells.fake.cell import FakeCell
 from executive.events import FaultInjected, ItemChanged, NodeEnded, RunEnded
 from executive.plugins import load_skills
 from executive.record.journal import read_journal
 from executive.testing.run_mission import run_mission
-from executive.view.results.fault_results import Trial
 
 
 def number_of(campaign: Campaign, name: str, what: str, when: str = "first", *, behind: bool = False) -> int:

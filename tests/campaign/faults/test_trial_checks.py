@@ -22,6 +22,7 @@ from executive.cell.frame import FrameCaptured
 from executive.cells.fake.cell import FakeCell
 from executive.events import FaultInjected, FrameSearched, RunEnded, TimedEvent
 from executive.mission.flow_analysis import UnhandledFailure
+from executive.record.timeline.timeline import Timeline
 from executive.testing.faults import during, seal_fails
 from executive.testing.faults.world_access import TrueObject
 
@@ -108,7 +109,8 @@ def test_what_nobody_saw_is_no_disagreement_unless_the_run_says_success(
 ) -> None:
     unseen = {**AUDIT, "left": 2, "unseen": 1}
     assert books(outcome(status, reason), ITEMS, unseen) == []
-    assert list(check_detection(outcome(status, reason), unseen, [at(1, frame_searched())] * looked)) == said
+    timeline = Timeline.from_events([at(1, frame_searched())] * looked)
+    assert list(check_detection(outcome(status, reason), unseen, timeline)) == said
 
 
 def test_what_fell_just_before_a_run_ended_early_may_lie_anywhere() -> None:
@@ -129,10 +131,10 @@ def test_what_was_taken_where_nobody_had_to_look_is_no_disagreement() -> None:
 
 def test_only_what_the_fault_reached_for_may_be_out_of_reach() -> None:
     gone = {**AUDIT, "elsewhere": 1}
-    taken = at(1, FaultInjected("object_removed", "", "", "", []))
-    slow = at(1, FaultInjected("detector_slow", "", "", "", []))
-    assert list(check_losses(gone, [taken])) == list(check_losses(None, [])) == []
-    assert list(check_losses(gone, [slow])) == ["1 objects are out of reach, but the faults displaced 0"]
+    taken = Timeline.from_events([at(1, FaultInjected("object_removed", "", "", "", []))])
+    slow = Timeline.from_events([at(1, FaultInjected("detector_slow", "", "", "", []))])
+    assert list(check_losses(gone, taken)) == list(check_losses(None, Timeline())) == []
+    assert list(check_losses(gone, slow)) == ["1 objects are out of reach, but the faults displaced 0"]
 
 
 def test_a_failure_for_another_reason_is_remarked() -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from executive.view.results.fault_results import (
+from executive.campaign.faults.planned_fault import PlannedFault, SkillFault
+from executive.campaign.faults.results import (
     Branch,
     FaultCampaignResults,
     Trial,
@@ -13,25 +14,27 @@ from executive.view.results.fault_results import (
     results_to_json,
 )
 
-MISSED = Trial(
-    (1,), ("tree/Grasp missed, first: nothing seals",), "Grasp", "sort.yaml:7", "missed", "first",
-    have_occurred=True, status="SUCCESS",
+MISS = PlannedFault(
+    "tree/Grasp", "Grasp", "sort.yaml:7", "missed", "first", "nothing seals",
+    SkillFault("tree/Grasp", "fails", "missed"),
 )  # fmt: skip
-LASTING = replace(MISSED, fault_numbers=(2,), occasion="lasting", missing_count=3)
-AGAIN = replace(MISSED, fault_numbers=(3,), missing_count=0)
+STICK = replace(MISS, location="tree/Release", name="Release", mission_line="sort.yaml:9", kind="stuck")
+BUG = replace(MISS, location="tree/Wait", name="Wait", mission_line="sort.yaml:9", kind="raises")
+TAKEN = replace(
+    MISS, location="object", name="object", mission_line="", kind="taken", occasion="late",
+    cause="from 8.00 s on",
+)  # fmt: skip
+MISSED = Trial("SUCCESS", "", "", "", True, "", 10, 1.0, faults={1: MISS}, have_occurred=True)
+LASTING = replace(MISSED, faults={2: replace(MISS, occasion="lasting")}, missing_count=3)
+AGAIN = replace(MISSED, faults={3: MISS}, missing_count=0)
 STUCK = replace(
-    MISSED, fault_numbers=(4,), affected_part="Release", mission_line="sort.yaml:9", fault_kind="stuck",
-    status="FAILURE", reason="Release.stuck", message="it hangs", node="tree/Release",
+    MISSED, faults={4: STICK}, status="FAILURE", reason="Release.stuck", message="it hangs",
+    node="tree/Release",
 )  # fmt: skip
-NOWHERE = replace(
-    MISSED, fault_numbers=(1, 5), affected_part="Wait", mission_line="sort.yaml:9", fault_kind="raises",
-    have_occurred=False,
-)  # fmt: skip
+NOWHERE = replace(MISSED, faults={1: MISS, 5: BUG}, have_occurred=False)
 WRONG = replace(
-    STUCK, fault_numbers=(6,), problems=("the arm is not at rest",), remark="it says Release.stuck",
-    affected_part="object", mission_line="", fault_kind="taken", occasion="late",
-    descriptions=("object taken, late: from 8.00 s on",),
-)  # fmt: skip
+    STUCK, faults={6: TAKEN}, problems=("the arm is not at rest",), remark="it says Release.stuck"
+)
 BRANCHES = (
     Branch("sort.yaml:12", "catch on Grasp.missed", ("tree/try/catch/1",), 2),
     Branch("sort.yaml:14", "recover", ("tree/retry/recover",)),
@@ -82,8 +85,14 @@ def test_problems_and_recoveries_never_entered_are_printed_with_their_positions(
 
 
 def test_pairs_have_no_matrix_a_campaign_cut_short_says_so_and_one_run_is_a_few_lines() -> None:
-    lines = ["fault 1+5: tree/Grasp missed, first: nothing seals", "  the fault did not occur", "  SUCCESS"]
-    assert format_trial(NOWHERE).splitlines() == lines
+    assert format_trial(NOWHERE).splitlines() == [
+        "fault 1+5: tree/Grasp missed, first: nothing seals; and tree/Wait raises, first: nothing seals",
+        "  one of the faults did not occur",
+        "  SUCCESS",
+    ]
+    alone = replace(NOWHERE, faults={1: MISS})
+    lines = ["fault 1: tree/Grasp missed, first: nothing seals", "  the fault did not occur", "  SUCCESS"]
+    assert format_trial(alone).splitlines() == lines
     text = format_results(replace(FIGURES, has_pairs=True, is_complete=False, trials=(NOWHERE,)))
     assert text.splitlines()[:3] == [
         "sort (fake), seed 3: 1 runs with pairs of faults; a run without faults takes 11.5 s",

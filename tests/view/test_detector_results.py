@@ -8,7 +8,7 @@ import pytest
 
 from executive.training.evaluation.measured_rates import CountedRate, MeasuredErrorRates
 from executive.training.evaluation.metrics import ClassMetrics, Distribution, Evaluation
-from executive.view.results.detector_results import print_metrics
+from executive.view.detector_results import print_metrics
 
 MEASURED = Evaluation(
     threshold=0.5, images=300, objects=900, precision=0.991, recall=0.98, map50=0.995, map50_95=0.8,

@@ -1,4 +1,4 @@
-"""Results of fault campaigns, as objects, as JSON values and as text."""
+"""Results of a fault campaign, as objects, as JSON values and as text."""
 
 from __future__ import annotations
 
@@ -6,59 +6,53 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import itemgetter
+from typing import get_args
 
-OCCASIONS = ("first", "middle", "late", "lasting")
-"""Values of `Trial.occasion`; each value has a column in the table of verdicts."""
+from executive.campaign.faults.planned_fault import Occasion, PlannedFault
+from executive.events import RunEnded
+
+OCCASIONS: tuple[Occasion, ...] = get_args(Occasion)
+"""Occasions of faults; each occasion has a column in the table of verdicts."""
 
 
-@dataclass(frozen=True)
-class Trial:
-    """One run with injected faults.
+@dataclass(frozen=True, kw_only=True)
+class Trial(RunEnded):
+    """One run with injected faults: its `RunEnded` event, its faults, and the results of its checks.
 
     Attributes:
-        fault_numbers: Numbers of the injected faults. The last fault is under test, and occurs only after
-            all other faults.
-        descriptions: Description of each fault.
-        affected_part: Name of the skill, or of the part of the cell, that the last fault affects.
-        mission_line: File and line of the affected node in the mission, or "".
-        fault_kind: Failure reason that the last fault should cause, or kind of the fault.
-        occasion: Occasion of the last fault, one of `OCCASIONS`.
+        faults: Injected faults by number. The last fault is under test, and occurs only after all other
+            faults.
         have_occurred: True if all faults occurred.
         had_effect: True if the affected node failed with the expected reason, or if no reason is expected.
         is_halted_by_user: True if the user halted the run.
-        status: Status of the run at its end.
-        reason: Reason of the status, or "".
-        message: Sentence that explains the status, or "".
-        node: Path of the node that determined the status, or "".
         missing_count: Number of objects in bins after a run without faults, minus the number after this run.
         items: Number of items in the ledger by state.
         audit: Number of objects by their true place, or None if there was no audit.
-        robot_time: Duration of the run on its clock [s].
         entered_paths: Paths of all nodes that were started.
         problems: Sentences about violated requirements.
         remark: Sentence about questionable but permitted behaviour, or "".
     """
 
-    fault_numbers: tuple[int, ...]
-    descriptions: tuple[str, ...]
-    affected_part: str
-    mission_line: str
-    fault_kind: str
-    occasion: str
+    faults: Mapping[int, PlannedFault]
     have_occurred: bool = False
     had_effect: bool = True
     is_halted_by_user: bool = False
-    status: str = ""
-    reason: str = ""
-    message: str = ""
-    node: str = ""
     missing_count: int = 0
     items: Mapping[str, int] = field(default_factory=dict)
     audit: Mapping[str, int] | None = None
-    robot_time: float = 0.0
     entered_paths: frozenset[str] = frozenset()
     problems: tuple[str, ...] = ()
     remark: str = ""
+
+    @property
+    def fault_numbers(self) -> tuple[int, ...]:
+        """Numbers of the injected faults."""
+        return tuple(self.faults)
+
+    @property
+    def tested_fault(self) -> PlannedFault:
+        """Fault under test."""
+        return list(self.faults.values())[-1]
 
     @property
     def fault_option(self) -> str:
@@ -147,13 +141,14 @@ def results_to_json(results: FaultCampaignResults) -> dict[str, object]:
 
 def trial_to_json(trial: Trial) -> dict[str, object]:
     """Return a trial as JSON values by key; times are in s."""
+    fault = trial.tested_fault
     return {
-        "place": trial.mission_line, "what": trial.fault_kind, "when": trial.occasion,
+        "place": fault.mission_line, "what": fault.kind, "when": fault.occasion,
         "happened": trial.have_occurred, "raised": trial.had_effect, "status": trial.status,
         "reason": trial.reason, "message": trial.message, "node": trial.node, "missing": trial.missing_count,
         "items": trial.items, "audit": trial.audit, "problems": list(trial.problems), "remark": trial.remark,
         "fault": trial.fault_option, "verdict": trial.verdict, "robot_time_s": trial.robot_time,
-        "descriptions": list(trial.descriptions),
+        "descriptions": list(map(str, trial.faults.values())),
     }  # fmt: skip
 
 
@@ -194,8 +189,8 @@ def _list_table_lines(trials: Sequence[Trial]) -> Iterator[str]:
     """Yield the lines of a table of verdicts: a row per node and kind of fault, a column per occasion."""
     trials_by_row: dict[tuple[str, str, str], dict[str, list[Trial]]] = defaultdict(lambda: defaultdict(list))
     for trial in trials:
-        key = trial.affected_part, trial.mission_line, trial.fault_kind
-        trials_by_row[key][trial.occasion].append(trial)
+        fault = trial.tested_fault
+        trials_by_row[fault.name, fault.mission_line, fault.kind][fault.occasion].append(trial)
     rows: list[tuple[str, ...]] = [("node", "place", "fault", *OCCASIONS)]
     # The sort is stable, so the faults of a node keep their order.
     for key in sorted(trials_by_row, key=itemgetter(0, 1)):
@@ -254,9 +249,9 @@ def _list_remark_lines(trials: Sequence[Trial]) -> Iterator[str]:
 
 def _list_trial_lines(trial: Trial) -> Iterator[str]:
     """Yield the lines of the text about a trial."""
-    yield f"fault {trial.fault_option}: {'; and '.join(trial.descriptions)}"
+    yield f"fault {trial.fault_option}: {'; and '.join(map(str, trial.faults.values()))}"
     if not trial.have_occurred:
-        subject = "one of the faults" if len(trial.descriptions) > 1 else "the fault"
+        subject = "one of the faults" if len(trial.faults) > 1 else "the fault"
         yield f"  {subject} did not occur"
     status_text = " ".join(filter(None, (trial.status, trial.reason)))
     node_text = f" at {trial.node}" if trial.node else ""
