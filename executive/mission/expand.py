@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields, replace
 from typing import TypeVar, cast
 
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
-from executive.mission.model.mission import Mission, Subtree
+from executive.mission.model.mission import Mission, Quota, Subtree
 from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import (
     InnerNode,
@@ -47,11 +47,13 @@ class ExpandedMission:
     """A mission after expansion.
 
     Attributes:
+        quotas: Quotas with the values of params.
         tree: Expanded tree, or None if the expansion failed.
         unused_subtrees: Expanded bodies of the unused subtrees that require no arguments.
         findings: Errors and warnings about subtrees, params and arguments.
     """
 
+    quotas: tuple[Quota, ...]
     tree: Node | None
     unused_subtrees: tuple[Node, ...]
     findings: tuple[Finding, ...]
@@ -65,6 +67,7 @@ def expand(
     `names_by_word` contains the names that replace each word; a word without an entry remains.
     """
     expander = _Expander(mission, skills, names_by_word)
+    quotas = tuple(expander.expand_quota(quota) for quota in mission.quotas)
     tree = None if mission.tree is None else expander.expand_tree(mission.tree, expander.params)
     unused_subtrees = []
     subtree_nodes = [node for subtree in mission.subtrees.values() for node in subtree.body.walk()]
@@ -81,7 +84,7 @@ def expand(
             body = expander.expand_tree(subtree.body, {**expander.params, **defaults})
             unused_subtrees += [body] if body else []
     expander.findings += expander.find_unused_names()
-    return ExpandedMission(tree, tuple(unused_subtrees), tuple(expander.findings))
+    return ExpandedMission(quotas, tree, tuple(unused_subtrees), tuple(expander.findings))
 
 
 class _TooLargeError(Exception):
@@ -108,6 +111,13 @@ class _Expander:
         # Span of the `use` in the mission file that contains the current node.
         self._outermost_span: Span | None = None
         self._use_counts: Counter[str] = Counter()
+
+    def expand_quota(self, quota: Quota) -> Quota:
+        """Return the quota with the value of a param in place of its name."""
+        limit = quota.limit
+        if isinstance(limit, Reference):
+            limit = self._resolve_name(limit, self.params, ())
+        return replace(quota, limit=limit)
 
     def expand_tree(self, tree: Node, values: ValuesByName) -> Node | None:
         """Return the expanded tree, or None if the expanded tree is too large."""
@@ -192,10 +202,8 @@ class _Expander:
             text = f"the field {value}" if isinstance(value, Reference) else "a constant"
             message = f"${reference.name} is {text}, which has no field {reference.field}"
             self._add_error(reference.span, "unknown-field", message)
-        elif isinstance(value, Reference):
-            return replace(value, field=reference.field or value.field)
         if isinstance(value, Reference):
-            return value
+            return replace(value, field=reference.field or value.field)
         # A finding about the value is located at the value, so the message must contain the reference.
         origin = f"${reference.name} in {reference.span.describe_place(value.span.source)}"
         return replace(value, origin=origin, reference_span=reference.span)

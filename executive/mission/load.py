@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import cast
 
@@ -21,6 +21,7 @@ from executive.mission.flow_analysis import UnhandledFailure, find_unhandled_fai
 from executive.mission.model.mission import Mission
 from executive.mission.model.node_paths import assign_paths
 from executive.mission.model.nodes import InvalidNode, Node
+from executive.mission.model.values import Literal
 from executive.mission.parse.cell_file import CellFile
 from executive.mission.parse.read_mission import read_mission
 from executive.mission.parse.validate import find_span
@@ -77,8 +78,9 @@ class LoadedMission:
     def quotas(self) -> Quotas:
         """Maximum numbers of objects in the bins."""
         quotas = self.mission.quotas
-        limits = {(quota.bin.name, quota.label and quota.label.name): quota.limit.value for quota in quotas}
-        return Quotas(cast("dict[tuple[str, str | None], int]", limits))
+        keys = [(quota.bin.name, quota.label.name if quota.label else None) for quota in quotas]
+        limits = [cast("int", cast("Literal", quota.limit).value) for quota in quotas]
+        return Quotas(dict(zip(keys, limits, strict=True)))
 
 
 def load_mission(
@@ -120,6 +122,7 @@ def load_mission(
             classes_by_detector = dict(cell_kind.labels(config, folder))
             min_times = None if cell_findings else cell_kind.min_times(config)
     expansion = expand(mission, skills, _list_names_by_word(mission, config) if config else {})
+    mission = replace(mission, quotas=expansion.quotas)
     tree = assign_paths(expansion.tree or InvalidNode(files.source.make_span(), label=""))
     context = CheckContext(
         mission, tree, expansion.unused_subtrees, skills, node_classes, config, classes_by_detector, min_times

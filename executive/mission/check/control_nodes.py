@@ -35,7 +35,7 @@ def _check_keys(context: CheckContext, owner: InnerNode | NodeSection, name: str
                 yield from _check_keys(context, item, key.name)
         if key.kind is KeyKind.CONSTANT:
             max_value = find_upper_bound(owner, key)
-            yield from _check_constant(context, f"{name}.{key.name}", key, value, max_value)
+            yield from check_constant(context, f"{name}.{key.name}", key, value, max_value)
         elif (
             key.kind is KeyKind.ELEMENTS
             and isinstance(value, Literal)
@@ -51,9 +51,10 @@ def _check_keys(context: CheckContext, owner: InnerNode | NodeSection, name: str
             yield make_error(value.span, "wrong-type", message, hint if is_text_at_key else "")
 
 
-def _check_constant(
-    context: CheckContext, name: str, key: Key, value: KeyValue, max_value: int | None
+def check_constant(
+    context: CheckContext, name: str, key: Key, value: KeyValue, max_value: int | None = None
 ) -> Iterator[Finding]:
+    """Yield an error if `value` is a variable or no valid constant; `name` is the subject of the message."""
     if isinstance(value, Reference):
         message = f"{name} must be a constant, but ${value.name} is neither a param nor an argument"
         yield make_error(value.span, "unknown-param", message, context.make_unknown_param_hint(value))

@@ -1,4 +1,4 @@
-"""Checks of skills and their settings, of routes, and of names that must exist in the cell."""
+"""Checks of skills and their settings, and of the classes in the mission."""
 
 from __future__ import annotations
 
@@ -132,21 +132,6 @@ def find_param_problem(param: Param, value: object) -> tuple[str, str]:
         suggestion = suggest_word(value, map(str, param.choices))
         return "wrong-value", f"must be {allowed}, not {describe_value(value)}{suggestion}"
     return "", ""
-
-
-def check_routes(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every route with an unknown class or bin."""
-    if context.cell is None:
-        return
-    for route in context.mission.routes:
-        if route.label not in context.cell.objects:
-            hint = suggest_choice(route.label, context.cell.objects, "Classes of the cell")
-            message = f'the cell has no class "{route.label}"'
-            yield make_error(route.label_span, "unknown-class", message, hint)
-        for bin in route.bins:
-            if bin.name not in context.cell.bins:
-                hint = suggest_choice(bin.name, context.cell.bins, "Bins of the cell")
-                yield make_error(bin.span, "unknown-bin", f'the cell has no bin "{bin.name}"', hint)
 
 
 def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:

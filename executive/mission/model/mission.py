@@ -79,7 +79,10 @@ class Quota:
 
     bin: LocatedName
     label: LocatedName | None
-    limit: Literal
+    limit: Value
+
+    def __str__(self) -> str:
+        return f"the quota of {self.bin.name}" + (f" for {self.label.name}" if self.label else "")
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ class Mission:
         cell: Path of the cell file, relative to the folder of the mission.
         libraries: Paths of the library files, relative to the folder of the mission.
         params: Constants by name, with the values of `--set`.
-        quotas: Maximum numbers of objects in the bins, with valid numbers.
+        quotas: Maximum numbers of objects in the bins.
         tree: Root node of the tree; None if the key is missing.
         subtrees: Subtrees of the mission and of its libraries, by name.
         is_complete: False if a library could not be read, so that `subtrees` may lack subtrees.

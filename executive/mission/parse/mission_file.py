@@ -8,12 +8,11 @@ from dataclasses import replace
 
 from executive.mission.model import grammar
 from executive.mission.model.grammar import GrammarKeys
-from executive.mission.model.mission import Argument, Mission, Route, Subtree
+from executive.mission.model.mission import Argument, Mission, Quota, Route, Subtree
 from executive.mission.model.values import LocatedName
 from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
 from executive.mission.parse.node_parser import NodeParser
 from executive.mission.parse.params import parse_params
-from executive.mission.parse.quota_parser import read_quotas
 from executive.mission.source import Span
 from executive.mission.text.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, describe_node
 
@@ -25,7 +24,6 @@ def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodePars
     """Return the valid content of a mission file; add errors to the findings of `parser`."""
     reader = _make_file_reader("the mission", root, grammar.MISSION_KEYS, parser)
     tree = reader.get("tree")
-    params = parse_params(reader, overrides)
     return Mission(
         name=_read_name(reader),
         description=reader.read_text("description"),
@@ -33,9 +31,9 @@ def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodePars
         libraries=_read_names(
             reader, reader.list_items("library"), "library must be the path of a file or a list of paths"
         ),
-        params=params,
+        params=parse_params(reader, overrides),
         routes=_read_routes(reader),
-        quotas=tuple(read_quotas(reader, params)),
+        quotas=tuple(_read_quotas(reader)),
         tree=None if tree is None else parser.read_node(tree, reader.get_key_span("tree")),
         subtrees=_read_subtrees(reader, parser),
     )
@@ -75,6 +73,20 @@ def _read_routes(reader: MappingReader) -> tuple[Route, ...]:
         bins = _read_names(reader, items, "a route must be a bin or a list of bins")
         routes.append(Route(label, span, bins))
     return tuple(routes)
+
+
+def _read_quotas(reader: MappingReader) -> Iterator[Quota]:
+    """Yield the quotas below `quotas`: a limit for each bin, or a mapping of classes to limits."""
+    for bin_name, span, node in reader.iterate_entries("quotas"):
+        bin = LocatedName(bin_name, span)
+        limits: list[tuple[LocatedName | None, YamlNode]] = [(None, node)]
+        if isinstance(node, YamlMapping):
+            limits = [(LocatedName(entry.key.text, entry.key.span), entry.value) for entry in node.entries]
+            if not limits:
+                reader.add_error(node.span, "empty-list", f"the quota of {bin_name} names no class")
+        for label, value in limits:
+            if (limit := read_value(value, reader.findings)) is not None:
+                yield Quota(bin, label, limit)
 
 
 def _read_names(reader: MappingReader, items: Iterable[YamlNode], rule: str) -> tuple[LocatedName, ...]:
