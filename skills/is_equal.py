@@ -14,7 +14,9 @@ class IsEqual(Skill):
     The skill fails with `different` if the values are not equal.
     """
 
-    value: In[str | int | float | bool] = port(doc="the value to compare, for example `$target.label`")
+    value: In[str | int | float | bool] = port(
+        same_as="to", doc="the value to compare, for example `$target.label`"
+    )
     to: In[str | int | float | bool] = port(same_as="value", doc="the expected value, for example `cube`")
     reasons: ClassVar = ("different",)
     is_condition: ClassVar = True

@@ -22,7 +22,7 @@ from executive.mission.model.nodes import (
     SubtreeNode,
     iterate_keys,
 )
-from executive.mission.model.values import Literal, LocatedName, Reference, Setting, Value
+from executive.mission.model.values import InvalidValue, Literal, LocatedName, Reference, Setting, Value
 from executive.mission.model.wiring import find_control_node_outputs, find_written_variables
 from executive.mission.source import Span
 from executive.skill import Direction, Skill
@@ -196,12 +196,15 @@ class _Expander:
         name = reference.name if value is not None else find_similar_word(reference.name, values)
         is_argument = bool(callers) and name in self.mission.subtrees[callers[-1]].arguments
         self._referenced_names.add((callers[-1] if is_argument else "", name or ""))
-        if value is None:
-            return reference
+        if value is None or isinstance(value, InvalidValue):
+            return value or reference
         if reference.field and (isinstance(value, Literal) or value.field):
-            text = f"the field {value}" if isinstance(value, Reference) else "a constant"
+            text = "a constant"
+            if isinstance(value, Reference):
+                text = f"the field {value}".replace(_CALLER_PREFIX, "")
             message = f"${reference.name} is {text}, which has no field {reference.field}"
             self._add_error(reference.span, "unknown-field", message)
+            return InvalidValue(reference.span)
         if isinstance(value, Reference):
             return replace(value, field=reference.field or value.field)
         # A finding about the value is located at the value, so the message must contain the reference.
@@ -276,7 +279,7 @@ class _Expander:
                 self._add_error(setting.name_span, "unknown-return", message, hint)
             elif isinstance(setting.value, Reference) and not setting.value.field:
                 variables[name] = setting.value.name
-            else:
+            elif not isinstance(setting.value, InvalidValue):
                 message = f"returns.{name} must be a variable, for example $mine"
                 self._add_error(setting.value.span, "wrong-type", message)
         return variables

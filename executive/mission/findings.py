@@ -31,7 +31,7 @@ MEANING_BY_CODE: Mapping[str, str] = dict(
 )
 """Meaning of each code of a finding, and the action to take."""
 _VALUE_CODES = frozenset({
-    "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten", "unknown-field",
+    "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten",
     "unknown-bin", "unknown-class", "unknown-detector", "unknown-pose", "unseen-class",
 })  # fmt: skip
 """Codes of findings about a value; `sort_findings` keeps one finding per position and code."""

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 
 from executive.mission.check import (
-    conditions,
     connection_types,
     control_nodes,
     parallel_branches,
@@ -27,7 +26,6 @@ CHECKS: tuple[Check, ...] = (
     skill_settings.check_settings,
     skill_settings.find_unreplayable_skills,
     control_nodes.check_constants,
-    conditions.find_non_conditions,
     reasons.check_labels,
     routes.check_names,
     routes.check_quotas,

@@ -11,14 +11,13 @@ from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNod
 from executive.skill import ANY, Direction, Skill
 
 
-def find_non_conditions(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every node that is no condition, under a key that takes only conditions."""
-    for parent in context.iterate_control_nodes():
-        for key, value in iterate_keys(parent):
-            for node in list_nodes(value) if key.takes_conditions else ():
-                if problem := _find_problem(context, node):
-                    message = f"{problem}, but {get_type_name(parent)}.{key.name} needs a condition"
-                    yield make_error(node.span, "no-condition", message, _make_hint(context))
+def find_non_conditions(context: CheckContext, parent: InnerNode) -> Iterator[Finding]:
+    """Yield an error for every child that is no condition, under a key that takes only conditions."""
+    for key, value in iterate_keys(parent):
+        for node in list_nodes(value) if key.takes_conditions else ():
+            if problem := _find_problem(context, node):
+                message = f"{problem}, but {get_type_name(parent)}.{key.name} needs a condition"
+                yield make_error(node.span, "no-condition", message, _make_hint(context))
 
 
 def _find_problem(context: CheckContext, node: Node) -> str:

@@ -116,7 +116,7 @@ class ElementLoop:
                     hint = f"{key} reads ${variable} in {span.describe_place(value_span.source)}."
                     yield make_error(value_span, "port-type", message, hint)
             if writer.values is None and find_element_type(writer.type) is None:
-                message = f"{key} takes a list, but ${variable} holds {describe_type(writer.type)}"
+                message = f"{key} takes a list, but {self.elements} holds {describe_type(writer.type)}"
                 yield make_error(span, "port-type", message, f"It is written by {writer.describe(span)}.")
 
     def make_element_writers(self, list_writer: Writer) -> Iterator[Writer]:
@@ -197,7 +197,8 @@ def _check_compared_constants(
     """Yield an error for each constant that a node compares with an input, and that can never be equal."""
     for name, value in find_literals(node) if isinstance(node, SkillNode) and writer.values is None else ():
         port = context.skills[wire.skill].ports.get(name)
-        if port is None or port.same_as != wire.port.name:
+        # `check_settings` reports a constant that fits no variable.
+        if port is None or port.same_as != wire.port.name or find_input_problem(value.value, port):
             continue
         # A field that names a bin may be empty.
         expected = replace(port, type=writer.type, refers_to=writer.refers_to, default="")

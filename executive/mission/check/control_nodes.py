@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import cast
 
+from executive.mission.check.conditions import find_non_conditions
 from executive.mission.check.context import CheckContext
 from executive.mission.check.node_min_times import compute_min_time
 from executive.mission.descriptions import describe_value
@@ -69,10 +70,13 @@ def check_constant(
 
 
 def run_node_checks(context: CheckContext) -> Iterator[Finding]:
-    """Yield the findings of the method `check` of every control node."""
+    """Yield the findings of every control node: children that are no conditions, else those of `check`."""
     halted_paths = _find_paths_below(context, lambda node: node.children_halted_by_sibling)
     concurrent_paths = _find_paths_below(context, lambda node: node.concurrent_children)
     for node in context.iterate_control_nodes():
+        if non_conditions := list(find_non_conditions(context, node)):
+            yield from non_conditions
+            continue
         analysis = CheckerAnalysis(context, node, node.path in halted_paths, node.path in concurrent_paths)
         for node_finding in make_inspection_instance(node).check(analysis):
             yield _locate_finding(node, node_finding)

@@ -38,7 +38,7 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
             elif isinstance(setting.value, Literal):
                 yield from _check_value(context, node, declarations[name], setting.value)
                 yield from find_unknown_names(context, node.skill, declarations[name], setting.value)
-            else:
+            elif isinstance(setting.value, Reference):
                 yield from _check_reference(context, node.skill, declarations[name], setting.value)
         for param in skill.params.values():
             if param.is_required and param.name not in node.settings:
@@ -72,9 +72,9 @@ def find_unreplayable_skills(context: CheckContext) -> Iterator[Finding]:
     for node, skill in context.iterate_installed_skills():
         if not skill.is_replayable:
             message = f"{node.skill} may read the world by itself, and a run does not record what it reads"
-            hint = (
-                "A replay or a resumed run executes it again. If it reads nothing, set is_replayable = True."
-            )
+            hint = "A replay or a resumed run executes it again."
+            if not skill.__module__.startswith("py_trees."):
+                hint += " If it reads nothing, set is_replayable = True."
             yield make_warning(node.span, "not-recorded", message, hint)
 
 

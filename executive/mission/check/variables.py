@@ -23,7 +23,7 @@ def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
             problem = "is not written on every path to this node"
             hint = f"It is written by {_describe_writers(context, read.variable, read.span)}."
         else:
-            problem, hint = "no node writes", _make_unwritten_hint(context, read.variable)
+            problem, hint = "no node writes", _make_unwritten_hint(context, read)
         message = f"{read.input_name} reads ${name_in_file}, which {problem}"
         yield make_error(read.span, "unwritten", message, hint)
 
@@ -146,14 +146,17 @@ def _suggest_writers(context: CheckContext, variable: str, span: Span) -> str:
     return " and ".join(writers_in_file) or list_skills_with_output(context, variable) or "no skill"
 
 
-def _make_unwritten_hint(context: CheckContext, variable: str) -> str:
-    """Return a hint for a variable that no node of the tree writes."""
+def _make_unwritten_hint(context: CheckContext, read: VariableRead) -> str:
+    """Return a hint for the read of a variable that no node of the tree writes."""
+    variable = read.variable
     local_names = [name for name in context.written_variables if name.endswith(f".{variable}")]
     if local_names:
         subtree = min(name.rpartition(".")[0] for name in local_names)
         return f'The subtree "{subtree}" writes a local variable {variable}: add {variable} to its returns.'
     if skills := list_skills_with_output(context, variable):
         return f"It is written by: {skills}."
+    if not read.is_explicit:
+        return f"Set {read.input_name}."
     global_names = sorted(name for name in context.written_variables if "." not in name)
     similar = find_similar_word(variable, global_names)
     names = ", ".join(f"${name}" for name in global_names) or "none"

@@ -59,7 +59,14 @@ class Reference:
         return f"${self.local_name}.{self.field}" if self.field else f"${self.local_name}"
 
 
-Value = Literal | Reference
+@dataclass(frozen=True)
+class InvalidValue:
+    """A value with an error that a finding reports."""
+
+    span: Span
+
+
+Value = Literal | Reference | InvalidValue
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pydantic import JsonValue
 
 from executive.mission.findings import Finding, make_error, suggest_choice
-from executive.mission.model.values import FailureName, Literal, Reference, Setting, Value
+from executive.mission.model.values import FailureName, InvalidValue, Literal, Reference, Setting, Value
 from executive.mission.source import Span
 from executive.mission.text.yaml_text import (
     YamlMapping,
@@ -159,19 +159,19 @@ def read_settings(
         hint = f"Write {owner}: {{{example_key}: {node.text}}}." if isinstance(node, YamlScalar) else ""
         findings.append(make_error(node.span, "wrong-type", message, hint))
         return {}
-    values = [(entry.key, read_value(entry.value, findings)) for entry in node.entries]
-    return {key.text: Setting(key.span, value) for key, value in values if value is not None}
+    entries = ((entry.key, entry.value) for entry in node.entries)
+    return {key.text: Setting(key.span, read_value(value, findings)) for key, value in entries}
 
 
-def read_value(node: YamlNode, findings: list[Finding]) -> Value | None:
-    """Return a reference for `$name` or `$name.field`, or a constant with `$` for `$$`; None after errors."""
+def read_value(node: YamlNode, findings: list[Finding]) -> Value:
+    """Return a reference for `$name` or `$name.field`, or a constant with `$` for `$$`."""
     text = node.value if isinstance(node, YamlScalar) else None
     if isinstance(text, str) and (match := REFERENCE_PATTERN.fullmatch(text)):
         return Reference(match[1], node.span, match[2] or "")
     errors = list(_find_misplaced_dollars(node))
     findings += errors
     literal = make_literal(node)
-    return None if errors else replace(literal, value=_unescape(literal.value))
+    return InvalidValue(node.span) if errors else replace(literal, value=_unescape(literal.value))
 
 
 def make_literal(node: YamlNode) -> Literal:

@@ -85,8 +85,7 @@ def _read_quotas(reader: MappingReader) -> Iterator[Quota]:
             if not limits:
                 reader.add_error(node.span, "empty-list", f"the quota of {bin_name} names no class")
         for label, value in limits:
-            if (limit := read_value(value, reader.findings)) is not None:
-                yield Quota(bin, label, limit)
+            yield Quota(bin, label, read_value(value, reader.findings))
 
 
 def _read_names(reader: MappingReader, items: Iterable[YamlNode], rule: str) -> tuple[LocatedName, ...]:

@@ -10,7 +10,7 @@ from executive.errors import InputError
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model import grammar
 from executive.mission.model.nodes import InnerNode, InvalidNode, Node, SkillNode, SubtreeNode
-from executive.mission.model.values import Literal
+from executive.mission.model.values import Literal, Reference
 from executive.mission.parse.control_node_parser import (
     find_inner_keys,
     find_sibling_keys,
@@ -182,12 +182,12 @@ class NodeParser:
                 return SkillNode(span, label, name, settings)
             message = f'there is another skill "{name}"; register this class as a skill under another name'
             self.add_error(path.span, "unknown-behaviour", message)
-        elif path is not None:
+        elif isinstance(path, Literal | Reference):
             message = (
                 f"{keyword}.{class_key} must be an import path, for example py_trees.behaviours:TickCounter"
             )
             self.add_error(path.span, "wrong-type", message)
-        elif is_empty(entry.value) or isinstance(entry.value, YamlMapping):
+        elif path is None and (is_empty(entry.value) or isinstance(entry.value, YamlMapping)):
             self.add_error(span, "missing-key", f'{keyword} needs the key "{class_key}"')
         return InvalidNode(span, label)
 
