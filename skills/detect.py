@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from executive.cell.detection import Detections
-from executive.cell.protocols import Cell, MinTimes, Steps
-from executive.manipulation.looks import take_look
+from executive.cell.protocols import Cell, Steps
+from executive.manipulation.looks import LookingSkill
 from executive.manipulation.obstacles import is_detection_in_bin
-from executive.skill import Out, Skill, param, port
+from executive.skill import Out, param, port
 
 
-class Detect(Skill):
+class Detect(LookingSkill):
     """Detect the objects in a new image, without blocking the tick loop.
 
     The output contains all detections that are not doubtful; it may be empty. A detection is doubtful if its
@@ -25,27 +24,17 @@ class Detect(Skill):
     """
 
     detections: Out[Detections] = port(doc="the detections and their frame")
-    detector: str = param("", refers_to="detector", doc="a detector of the cell; empty: the first detector")
-    view: str = param("table", choices=("table", "full"), doc="`table`: the workspace; `full`: entire image")
     doubtful: str = param("fail", choices=("fail", "pass"), doc="result if all table detections are doubtful")
     hidden: str = param("fail", choices=("fail", "pass"), doc="result if the arm hides part of the workspace")
-    reasons: ClassVar = ("unsure", "hidden", "unavailable", "crowded", "camera_moved")
-    uses: ClassVar = ("camera",)
-    senses: ClassVar = True
-
-    @classmethod
-    def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
-        """Return the minimum time from the frame to the answer of the detector [s]."""
-        return min_times.get_answer_time(values["detector"])
+    reasons: ClassVar = ("unsure", "hidden", *LookingSkill.reasons)
 
     def run(self, cell: Cell) -> Steps:
         """Capture a frame, send the frame to the detector, and wait for the answer."""
         camera = cell.camera
         if self.hidden == "fail" and not camera.sees_table():
             raise self.failure("hidden", f"the arm hides part of the workspace from camera {camera.name}")
-        frame, answer = yield from take_look(self, cell, self.detector, self.view)
-        on_table = (entry for entry in answer.doubtful if not is_detection_in_bin(cell, entry, frame))
-        if not answer.confident and self.doubtful == "fail" and (best := next(on_table, None)):
-            raise self.failure("unsure", answer.describe_doubt(best))
-        area = camera.get_view_box(self.view)
-        self.detections = Detections(**vars(answer), frame=frame, view=self.view, area=area)
+        look = yield from self.take_look(cell)
+        on_table = (entry for entry in look.doubtful if not is_detection_in_bin(cell, entry, look.frame))
+        if not look.confident and self.doubtful == "fail" and (best := next(on_table, None)):
+            raise self.failure("unsure", look.describe_doubt(best))
+        self.detections = look

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
-from typing import Any, ClassVar
+from collections.abc import Generator
+from typing import ClassVar
 
-from executive.cell.detection import Detections
 from executive.cell.ledger import Presence
 from executive.cell.objects import Item
-from executive.cell.protocols import Cell, MinTimes, Steps
+from executive.cell.protocols import Cell, Steps
 from executive.errors import NoDepth
-from executive.manipulation.looks import take_look
-from executive.skill import In, Skill, param, port
+from executive.manipulation.looks import LookingSkill
+from executive.skill import In, param, port
 
 
-class LookAt(Skill):
+class LookAt(LookingSkill):
     """Verify with the camera that an item, or each item in a bin, is where the ledger believes it to be.
 
     The skill does not move the arm: move to a pose from which the camera sees the place first. The skill
@@ -27,18 +26,10 @@ class LookAt(Skill):
 
     item: In[Item | None] = port(default=None, refers_to="item", doc="the item to verify")
     bin: In[str | None] = port(default=None, refers_to="bin", doc="the bin whose items are verified")
-    detector: str = param("", refers_to="detector", doc="a detector of the cell; empty: the first detector")
     view: str = param("full", choices=("table", "full"), doc="`table`: the workspace; `full`: entire image")
     looks: int = param(10, ge=1, le=100, doc="maximum number of images")
     one_of: ClassVar = ("item", "bin")
-    reasons: ClassVar = ("gone", "hidden", "unavailable", "crowded", "camera_moved")
-    uses: ClassVar = ("camera",)
-    senses: ClassVar = True
-
-    @classmethod
-    def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
-        """Return the minimum time from the frame to the answer of the detector [s]."""
-        return min_times.get_answer_time(values["detector"])
+    reasons: ClassVar = ("gone", "hidden", *LookingSkill.reasons)
 
     def run(self, cell: Cell) -> Steps:
         """Take looks until all answers are certain, or until a place is not in view."""
@@ -60,15 +51,13 @@ class LookAt(Skill):
 
     def _look(self, cell: Cell, items: list[Item]) -> Generator[None, None, dict[Item, Presence]]:
         """Take a look, update the ledger, and return the answer for each item."""
-        frame, answer = yield from take_look(self, cell, self.detector, self.view)
-        area = cell.camera.get_view_box(self.view)
-        detections = Detections(**vars(answer), frame=frame, view=self.view, area=area)
+        look = yield from self.take_look(cell)
         try:
             # Objects may have moved since the capture while another branch of a `parallel` used the tool.
-            observations = cell.localizer.localize(detections) if cell.ledger.is_current(frame) else None
+            observations = cell.localizer.localize(look) if cell.ledger.is_current(look.frame) else None
         except NoDepth:
             observations = None
         if observations is None:
             return dict.fromkeys(items, Presence.UNSURE)
-        cell.ledger.observe(detections, observations)
-        return {item: cell.ledger.verify(item, detections, observations) for item in items}
+        cell.ledger.observe(look, observations)
+        return {item: cell.ledger.verify(item, look, observations) for item in items}

@@ -1,39 +1,47 @@
-"""Looks of skills: a frame of the camera, and the answer of a detector."""
+"""Base class of skills that take a look: a frame of the camera, and the detections of a detector in it."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
+from typing import Any, ClassVar
 
-from executive.cell.detection import Answer
-from executive.cell.frame import Frame
-from executive.cell.protocols import Cell
+from executive.cell.detection import Detections
+from executive.cell.protocols import Cell, MinTimes
 from executive.errors import Crowded, Unavailable
-from executive.skill import Skill
+from executive.skill import Skill, param
 
 
-def take_look(
-    skill: Skill, cell: Cell, detector_name: str, view: str
-) -> Generator[None, None, tuple[Frame, Answer]]:
-    """Capture a frame, wait for the answer of a detector, and return both.
+class LookingSkill(Skill):
+    """Base class of skills that capture a frame and wait for the answer of a detector."""
 
-    Args:
-        skill: Skill that declares the reasons below.
-        cell: The cell.
-        detector_name: Name of the detector; "" for the first detector.
-        view: Searched region of the image: `table` or `full`.
+    detector: str = param("", refers_to="detector", doc="a detector of the cell; empty: the first detector")
+    view: str = param("table", choices=("table", "full"), doc="`table`: the workspace; `full`: entire image")
+    reasons: ClassVar = ("unavailable", "crowded", "camera_moved")
+    uses: ClassVar = ("camera",)
+    senses: ClassVar = True
 
-    Raises:
-        SkillFailed: `camera_moved`, `crowded` or `unavailable`.
-    """
-    frame = cell.camera.capture()
-    if displacement := cell.camera.describe_displacement(frame):
-        raise skill.failure("camera_moved", displacement)
-    request = cell.detectors[detector_name or next(iter(cell.detectors))].request(frame, view)
-    while not request.ready:
-        yield
-    try:
-        return frame, request.result()
-    except Crowded as error:
-        raise skill.failure("crowded", str(error)) from error
-    except Unavailable as error:
-        raise skill.failure("unavailable", str(error)) from error
+    @classmethod
+    def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
+        """Return the minimum time from the frame to the answer of the detector [s]."""
+        return min_times.get_answer_time(values["detector"])
+
+    def take_look(self, cell: Cell) -> Generator[None, None, Detections]:
+        """Capture a frame, yield until the detector has answered, and return its detections.
+
+        Raises:
+            SkillFailed: `camera_moved`, `crowded` or `unavailable`.
+        """
+        frame = cell.camera.capture()
+        if displacement := cell.camera.describe_displacement(frame):
+            raise self.failure("camera_moved", displacement)
+        request = cell.detectors[self.detector or next(iter(cell.detectors))].request(frame, self.view)
+        while not request.ready:
+            yield
+        try:
+            answer = request.result()
+        except Crowded as error:
+            raise self.failure("crowded", str(error)) from error
+        except Unavailable as error:
+            raise self.failure("unavailable", str(error)) from error
+        area = cell.camera.get_view_box(self.view)
+        return Detections(**vars(answer), frame=frame, view=self.view, area=area)
