@@ -18,5 +18,5 @@ class IsPlaced(Skill):
 
     def run(self, cell: Cell) -> None:
         """Ask the ledger for the state of the item."""
-        if not cell.ledger.is_placed(self.item):
+        if cell.ledger.describe(self.item).state != "placed":
             raise self.failure("not_placed", f"{self.item} is in no bin")

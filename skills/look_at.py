@@ -33,7 +33,8 @@ class LookAt(LookingSkill):
 
     def run(self, cell: Cell) -> Steps:
         """Take looks until all answers are certain, or until a place is not in view."""
-        items = [self.item] if self.item else list(cell.ledger.list_items_in(self.bin or ""))
+        known_items = cell.ledger.list_known_items()
+        items = [self.item] if self.item else [known.item for known in known_items if known.bin == self.bin]
         unsure_items: list[Item] = []
         for _ in range(self.looks):
             answers = yield from self._look(cell, items)

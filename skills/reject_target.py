@@ -22,7 +22,7 @@ class RejectTarget(Skill):
 
     def run(self, cell: Cell) -> None:
         """Reject the item in the ledger."""
-        failures = cell.ledger.count_attempts(self.item)
+        failures = cell.ledger.describe(self.item).attempts
         if failures >= self.after:
             reason = f"{self.why} ({failures} failed attempts)" if failures else self.why
             cell.ledger.reject(self.item, reason)

@@ -31,7 +31,7 @@ class Release(Skill):
         item, bin = self.held, self.bin
         if cell.ledger.find_held_item() == item:
             yield from release(self, cell, item, self.settle, lambda: cell.ledger.record_placement(item, bin))
-        elif cell.ledger.is_open(item):
+        elif cell.ledger.describe(item).state != "placed":
             raise self.failure("dropped", f"{item} is not in the tool any more")
         # A skill that is started again after a halt may find its item already placed.
         self.placed = item

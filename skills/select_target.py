@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
-from executive.manipulation.tool_goals import choose_bin, list_free_bins, sort_pickable_targets
+from executive.manipulation.tool_goals import choose_bin, sort_pickable_targets
 from executive.perception.evidence import describe_unknown_labels
 from executive.skill import In, Out, Skill, SkillFailed, param, port
 
@@ -51,11 +51,12 @@ class SelectTarget(Skill):
             raise self._explain_missing_candidate(cell)
         # The candidates are sorted by distance, and `min` returns the first of equal ones.
         best = min(candidates, key=lambda target: self._rank(cell, target))
-        if (turn := cell.ledger.describe(best.item).turn) and (names := self._list_uncertain(cell, turn)):
+        rank = cell.ledger.describe(best.item).deferral_rank
+        if rank and (names := self._list_uncertain(cell, rank)):
             message = f"{best.item} is deferred, and not enough looks agree on {names} yet; look again"
             raise self.failure("doubtful", message)
         self.target, self.item = best, best.item
-        bin = choose_bin(cell, cell.ledger.get_label(best.item))
+        bin = choose_bin(cell, best.item)
         assert bin is not None, "every candidate has a free bin"
         self.bin = bin
         cell.report_selection(best, bin)
@@ -64,38 +65,35 @@ class SelectTarget(Skill):
         """Return the sort key of a candidate; the smallest key comes first."""
         known = cell.ledger.describe(target.item)
         if self.prefer == "surest":
-            return known.turn, -target.confidence, target.item
-        return known.turn, known.attempts if self.prefer == "least_tried" else 0
+            return known.deferral_rank, -target.confidence, target.item
+        return known.deferral_rank, known.attempts if self.prefer == "least_tried" else 0
+
+    def _is_permitted(self, cell: Cell, item: Item) -> bool:
+        """Return True if the mission permits an item of any class, and a bin for the item is free."""
+        is_excluded = item in (self.not_ or ()) or (self.among is not None and item not in self.among)
+        return not is_excluded and self.same in (None, item) and choose_bin(cell, item) is not None
 
     def _is_requested(self, cell: Cell, item: Item) -> bool:
-        label = cell.ledger.get_label(item)
-        if item in (self.not_ or ()) or (self.among is not None and item not in self.among):
-            return False
-        has_bin = bool(list_free_bins(cell, label))
-        return has_bin and self.same in (None, item) and self.wanted in (None, label)
+        return self.wanted in (None, cell.ledger.get_label(item)) and self._is_permitted(cell, item)
 
-    def _list_uncertain(self, cell: Cell, turn: float = math.inf) -> str:
-        """Return the requested items before `turn` on which not enough looks agree, separated by commas."""
+    def _list_uncertain(self, cell: Cell, max_rank: float = math.inf) -> str:
+        """Return the requested items before a deferral rank on which not enough looks agree, with commas."""
         items = (item for item in cell.ledger.find_uncertain_items() if self._is_requested(cell, item))
-        return ", ".join(item for item in items if cell.ledger.describe(item).turn < turn)
+        return ", ".join(item for item in items if cell.ledger.describe(item).deferral_rank < max_rank)
 
     def _is_nothing_left(self, cell: Cell) -> bool:
-        """Return True if no requested item is left, or if none of the items in `among` is open."""
-        # An object that looks like an object of the wanted class may belong to it, until it is weighed.
-        looks = {other.look for other in cell.classes.values() if other.label == self.wanted}
-        labels, ignored_items = {self.wanted, *looks}, self.not_ or ()
+        """Return True if no requested item is left, or if none of the items in `among` is open or lost.
+
+        An item that may belong to the wanted class after a weighing is left.
+        """
+        ledger = cell.ledger
         if self.among is None:
-            return self.same is None and all(
-                cell.ledger.is_table_empty(label, ignored_items) for label in labels
-            )
+            return self.same is None and ledger.is_table_empty(self.wanted, self.not_ or ())
         return not any(
             (known.is_open or known.state == "lost")
-            and (self.wanted is None or known.label in labels)
-            and list_free_bins(cell, known.label)
-            for known in cell.ledger.list_known_items()
-            if known.item in self.among
-            and known.item not in ignored_items
-            and self.same in (None, known.item)
+            and self.wanted in (None, *ledger.list_possible_labels(known.item))
+            and self._is_permitted(cell, known.item)
+            for known in ledger.list_known_items()
         )
 
     def _explain_missing_candidate(self, cell: Cell) -> SkillFailed:

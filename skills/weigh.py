@@ -40,11 +40,11 @@ class Weigh(Skill):
             yield
         fail_if_dropped(self, cell, self.held, "during the weighing")
         self.weight = sum(loads) / len(loads)
-        ledger, std = cell.ledger, cell.tool.load_std
-        if contradiction := ledger.record_weight(self.held, self.weight, std, cell.classes):
+        ledger = cell.ledger
+        if contradiction := ledger.record_weight(self.held, self.weight, cell.tool.load_std):
             raise self.failure("contradicted", f"{self.held} is of no certain class: {contradiction}")
-        label = ledger.get_label(self.held)
-        if (bin := choose_bin(cell, label)) is None:
+        if (bin := choose_bin(cell, self.held)) is None:
+            label = ledger.get_label(self.held)
             explanation = ledger.explain_exemption(label) or "no bin is free"
             raise self.failure("no_bin", f"{self.held} is a {label}: {explanation}")
         self.bin = bin

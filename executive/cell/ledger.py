@@ -8,7 +8,7 @@ from typing import Protocol
 
 from executive.cell.detection import Detections, Observation
 from executive.cell.frame import Frame
-from executive.cell.objects import Item, KnownItem, ObjectClass, Target
+from executive.cell.objects import Item, KnownItem, Target
 from executive.geometry import Array
 
 
@@ -65,12 +65,6 @@ class Ledger(Protocol):
     def is_fresh(self, target: Target) -> bool:
         """Return False if the robot may have moved a target since its last detection."""
 
-    def is_open(self, item: Item) -> bool:
-        """Return True if an item still has to be sorted: it is on the table or dropped, but not rejected."""
-
-    def is_placed(self, item: Item) -> bool:
-        """Return True if an item is in a bin."""
-
     def is_certain(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough to pick it."""
 
@@ -82,11 +76,14 @@ class Ledger(Protocol):
         table.
         """
 
-    def is_weighed(self, item: Item) -> bool:
-        """Return True if the class of an item is certain according to its last weighing."""
-
     def get_label(self, item: Item) -> str:
         """Return the most probable class of an item."""
+
+    def list_possible_labels(self, item: Item) -> Sequence[str]:
+        """Return the classes of an item that a weighing may find, the most probable class first.
+
+        Only classes that look alike are possible, and only one class after a weighing that made it certain.
+        """
 
     def describe(self, item: Item) -> KnownItem:
         """Return the present knowledge about an item."""
@@ -94,14 +91,11 @@ class Ledger(Protocol):
     def list_known_items(self) -> Sequence[KnownItem]:
         """Return all items that exist with a probability of at least 0.5, in the order of detection."""
 
-    def count_attempts(self, item: Item) -> int:
-        """Return the number of failed attempts to pick an item."""
-
     def count_objects_in(self, bin: str, label: str | None = None) -> int:
         """Return the number of objects in a bin; `label` restricts the count to one class."""
 
     def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
-        """Return the number of items in the state `placed` or `rejected`.
+        """Return the number of known items in the state `placed` or `rejected` (`KnownItem.state`).
 
         `label` restricts the count to one class, `bin` to one bin.
         """
@@ -113,14 +107,10 @@ class Ledger(Protocol):
         """
 
     def count_used_slots(self, bin: str) -> int:
-        """Return the index of the next free slot of a bin.
+        """Return the index of the next free slot of a bin, behind the slots of all objects in the bin.
 
-        Slots are used in order, so the slots of objects that someone took out of the bin count as used until
-        the bin is empty.
+        Slots are used in order: a slot before another used slot stays used after its object was taken out.
         """
-
-    def list_items_in(self, bin: str) -> Sequence[Item]:
-        """Return the items that were placed in a bin and are not gone."""
 
     def verify(self, item: Item, detections: Detections, observations: Sequence[Observation]) -> Presence:
         """Return whether an item is at its place, according to this frame and to earlier calls.
@@ -144,7 +134,7 @@ class Ledger(Protocol):
             may_miss_top: True if the cup may have touched the object below its top.
         """
 
-    def record_weight(self, item: Item, weight: float, std: float, classes: Mapping[str, ObjectClass]) -> str:
+    def record_weight(self, item: Item, weight: float, std: float) -> str:
         """Record the weight of an item, which determines its class among the classes that look alike.
 
         Return "" if the class is then certain, otherwise a sentence that states the contradiction.
@@ -153,7 +143,6 @@ class Ledger(Protocol):
             item: The item.
             weight: Measured weight [N].
             std: Standard deviation of the error of the measurement [N].
-            classes: Classes of the cell by label.
         """
 
     def record_miss(self, item: Item, *, found_table: bool = False) -> None:

@@ -7,7 +7,7 @@ hardware. No call blocks: a skill sends a request, yields, and reads the result 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 from executive.cell.arm import Arm
@@ -210,4 +210,4 @@ class Cell:
     descent: float
     descent_speed: float
     report_selection: Callable[[Target, str], None]
-    quotas: Quotas = field(default_factory=Quotas)
+    quotas: Quotas

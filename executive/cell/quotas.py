@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 CountObjects = Callable[[str, str | None], int]
 """Function that returns the number of objects of a class in a bin; of all classes if the class is None."""
@@ -17,11 +17,7 @@ class Quotas:
         limits: Maximum number by bin and class; the class None stands for the objects of all classes.
     """
 
-    limits: Mapping[tuple[str, str | None], int] = field(default_factory=dict)
-
-    def is_limited(self, bin: str, label: str) -> bool:
-        """Return True if a quota limits the number of objects of the class `label` in a bin."""
-        return (bin, None) in self.limits or (bin, label) in self.limits
+    limits: Mapping[tuple[str, str | None], int]
 
     def is_reached(self, bin: str, label: str, count_objects: CountObjects) -> bool:
         """Return True if a bin takes no further object of the class `label`."""

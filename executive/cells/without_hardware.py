@@ -48,9 +48,10 @@ class CellWithoutHardware:
         del seed
         self.config, self.routes = config, dict(routes)
         self.steps = self.last_command_step = 0
-        bins, distinct_classes = build_bins(config), find_classes_distinct_by_touch(config)
+        bins, classes = build_bins(config), build_object_classes(config)
+        distinct_classes = find_classes_distinct_by_touch(config)
         self.accounts = Tracker(
-            config.ledger, config.table, bins, self.routes, emit, distinct_classes, options.quotas
+            config.ledger, config.table, bins, classes, self.routes, options.quotas, emit, distinct_classes
         )
         no_device: Any = None
 
@@ -66,7 +67,7 @@ class CellWithoutHardware:
             ledger=self.accounts,
             operator=options.operator,
             bins=bins,
-            classes=build_object_classes(config),
+            classes=classes,
             routes=self.routes,
             localizer=no_device,
             safe_place=np.array(config.safe_place),

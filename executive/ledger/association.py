@@ -47,7 +47,7 @@ def associate(
         for record in records:
             distance = record.distance_to(observation.position)
             if distance <= compute_association_distance(record, observation, gate):
-                is_other_class = record.look != observation.detection.label
+                is_other_class = record.detected_label != observation.detection.label
                 rank = (not staleness.is_unmoved(record), is_other_class, distance)
                 pairs.append((rank, observation, record))
     matches: dict[Observation, ItemRecord] = {}
@@ -108,7 +108,7 @@ def _may_be_same_object(
     phantom after an attempt to pick it may be an object that the attempt pushed away. An item that left its
     place may be anywhere; the new item then is at a position that a look found empty.
     """
-    if old_item is new_item or old_item.look != new_item.look:
+    if old_item is new_item or old_item.detected_label != new_item.detected_label:
         return False
     if old_item.state is State.DROPPED and old_item.is_missing:
         return new_item.was_place_searched and new_item.first_stamp > old_item.stamp

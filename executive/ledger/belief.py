@@ -58,8 +58,8 @@ class Belief:
         log_likelihoods: Log likelihood of each detected class, relative to a class that was never detected.
         label_counts: Number of looks by detected class.
         max_confusion_rate: Largest confusion rate of the detectors that detected the item, 0 to 1.
-        looks: After a weighing: for each class of the cell, the class that it looks like. Before, empty:
-            every class stands for all classes that look like it.
+        detected_labels: After a weighing: for each class of the cell, the class that it looks like. Before,
+            empty: every class stands for all classes that look like it.
         weight_log_ratios: Log likelihood ratio of the last weighing by class, part of `log_likelihoods`.
     """
 
@@ -73,7 +73,7 @@ class Belief:
     log_likelihoods: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     label_counts: Counter[str] = field(default_factory=Counter)
     max_confusion_rate: float = 0.0
-    looks: Mapping[str, str] = field(default_factory=dict)
+    detected_labels: Mapping[str, str] = field(default_factory=dict)
     weight_log_ratios: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -89,9 +89,9 @@ class Belief:
         return min(self.log_likelihoods, key=lambda label: (-self.log_likelihoods[label], label))
 
     @property
-    def look(self) -> str:
+    def detected_label(self) -> str:
         """Class that the detectors report for an object of the class `label`."""
-        return self.looks.get(self.label, self.label)
+        return self.detected_labels.get(self.label, self.label)
 
     @property
     def class_error(self) -> float:
@@ -112,7 +112,7 @@ class Belief:
 
         A small value shows that the detector confuses classes more often than its error rates state.
         """
-        wrong_count = self.look_count - self.label_counts[self.look]
+        wrong_count = self.look_count - self.label_counts[self.detected_label]
         # bdtrc(k, n, p) is the probability of more than k events in n trials with the event probability p.
         return float(bdtrc(wrong_count - 1, self.look_count, self.max_confusion_rate))
 
@@ -171,7 +171,7 @@ class Belief:
         self.miss_probability *= miss_rate
         self.log_odds += math.log(miss_rate)
 
-    def add_weight(self, log_ratios: Mapping[str, float], looks: Mapping[str, str]) -> None:
+    def add_weight(self, log_ratios: Mapping[str, float], detected_labels: Mapping[str, str]) -> None:
         """Update the class with a weighing, which distinguishes classes that look alike.
 
         A weighing replaces the last one, because a weight off by a constant error is off in both.
@@ -179,12 +179,12 @@ class Belief:
         Args:
             log_ratios: For each class of the cell, log likelihood of the measured weight, relative to an
                 object of another class.
-            looks: For each class of the cell, the class that it looks like; by default, itself.
+            detected_labels: For each class of the cell, the class that it looks like; by default, itself.
         """
-        if not self.looks:
-            detected = self.log_likelihoods
-            known = {label: detected[look] for label, look in looks.items() if look in detected}
-            self.log_likelihoods, self.looks = defaultdict(float, known), looks
+        if not self.detected_labels:
+            old, pairs = self.log_likelihoods, detected_labels.items()
+            new = {label: old[detected_label] for label, detected_label in pairs if detected_label in old}
+            self.log_likelihoods, self.detected_labels = defaultdict(float, new), detected_labels
         for label in self.log_likelihoods:
             self.log_likelihoods[label] += log_ratios[label] - self.weight_log_ratios.get(label, 0.0)
         self.weight_log_ratios = {label: log_ratios[label] for label in self.log_likelihoods}
@@ -196,9 +196,10 @@ class Belief:
         self.label_counts += duplicate.label_counts
         self.miss_probability = 1.0
 
-    def _add_class_evidence(self, look: str, log_ratio: float) -> None:
+    def _add_class_evidence(self, detected_label: str, log_ratio: float) -> None:
         """Add the log likelihood ratio of a detected class to each class that looks like it."""
-        for label in [label for label, other in self.looks.items() if other == look] or [look]:
+        alike = [label for label, other in self.detected_labels.items() if other == detected_label]
+        for label in alike or [detected_label]:
             self.log_likelihoods[label] += log_ratio
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -43,15 +43,13 @@ class BinContents:
         routes: Names of the permitted bins by class.
         records: All items.
         quotas: Maximum numbers of objects in the bins.
-        vacated_slot_counts: Number of objects that someone took out of each bin since it was empty, by name.
     """
 
     config: LedgerConfig
     bins: Mapping[str, Bin]
     routes: Routes
     records: ItemRecords
-    quotas: Quotas = field(default_factory=Quotas)
-    vacated_slot_counts: Counter[str] = field(default_factory=Counter)
+    quotas: Quotas
 
     def count_objects_in(self, bin_name: str, label: str | None = None) -> int:
         """Return the number of items that were released in a bin or have probably fallen into the bin.
@@ -72,20 +70,14 @@ class BinContents:
         return f"the {subject} of {', '.join(bin_names)} {verb} reached"
 
     def count_used_slots(self, bin_name: str) -> int:
-        """Return the number of slots of a bin that were used since the bin was empty."""
-        return self.count_objects_in(bin_name) + self.vacated_slot_counts[bin_name]
+        """Return the index of the next free slot of a bin: behind all used slots, and at least the count."""
+        slots = [record.slot for record in self.records if record.bin == bin_name]
+        return max([self.count_objects_in(bin_name), *(slot + 1 for slot in slots if slot is not None)])
 
     def get_slot_position(self, record: ItemRecord) -> Array:
         """Return the x and y of the slot of a placed item `(2,)` [m]; of the bin if the item fell into it."""
         bin = self.bins[record.bin]
         return bin.position[:2] if record.slot is None else bin.slots[record.slot % len(bin.slots)]
-
-    def take_out(self, record: ItemRecord) -> None:
-        """Record that someone took a placed item out of its bin; an empty bin has no used slots."""
-        self.vacated_slot_counts[record.bin] += 1
-        bin_name, record.bin, record.reason, record.slot = record.bin, "", "", None
-        if not self.count_objects_in(bin_name):
-            del self.vacated_slot_counts[bin_name]
 
     def find_bin_name(self, observation: Observation, bias_std: float) -> str | None:
         """Return the name of the bin in which an observed object lies, or None.
@@ -124,8 +116,9 @@ class BinContents:
         placed_records = []
         for record in self.records.filter_by_state(State.DROPPED):
             for bin_name in self.routes.get(record.label, ()):
-                key = (record.look, bin_name)
-                is_visible = visible_counts[key] > sum((item.look, item.bin) == key for item in self.records)
+                key = (record.detected_label, bin_name)
+                known_count = sum((item.detected_label, item.bin) == key for item in self.records)
+                is_visible = visible_counts[key] > known_count
                 if is_visible or self.is_floor_visible(bin_name, look):
                     update_bin_log_odds(record, bin_name, look.error_rates, is_visible=is_visible)
                 if record.bin_log_odds[bin_name] >= -math.log(self.config.max_miss_probability):

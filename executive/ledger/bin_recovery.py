@@ -46,7 +46,9 @@ class BinRecovery:
             dropped_items = [
                 item for item in self._records.filter_by_state(State.DROPPED) if item.is_untracked
             ]
-            same_class = (item for item in dropped_items if item.look == label and item not in found_items)
+            same_class = (
+                item for item in dropped_items if item.detected_label == label and item not in found_items
+            )
             record = next(same_class, None)
             if record is None:
                 belief = Belief(label, MIN_LOG_ODDS_OF_PROOF, is_proved=True)
@@ -74,7 +76,9 @@ class BinRecovery:
             max_unknown_count = sum(detected_counts.values()) - self._bins.count_objects_in(bin_name)
             wrong_labels = {label for label in labels if bin_name not in self._bins.routes.get(label, ())}
             for label in sorted(labels, key=lambda label: (label in wrong_labels, label)):
-                known_count = sum((item.look, item.bin) == (label, bin_name) for item in self._records)
+                known_count = sum(
+                    (item.detected_label, item.bin) == (label, bin_name) for item in self._records
+                )
                 unknown_count = max(min(detected_counts[label] - known_count, max_unknown_count), 0)
                 max_unknown_count -= unknown_count
                 yield from [(label, bin_name)] * unknown_count

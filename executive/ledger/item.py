@@ -87,7 +87,7 @@ class ItemRecord:
         bin_log_odds: Log odds, by bin, that the dropped item lies in the bin.
         is_untracked: True if the tool may have moved the item while the journal was incomplete.
         deferral_count: Number of times that the item was deferred.
-        turn: Rank among the deferred items; 0 if the item is not deferred.
+        deferral_rank: Rank among the deferred items; 0 if the item is not deferred.
         is_missing: True for a dropped item that someone, and not the tool, took from its place.
         slot: Index of the slot of the bin over which the item was released, or None.
     """
@@ -120,7 +120,7 @@ class ItemRecord:
     bin_log_odds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     is_untracked: bool = False
     deferral_count: int = 0
-    turn: int = 0
+    deferral_rank: int = 0
     is_missing: bool = False
     slot: int | None = None
 
@@ -133,9 +133,9 @@ class ItemRecord:
         return self.belief.label
 
     @property
-    def look(self) -> str:
+    def detected_label(self) -> str:
         """Class that the detectors report for an object of the class `label`."""
-        return self.belief.look
+        return self.belief.detected_label
 
     @property
     def target(self) -> Target:
@@ -159,10 +159,10 @@ class ItemRecord:
         if self.state is State.DROPPED:
             state = State.REJECTED.value if self.reason else State.LOST.value
         elif self.state is State.SEEN:
-            state = State.SKIPPED.value if is_exempt else "deferred" if self.turn else "open"
+            state = State.SKIPPED.value if is_exempt else "deferred" if self.deferral_rank else "open"
         return KnownItem(
             self.item, self.label, state, self.bin, self.position, self.attempt_count, self.deferral_count,
-            self.turn,
+            self.deferral_rank,
         )  # fmt: skip
 
     def distance_to(self, position: Array) -> float:
@@ -173,8 +173,10 @@ class ItemRecord:
         """Set the state and its reason."""
         self.state, self.reason = state, reason
 
-    def lose(self, change_count: int) -> None:
-        """Set the item to DROPPED, because looks showed that it left its place."""
+    def mark_as_missing(self, change_count: int) -> None:
+        """Set the item to DROPPED, because looks showed that it left its place on the table or in a bin."""
+        if self.state is State.PLACED:
+            self.bin, self.reason, self.slot = "", "", None
         self.state, self.is_missing, self.change_count = State.DROPPED, True, change_count
         self.bin_log_odds.clear()
         self.belief.miss_probability = 1.0

@@ -135,7 +135,7 @@ class LookUpdate:
             if record not in updated_items:
                 record.belief.uncertain_look_count += 1
                 # A contradiction of the detected class is no evidence about an item of another class.
-                if observation.contradiction and observation.detection.label == record.look:
+                if observation.contradiction and observation.detection.label == record.detected_label:
                     record.contradiction_count += 1
                     record.last_contradiction = observation.contradiction
                 updated_items.append(record)

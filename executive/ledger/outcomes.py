@@ -86,7 +86,9 @@ def discard_moved_items(records: Collection[ItemRecord], dropped: Collection[Ite
             if item.first_stamp > lost_item.stamp
             and (item.has_appeared or (lost_item.is_missing and item.was_place_searched))
         )
-        if new_item := next((item for item in later_items if item.look == lost_item.look), None):
+        if new_item := next(
+            (item for item in later_items if item.detected_label == lost_item.detected_label), None
+        ):
             lost_item.set_state(State.PHANTOM, f"it is {new_item.item}")
             new_items.remove(new_item)
             phantoms.append(lost_item)

@@ -1,4 +1,4 @@
-"""Tracker of all items: record of looks and actions of the robot, and answers to queries of skills."""
+"""Tracker of all items: record of the looks and of the actions of the robot."""
 
 from __future__ import annotations
 
@@ -11,45 +11,29 @@ import numpy as np
 from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.detection import Detections, Observation
-from executive.cell.frame import Frame, FrameCaptured
+from executive.cell.frame import FrameCaptured
 from executive.cell.ledger import Presence
-from executive.cell.objects import Item, KnownItem, ObjectClass, Target
+from executive.cell.objects import Item, ObjectClass, Target
 from executive.cell.protocols import Routes
 from executive.cell.quotas import Quotas
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
 from executive.ledger import outcomes
-from executive.ledger.bin_contents import BinContents, find_probable_bin
+from executive.ledger.bin_contents import find_probable_bin
 from executive.ledger.bin_recovery import BinRecovery
-from executive.ledger.certainty import Certainty
-from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, ItemRecord, State
 from executive.ledger.look import LookUpdate, make_look_event
-from executive.ledger.records import ItemRecords
-from executive.ledger.staleness import Staleness
+from executive.ledger.queries import LedgerQueries
 from executive.ledger.verification import confirm_placed_items, verify
 from executive.perception.evidence import compute_weight_log_ratios, describe_weight
 
-MIN_LOG_RATIO_OF_WEIGHT = math.log(0.01)
-"""Minimum log likelihood ratio of a weight that agrees with the class of an item: prior odds that the item is
-an object of no declared class."""
 
-
-class Tracker:
+class Tracker(LedgerQueries):
     """Tracks each object from its first look to its final state; implements `executive.cell.ledger.Ledger`.
 
     A look is an image with its detections. The tracker owns the records of the items and emits each change of
     an item as an event. `Ledger` documents the methods in detail.
-
-    Args:
-        config: Thresholds of the ledger, from the cell file.
-        table: The workspace.
-        bins: Bins by name.
-        routes: Names of the permitted bins by class.
-        emit: Function that receives the events.
-        labels_with_unique_height: Classes whose height distinguishes them from all others.
-        quotas: Maximum numbers of objects in the bins; None: no quotas.
 
     Attributes:
         unknown_labels: Labels that are not in the cell file, each with its maximum number of boxes per frame.
@@ -57,31 +41,18 @@ class Tracker:
     """
 
     def __init__(
-        self, config: LedgerConfig, table: TableConfig, bins: Mapping[str, Bin], routes: Routes, emit: Emit,
-        labels_with_unique_height: Collection[str] = (), quotas: Quotas | None = None,
+        self, config: LedgerConfig, table: TableConfig, bins: Mapping[str, Bin],
+        classes: Mapping[str, ObjectClass], routes: Routes, quotas: Quotas, emit: Emit,
+        labels_with_unique_height: Collection[str] = (),
     ) -> None:  # fmt: skip
-        self._config, self._routes, self._emit = config, routes, emit
-        self._records = ItemRecords(emit)
-        self._certainty = Certainty(config, labels_with_unique_height)
-        self._bins = BinContents(config, bins, routes, self._records, quotas or Quotas())
-        self._coverage, self._staleness = Coverage(table), Staleness()
+        super().__init__(config, table, bins, classes, routes, quotas, emit, labels_with_unique_height)
         self._bin_recovery: BinRecovery | None = None
         """Recovery of the contents of the bins from `lose_track` to `record_bin_contents`; otherwise None."""
-        self._last_frame_id = self._last_turn = 0
+        self._last_frame_id = self._deferral_count = 0
         self._last_stamp = 0.0
         """Capture time of the last look [s]."""
         self.unknown_labels: Counter[str] = Counter()
         self.assumption_reasons: list[str] = []
-
-    @property
-    def records(self) -> Sequence[ItemRecord]:
-        """All items, in the order of the first detection."""
-        return list(self._records)
-
-    @property
-    def change_count(self) -> int:
-        """Number of actions of the robot so far that may have moved objects on the table."""
-        return self._staleness.change_count
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
         """Update all items with the detections in one frame, and return the targets."""
@@ -99,119 +70,12 @@ class Tracker:
         self._emit(make_look_event(detections, observations))
         return self.find_targets()
 
-    def find_targets(self) -> Sequence[Target]:
-        """Return a target for each item in the state SEEN that cannot have moved since its last detection."""
-        seen_items = self._records.filter_by_state(State.SEEN)
-        return [record.target for record in seen_items if self._staleness.is_unmoved(record)]
-
-    def find_objects_on_table(self) -> Sequence[Target]:
-        """Return all items that lie on the table with a probability of at least 0.5."""
-        items = [record for record in self._records.filter_by_state(*ON_TABLE) if record.belief.is_probable]
-        return [item.target for item in items if not self._certainty.is_position_empty(item)]
-
-    def find_uncertain_items(self) -> Sequence[Item]:
-        """Return the unsorted items in the workspace that are uncertain, or that may have been moved."""
-        possible_items = [record for record in self.records if self._certainty.may_be_on_table(record)]
-        workspace_items = [item for item in possible_items if self._coverage.is_in_workspace(item.position)]
-        unmoved_items = [record for record in workspace_items if self._staleness.is_unmoved(record)]
-        certain_items = [record for record in unmoved_items if self._certainty.is_certain(record)]
-        return [record.item for record in workspace_items if record not in certain_items]
-
-    def find_held_item(self) -> Item | None:
-        """Return the item in the tool, or None."""
-        return next((record.item for record in self._records.filter_by_state(State.HELD)), None)
-
-    def is_current(self, frame: Frame) -> bool:
-        """Return False if an action since a frame's capture may have moved objects anywhere on the table."""
-        return self._staleness.is_table_unchanged(frame.change_count)
-
-    def is_fresh(self, target: Target) -> bool:
-        """Return False if the robot may have moved a target since its last detection."""
-        return self._staleness.is_unchanged(target.position, target.change_count)
-
-    def is_open(self, item: Item) -> bool:
-        """Return True if an item still has to be sorted: it is on the table or dropped, and not rejected."""
-        record = self._records.find(item)
-        return record.state in (State.SEEN, State.DROPPED) and not record.reason
-
-    def is_placed(self, item: Item) -> bool:
-        """Return True if an item is in a bin."""
-        return self._records.find(item).state is State.PLACED
-
-    def is_certain(self, item: Item) -> bool:
-        """Return True if the existence, class and position of an item are certain enough to sort the item."""
-        return self._certainty.is_certain(self._records.find(item))
-
-    def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
-        """Return True if almost certainly no object that the mission still sorts is visible on the table.
-
-        `label` restricts the check to objects of one class; None: all classes with a route. The objects in
-        `ignored_items` may be on the table.
-        """
-        routed_labels = [routed_label for routed_label in self._routes if label in (None, routed_label)]
-        labels = [entry for entry in routed_labels if not self._bins.explain_exemption(entry)]
-        if routed_labels and not labels:
-            return True
-        if self._coverage.max_object_probability > self._config.max_miss_probability:
-            return False
-        records = (record for record in self.records if record.item not in ignored_items)
-        possible_items = [record for record in records if self._certainty.may_be_on_table(record)]
-        visible_items = [record for record in possible_items if self._coverage.is_visible(record.position)]
-        # An item without a confident detection counts as an object of every class.
-        return not any(item.label in labels or not item.belief.look_count for item in visible_items)
-
-    def is_weighed(self, item: Item) -> bool:
-        """Return True if the class of an item is certain according to its last weighing."""
-        belief = self._records.find(item).belief
-        fits = belief.weight_log_ratios.get(belief.label, -math.inf) >= MIN_LOG_RATIO_OF_WEIGHT
-        return fits and belief.class_error <= self._config.max_class_error
-
-    def get_label(self, item: Item) -> str:
-        """Return the most probable class of an item."""
-        return self._records.find(item).label
-
-    def describe(self, item: Item) -> KnownItem:
-        """Return the present knowledge about an item."""
-        return self._describe(self._records.find(item))
-
-    def list_known_items(self) -> Sequence[KnownItem]:
-        """Return all items that exist with a probability of at least 0.5, in the order of detection."""
-        records = (record for record in self._records if record.state is not State.PHANTOM)
-        return [self._describe(record) for record in records if record.belief.is_probable]
-
-    def count_attempts(self, item: Item) -> int:
-        """Return the number of failed attempts to pick an item."""
-        return self._records.find(item).attempt_count
-
-    def count_objects_in(self, bin: str, label: str | None = None) -> int:
-        """Return the number of objects in a bin; `label` restricts the count to one class."""
-        return self._bins.count_objects_in(bin, label)
-
-    def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
-        """Return the number of items in a state, of one class (`label`) and in one bin, or of all."""
-        items = self._records.filter_by_state(State(state))
-        return sum(label in (None, item.label) and bin in (None, item.bin) for item in items)
-
-    def explain_exemption(self, label: str) -> str:
-        """Return the reason why the mission does not sort further objects of a class, or ""."""
-        return self._bins.explain_exemption(label)
-
-    def count_used_slots(self, bin: str) -> int:
-        """Return the index of the next free slot of a bin."""
-        return self._bins.count_used_slots(bin)
-
-    def list_items_in(self, bin: str) -> Sequence[Item]:
-        """Return the items that were placed in a bin and are not gone."""
-        return [record.item for record in self._records if record.bin == bin]
-
     def verify(self, item: Item, detections: Detections, observations: Sequence[Observation]) -> Presence:
         """Return whether an item is at its place; the position of an item that is gone becomes unknown."""
         record = self._records.find(item)
         presence = verify(record, detections, observations, self._bins, self._config)
         if presence is Presence.GONE and record.state in (State.PLACED, *ON_TABLE):
-            if record.state is State.PLACED:
-                self._bins.take_out(record)
-            record.lose(self.change_count)
+            record.mark_as_missing(self.change_count)
             self._records.emit(record)
         return presence
 
@@ -234,13 +98,15 @@ class Tracker:
             return False
         return True
 
-    def record_weight(self, item: Item, weight: float, std: float, classes: Mapping[str, ObjectClass]) -> str:
+    def record_weight(self, item: Item, weight: float, std: float) -> str:
         """Update the class of an item by its weight, and return "" or a contradiction."""
-        record = self._records.find(item)
+        record, classes = self._records.find(item), self._classes
         log_ratios = compute_weight_log_ratios(weight, std, classes)
-        record.belief.add_weight(log_ratios, {label: other.look for label, other in classes.items()})
+        record.belief.add_weight(
+            log_ratios, {label: other.detected_label for label, other in classes.items()}
+        )
         contradiction = ""
-        if not self.is_weighed(item):
+        if not self._is_weighed(record):
             contradiction = record.last_contradiction = describe_weight(weight, record.label, classes)
         self._records.emit(record)
         return contradiction
@@ -310,8 +176,8 @@ class Tracker:
     def defer(self, item: Item) -> None:
         """Move an item behind all others; it stays open."""
         record = self._records.find(item)
-        self._last_turn += 1
-        record.turn = self._last_turn
+        self._deferral_count += 1
+        record.deferral_rank = self._deferral_count
         record.deferral_count += 1
 
     def invalidate_positions(self) -> None:
@@ -342,7 +208,7 @@ class Tracker:
         ]
         for record in self.records:
             final_state = outcomes.find_final_state(
-                record, self._certainty, exemption=self._bins.explain_exemption(record.label),
+                record, self._certainty, exemption=self._explain_exemption(record),
                 is_completed=completed, has_touched_item=has_touched_item,
             )  # fmt: skip
             if bin := find_probable_bin(record):
@@ -380,9 +246,6 @@ class Tracker:
         elif detections.view == "full":
             confirm_placed_items(detections, observations, self._bins, self._config)
             self._records.emit(*self._bins.place_dropped_items(detections, bin_names))
-
-    def _describe(self, record: ItemRecord) -> KnownItem:
-        return record.describe(is_exempt=bool(self._bins.explain_exemption(record.label)))
 
     def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
         """Set items to DROPPED, so that later looks search for them on the table and in the bins."""

@@ -77,10 +77,10 @@ def _find_presence_in_bin(
     if not bins.is_floor_visible(record.bin, look):
         return Presence.HIDDEN
     items = [item for item in bins.records if item.bin == record.bin]
-    same_class = [item for item in items if item.look == record.look]
+    same_class = [item for item in items if item.detected_label == record.detected_label]
     bias_std = look.error_rates.bias
     shown = [entry for entry in observations if bins.find_bin_name(entry, bias_std) == record.bin]
-    same_look = [entry for entry in shown if entry.detection.label == record.look]
+    same_look = [entry for entry in shown if entry.detection.label == record.detected_label]
     confident = [entry for entry in same_look if entry.is_confident]
 
     def measure_distance(item: ItemRecord, entries: Sequence[Observation]) -> float:

@@ -16,7 +16,7 @@ class LookingSkill(Skill):
 
     detector: str = param("", refers_to="detector", doc="a detector of the cell; empty: the first detector")
     view: str = param("table", choices=("table", "full"), doc="`table`: the workspace; `full`: entire image")
-    reasons: ClassVar = ("unavailable", "crowded", "camera_moved")
+    reasons: ClassVar[tuple[str, ...]] = ("unavailable", "crowded", "camera_moved")
     uses: ClassVar = ("camera",)
     senses: ClassVar = True
 

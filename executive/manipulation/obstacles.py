@@ -31,27 +31,23 @@ def is_detection_in_bin(cell: Cell, detection: Detection, frame: Frame) -> bool:
     return any(bin.contains(position, BIN_THICKNESS) for bin in cell.bins.values())
 
 
-def predict_object_count(
-    cell: Cell, bin_name: str, excluded_item: Item | None = None, *, label: str | None = None
-) -> int:
+def predict_object_count(cell: Cell, bin_name: str, label: str | None = None) -> int:
     """Return the number of objects in a bin, including an item that the arm is moving into the bin.
 
-    A plan with this number remains valid after the release. A moving `excluded_item` is not counted. `label`
-    restricts the count to one class.
+    `label` restricts the count to one class.
     """
-    held_item = cell.ledger.find_held_item()
-    is_counted = held_item is not None and held_item != excluded_item
-    if held_item is not None and label is not None:
-        is_counted = is_counted and cell.ledger.get_label(held_item) == label
-    # Without a moving item, the destination is not read, because each reading of the cell is recorded.
-    arriving_count = 1 if is_counted and cell.bins[bin_name].contains(cell.arm.destination) else 0
-    return cell.ledger.count_objects_in(bin_name, label) + arriving_count
+    arriving_item = _find_arriving_item(cell, bin_name)
+    is_counted = arriving_item is not None and label in (None, cell.ledger.get_label(arriving_item))
+    return cell.ledger.count_objects_in(bin_name, label) + is_counted
 
 
 def predict_used_slots(cell: Cell, bin_name: str, excluded_item: Item | None = None) -> int:
-    """Return the number of used slots of a bin, as `predict_object_count` returns the number of objects."""
-    vacated_count = cell.ledger.count_used_slots(bin_name) - cell.ledger.count_objects_in(bin_name)
-    return vacated_count + predict_object_count(cell, bin_name, excluded_item)
+    """Return the index of the next free slot of a bin, after the release of an item that the arm is moving.
+
+    A plan with this number remains valid after the release. A moving `excluded_item` uses no slot.
+    """
+    arriving_item = _find_arriving_item(cell, bin_name, excluded_item)
+    return cell.ledger.count_used_slots(bin_name) + (arriving_item is not None)
 
 
 def make_obstacle(cell: Cell, target: Target) -> Obstacle:
@@ -69,6 +65,15 @@ def find_max_object_height(cell: Cell) -> float:
 def compute_layer_height(bin: Bin, layer: int, max_object_height: float) -> float:
     """Return the height of the underside of a layer of objects in a bin [m]; layer 0 lies on the floor."""
     return float(bin.position[2]) + BIN_THICKNESS + layer * max_object_height
+
+
+def _find_arriving_item(cell: Cell, bin_name: str, excluded_item: Item | None = None) -> Item | None:
+    """Return the item that the arm is moving into a bin, or None; None also for `excluded_item`."""
+    held_item = cell.ledger.find_held_item()
+    # Without a moving item, the destination is not read, because each reading of the cell is recorded.
+    if held_item in (None, excluded_item) or not cell.bins[bin_name].contains(cell.arm.destination):
+        return None
+    return held_item
 
 
 def _list_bin_obstacles(cell: Cell, excluded_item: Item | None) -> Iterator[Obstacle]:

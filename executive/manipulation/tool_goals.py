@@ -56,7 +56,7 @@ def make_approach(
     """
     goal = make_object_goal(
         cell.classes[target.label], target.position, cell.descent, cell.descent_speed,
-        failed_attempts=cell.ledger.count_attempts(target.item), overtravel=overtravel, spacing=spacing,
+        failed_attempts=cell.ledger.describe(target.item).attempts, overtravel=overtravel, spacing=spacing,
     )  # fmt: skip
     return goal, Task(obstacles=list_obstacles(cell, target.item), target=make_obstacle(cell, target))
 
@@ -105,41 +105,41 @@ def compute_min_contact_height(object_class: ObjectClass, centre_height: float, 
 def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]:
     """Return the targets that can be picked, sorted by their distance from the destination of the arm.
 
-    A target can be picked if its item is unsorted and certain, its class has a bin below its quota, and its
-    position is still valid.
+    A target can be picked if its item is open and certain, a bin below its quota is permitted for the item,
+    and its position is still valid.
     """
     ledger, destination = cell.ledger, cell.arm.destination[:2]
     pickable_targets = [
         target
         for target in targets
-        if ledger.is_open(target.item)
+        if ledger.describe(target.item).is_open
         and ledger.is_fresh(target)
         and ledger.is_certain(target.item)
-        and list_free_bins(cell, ledger.get_label(target.item))
+        and choose_bin(cell, target.item)
     ]
     offsets = {target.item: target.position[:2] - destination for target in pickable_targets}
     return sorted(pickable_targets, key=lambda target: (np.linalg.norm(offsets[target.item]), target.item))
 
 
-def list_free_bins(cell: Cell, label: str) -> list[str]:
-    """Return the names of the permitted bins of a class whose quota is not reached.
+def choose_bin(cell: Cell, item: Item) -> str | None:
+    """Return the first free bin with a quota, else the free bin with the fewest objects, or None.
 
-    An item that the arm is moving into a bin counts as an object in the bin.
+    A bin is free if it is permitted for the class of the item, and its quota is not reached. An item that the
+    arm is moving into a bin counts as an object in the bin. If the class of an unweighed item has no free
+    bin, the bin is one of a class that looks alike.
     """
 
-    def count_objects(bin_name: str, counted_label: str | None) -> int:
-        return predict_object_count(cell, bin_name, label=counted_label)
+    def count_objects(bin_name: str, label: str | None) -> int:
+        return predict_object_count(cell, bin_name, label)
 
-    bin_names = cell.routes.get(label, ())
-    return [name for name in bin_names if not cell.quotas.is_reached(name, label, count_objects)]
-
-
-def choose_bin(cell: Cell, label: str) -> str | None:
-    """Return the first free bin with a quota, else the free bin with the fewest objects, or None."""
-    bins = list_free_bins(cell, label)
-    limited_bins = (bin for bin in bins if cell.quotas.is_limited(bin, label))
-    fewest = min(bins, key=lambda bin: predict_object_count(cell, bin), default=None)
-    return next(limited_bins, fewest)
+    for label in cell.ledger.list_possible_labels(item):
+        bins = cell.routes.get(label, ())
+        if free_bins := [bin for bin in bins if not cell.quotas.is_reached(bin, label, count_objects)]:
+            limited_bins = (
+                bin for bin in free_bins if {(bin, None), (bin, label)} & cell.quotas.limits.keys()
+            )
+            return next(limited_bins, min(free_bins, key=lambda bin: predict_object_count(cell, bin)))
+    return None
 
 
 def explain_uncertain_bin(cell: Cell, bin_name: str, item: Item) -> str:
@@ -148,10 +148,10 @@ def explain_uncertain_bin(cell: Cell, bin_name: str, item: Item) -> str:
     Several classes look like the item, the bin is permitted for a part of them, and no weighing made the
     class certain. A bin that is permitted for none of these classes is a decision of the mission.
     """
-    look = cell.classes[cell.ledger.get_label(item)].look
-    labels = [label for label, other in cell.classes.items() if other.look == look]
+    possible_labels = cell.ledger.list_possible_labels(item)
+    labels = [label for label in cell.classes if label in possible_labels]
     other_labels = [label for label in labels if bin_name not in cell.routes.get(label, ())]
-    if len(other_labels) in (0, len(labels)) or cell.ledger.is_weighed(item):
+    if len(other_labels) in (0, len(labels)):
         return ""
     return (
         f"{item} may be a {' or a '.join(labels)}, which look alike, and {bin_name} is not permitted for a "

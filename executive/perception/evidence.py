@@ -88,8 +88,8 @@ def compute_weight_log_ratios(
 
 def describe_weight(weight: float, label: str, classes: Mapping[str, ObjectClass]) -> str:
     """Return a sentence with a weight [N], and with the weights of the classes that look like `label`."""
-    look = classes[label].look
-    similar_classes = [object_class for object_class in classes.values() if object_class.look == look]
+    detected_label = classes[label].detected_label
+    similar_classes = [other for other in classes.values() if other.detected_label == detected_label]
     weights = " and ".join(f"a {other.label} {other.mass * GRAVITY:.2f} N" for other in similar_classes)
     return f"it weighs {weight:.2f} N, and {weights}"
 

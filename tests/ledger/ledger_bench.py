@@ -12,7 +12,8 @@ from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.detection import Detection, Detections, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
-from executive.cell.objects import Target
+from executive.cell.objects import ObjectClass, Target
+from executive.cell.quotas import Quotas
 from executive.events import Event
 from executive.ledger.tracker import Tracker
 from tests.camera_poses import looking_down
@@ -42,7 +43,9 @@ def area_of(view: str) -> tuple[float, float, float, float]:
 class Bench:
     """A ledger with a camera above it that sees exactly what a test says."""
 
-    def __init__(self, labels_with_unique_height: Sequence[str] = ()) -> None:
+    def __init__(
+        self, labels_with_unique_height: Sequence[str] = (), classes: dict[str, ObjectClass] | None = None
+    ) -> None:
         self.config = LedgerConfig()
         self.events: list[Event] = []
         size = np.array([0.22, 0.24, 0.06])
@@ -56,7 +59,9 @@ class Bench:
             self.config,
             TableConfig(),
             bins,
+            classes or {},
             {"cube": ("red_bin", "pink_bin")},
+            Quotas({}),
             self.events.append,
             labels_with_unique_height,
         )

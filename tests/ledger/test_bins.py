@@ -38,7 +38,7 @@ def test_what_came_down_in_its_bin_is_there_though_no_look_shows_it(
     assert bench.end() == {"cube-1": final}
     why = "it probably fell into the bin" if final[0] == "placed" else final[1]
     assert bench.ledger.list_items()[0].reason == why
-    assert bench.ledger.count_attempts("cube-1") == 1
+    assert bench.ledger.describe("cube-1").attempts == 1
 
 
 def test_dropped_again_elsewhere_it_is_not_sought_where_it_fell_first(bench: Bench) -> None:
@@ -81,9 +81,9 @@ def test_what_leans_on_the_wall_of_its_bin_is_in_it_and_what_lies_beside_it_is_n
 def test_what_was_given_up_is_found_in_its_bin_all_the_same(bench: Bench) -> None:
     bench.look(CUBE)
     bench.drop("cube-1")
-    assert bench.ledger.is_open("cube-1")
+    assert bench.ledger.describe("cube-1").state == "lost"
     bench.ledger.reject("cube-1", "12 attempts failed")
-    assert not bench.ledger.is_open("cube-1")
+    assert bench.ledger.describe("cube-1").state == "rejected"
     bench.look(IN_RED, view="full")
     assert bench.states() == {"cube-1": ("placed", "red_bin")}
 

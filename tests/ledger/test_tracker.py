@@ -55,7 +55,7 @@ def test_what_the_robot_does_puts_places_in_doubt(bench: Bench, event: str, far_
     getattr(bench.ledger, event)(*(() if event == "invalidate_positions" else ("cube-1",)))
     assert not bench.ledger.is_fresh(near)
     assert bench.ledger.is_fresh(far) is far_is_fresh
-    assert bench.ledger.count_attempts("cube-1") == (event == "record_miss")
+    assert bench.ledger.describe("cube-1").attempts == (event == "record_miss")
 
 
 def test_a_pick_puts_in_doubt_what_is_nearer_than_seven_centimetres(bench: Bench) -> None:
@@ -419,7 +419,7 @@ def test_a_phantom_that_the_tool_tried_to_pick_may_turn_up_elsewhere(bench: Benc
     assert bench.states() == {"cube-1": PHANTOM}
     for _ in range(2):
         bench.look(("cube", 0.55, 0.05))
-    assert (bench.states()["cube-1"], bench.ledger.count_attempts("cube-1")) == (("seen", ""), 1)
+    assert (bench.states()["cube-1"], bench.ledger.describe("cube-1").attempts) == (("seen", ""), 1)
 
 
 def put_away(bench: Bench, *still_there: Thing) -> None:

@@ -48,7 +48,7 @@ def test_a_detection_between_two_misses_refutes_the_first_one(placed: Bench) -> 
 
 def test_an_item_that_is_gone_is_open_and_not_placed(gone: Bench) -> None:
     assert gone.states() == {"cube-1": ("dropped", "")}
-    assert gone.ledger.is_open("cube-1")
+    assert gone.ledger.describe("cube-1").state == "lost"
     assert gone.ledger.count_objects_in("red_bin") == 0
 
 

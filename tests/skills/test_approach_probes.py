@@ -64,4 +64,4 @@ def test_a_touch_that_only_the_fourth_attempt_can_make_is_no_touch_of_the_target
     thing.position[2] = -0.005
     result = run_skill(Approach(target=replace(target, change_count=fake.ledger.change_count)), fake)
     assert (result.reason, result.message[: len(message)]) == (reason, message)
-    assert fake.ledger.count_attempts(target.item) == (4 if is_touched else 3)
+    assert fake.ledger.describe(target.item).attempts == (4 if is_touched else 3)

@@ -30,8 +30,8 @@ def test_an_object_that_the_ledger_does_not_know_is_released(fake: FakeCell, hel
 def test_what_should_be_in_the_tool_and_is_not_was_dropped(fake: FakeCell, held: str) -> None:
     fake.tool.open()
     assert run_skill(ConfirmGrasp(), fake).message == f"the sensor detects no seal; {held} was dropped"
-    ledger = fake.ledger
-    assert (ledger.find_held_item(), ledger.is_open(held), ledger.count_attempts(held)) == (None, True, 1)
+    known = fake.ledger.describe(held)
+    assert (fake.ledger.find_held_item(), known.state, known.attempts) == (None, "lost", 1)
 
 
 def test_an_object_that_the_ledger_does_not_know_may_fall_on_others(fake: FakeCell, held: str) -> None:

@@ -42,7 +42,7 @@ def test_a_placed_item_that_someone_takes_away_is_gone(
     result = look_at(fake, **settings)
     assert (result.reason, result.message) == ("gone", "not at its place any more: cube-1")
     assert result.commands.count("camera.capture") == 2, "one miss is no proof"
-    assert fake.ledger.is_open("cube-1")
+    assert fake.ledger.describe("cube-1").state == "lost"
 
 
 def test_an_item_that_is_gone_keeps_its_name_where_the_next_look_finds_it(

@@ -70,7 +70,7 @@ def test_an_approach_that_meets_something_else_says_what(
     change(fake)
     result = run_skill(Approach(target=target), fake)
     assert (result.reason, result.message) == (reason, message)
-    assert (fake.ledger.count_attempts("cube-1"), fake.ledger.is_fresh(target)) == (attempts, is_fresh)
+    assert (fake.ledger.describe("cube-1").attempts, fake.ledger.is_fresh(target)) == (attempts, is_fresh)
 
 
 def test_it_does_not_go_where_something_may_have_moved_since(fake: FakeCell, target: Target) -> None:
@@ -117,7 +117,7 @@ def test_what_fell_before_it_was_let_go_is_not_placed(fake: FakeCell, held: str)
 
 
 def test_grasp_holds_and_the_ledger_knows(fake: FakeCell, held: str) -> None:
-    assert (held, fake.tool.holding, fake.ledger.is_open("cube-1")) == ("cube-1", True, False)
+    assert (held, fake.tool.holding, fake.ledger.describe("cube-1").state) == ("cube-1", True, "held")
 
 
 def test_a_grasp_without_a_seal_is_missed_and_lets_go(fake: FakeCell, target: Target) -> None:
@@ -133,7 +133,7 @@ def test_a_halted_grasp_leaves_nothing_in_the_tool_that_the_ledger_does_not_know
 ) -> None:
     run_skill(Approach(target=target), fake)
     assert run_skill(Grasp(target=target), fake, halt_at=10).status == "HALTED"
-    assert (fake.tool.holding, fake.ledger.is_open("cube-1")) == (False, True)
+    assert (fake.tool.holding, fake.ledger.describe("cube-1").state) == (False, "open")
 
 
 def test_items_hang_over_one_slot_after_the_other_and_are_placed(
@@ -160,7 +160,7 @@ def test_a_seal_that_breaks_on_the_way_is_dropped_and_the_arm_stops(fake: FakeCe
             next(steps)
             fake.advance()
     assert fake.arm.at_rest
-    assert fake.ledger.is_open("cube-1"), "a dropped item is looked for again"
+    assert fake.ledger.describe("cube-1").state == "lost", "a dropped item is looked for again"
 
 
 def test_what_does_not_come_off_is_stuck_and_not_placed(
@@ -177,10 +177,10 @@ def test_what_does_not_come_off_is_stuck_and_not_placed(
 def test_an_item_is_given_up_with_its_reason_after_the_failures_the_mission_grants(
     fake: FakeCell, target: Target
 ) -> None:
-    for failures, is_open in ((1, True), (2, False)):
+    for failures, state in ((1, "open"), (2, "rejected")):
         fake.ledger.record_miss("cube-1")
         run_skill(RejectTarget(item="cube-1", after=2), fake)
-        assert fake.ledger.is_open("cube-1") is is_open, failures
+        assert fake.ledger.describe("cube-1").state == state, failures
     assert fake.ledger.list_items()[0].reason == "could not be picked (2 failed attempts)"
 
 

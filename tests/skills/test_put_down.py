@@ -42,8 +42,8 @@ def test_what_falls_on_the_way_is_dropped_where_the_arm_stops(fake: FakeCell, he
     )
     assert fake.arm.at_rest
     assert fake.arm.tool_pose.position[1] == pytest.approx(-0.1, abs=0.01)
-    ledger = fake.ledger
-    assert (ledger.find_held_item(), ledger.count_attempts(held), ledger.is_open(held)) == (None, 1, True)
+    known = fake.ledger.describe(held)
+    assert (fake.ledger.find_held_item(), known.attempts, known.state) == (None, 1, "lost")
 
 
 def test_what_is_torn_off_by_running_into_something_is_dropped(fake: FakeCell, held: str) -> None:

@@ -88,7 +88,7 @@ def test_without_a_free_quota_no_candidate_is_left_at_once() -> None:
 def test_a_surplus_item_that_is_requested_again_is_skipped() -> None:
     fake = make_cell({("red_bin", "sphere"): 1}, "sphere", "sphere")
     place_all(fake, look(fake))
-    placed, surplus = sorted(("sphere-1", "sphere-2"), key=fake.ledger.is_open)
+    placed, surplus = sorted(("sphere-1", "sphere-2"), key=lambda item: fake.ledger.describe(item).state)
     expected = {
         placed: f"{placed} is placed",
         surplus: f"{surplus} is skipped: the quota of red_bin is reached",

@@ -1,0 +1,169 @@
+"""Answers of the ledger to skills: which items exist, where they are, and how certain that is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+
+from executive.cell.bins import Bin
+from executive.cell.config import LedgerConfig, TableConfig
+from executive.cell.frame import Frame
+from executive.cell.objects import Item, KnownItem, ObjectClass, Target
+from executive.cell.protocols import Routes
+from executive.cell.quotas import Quotas
+from executive.events import Emit
+from executive.ledger.bin_contents import BinContents
+from executive.ledger.certainty import Certainty
+from executive.ledger.coverage import Coverage
+from executive.ledger.item import ON_TABLE, ItemRecord, State
+from executive.ledger.records import ItemRecords
+from executive.ledger.staleness import Staleness
+
+MIN_LOG_RATIO_OF_WEIGHT = math.log(0.01)
+"""Minimum log likelihood ratio of a weight that agrees with the class of an item: prior odds that the item is
+an object of no declared class."""
+
+
+class LedgerQueries:
+    """Items of a run, and answers to queries that change nothing; `Tracker` adds the changes.
+
+    `executive.cell.ledger.Ledger` documents the methods in detail.
+
+    Args:
+        config: Thresholds of the ledger, from the cell file.
+        table: The workspace.
+        bins: Bins by name.
+        classes: Classes of the cell by label.
+        routes: Names of the permitted bins by class.
+        quotas: Maximum numbers of objects in the bins.
+        emit: Function that receives the events.
+        labels_with_unique_height: Classes whose height distinguishes them from all others.
+    """
+
+    def __init__(
+        self, config: LedgerConfig, table: TableConfig, bins: Mapping[str, Bin],
+        classes: Mapping[str, ObjectClass], routes: Routes, quotas: Quotas, emit: Emit,
+        labels_with_unique_height: Collection[str],
+    ) -> None:  # fmt: skip
+        self._config, self._classes, self._routes, self._emit = config, classes, routes, emit
+        self._records = ItemRecords(emit)
+        self._certainty = Certainty(config, labels_with_unique_height)
+        self._bins = BinContents(config, bins, routes, self._records, quotas)
+        self._coverage, self._staleness = Coverage(table), Staleness()
+
+    @property
+    def records(self) -> Sequence[ItemRecord]:
+        """All items, in the order of the first detection."""
+        return list(self._records)
+
+    @property
+    def change_count(self) -> int:
+        """Number of actions of the robot so far that may have moved objects on the table."""
+        return self._staleness.change_count
+
+    def find_targets(self) -> Sequence[Target]:
+        """Return a target for each item in the state SEEN that cannot have moved since its last detection."""
+        seen_items = self._records.filter_by_state(State.SEEN)
+        return [record.target for record in seen_items if self._staleness.is_unmoved(record)]
+
+    def find_objects_on_table(self) -> Sequence[Target]:
+        """Return all items that lie on the table with a probability of at least 0.5."""
+        items = [record for record in self._records.filter_by_state(*ON_TABLE) if record.belief.is_probable]
+        return [item.target for item in items if not self._certainty.is_position_empty(item)]
+
+    def find_uncertain_items(self) -> Sequence[Item]:
+        """Return the unsorted items in the workspace that are uncertain, or that may have been moved."""
+        possible_items = [record for record in self.records if self._certainty.may_be_on_table(record)]
+        workspace_items = [item for item in possible_items if self._coverage.is_in_workspace(item.position)]
+        unmoved_items = [record for record in workspace_items if self._staleness.is_unmoved(record)]
+        certain_items = [record for record in unmoved_items if self._certainty.is_certain(record)]
+        return [record.item for record in workspace_items if record not in certain_items]
+
+    def find_held_item(self) -> Item | None:
+        """Return the item in the tool, or None."""
+        return next((record.item for record in self._records.filter_by_state(State.HELD)), None)
+
+    def is_current(self, frame: Frame) -> bool:
+        """Return False if an action since a frame's capture may have moved objects anywhere on the table."""
+        return self._staleness.is_table_unchanged(frame.change_count)
+
+    def is_fresh(self, target: Target) -> bool:
+        """Return False if the robot may have moved a target since its last detection."""
+        return self._staleness.is_unchanged(target.position, target.change_count)
+
+    def is_certain(self, item: Item) -> bool:
+        """Return True if the existence, class and position of an item are certain enough to sort the item."""
+        return self._certainty.is_certain(self._records.find(item))
+
+    def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
+        """Return True if almost certainly no object that the mission still sorts is visible on the table.
+
+        `label` restricts the check to objects of one class; None: all classes with a route. The objects in
+        `ignored_items` may be on the table.
+        """
+        routed_labels = [routed_label for routed_label in self._routes if label in (None, routed_label)]
+        labels = {entry for entry in routed_labels if not self._bins.explain_exemption(entry)}
+        if routed_labels and not labels:
+            return True
+        if self._coverage.max_object_probability > self._config.max_miss_probability:
+            return False
+        records = (record for record in self.records if record.item not in ignored_items)
+        possible_items = [record for record in records if self._certainty.may_be_on_table(record)]
+        visible_items = [record for record in possible_items if self._coverage.is_visible(record.position)]
+        # An item without a confident detection counts as an object of every class.
+        return not any(
+            labels.intersection(self.list_possible_labels(record.item)) or not record.belief.look_count
+            for record in visible_items
+        )
+
+    def get_label(self, item: Item) -> str:
+        """Return the most probable class of an item."""
+        return self._records.find(item).label
+
+    def list_possible_labels(self, item: Item) -> Sequence[str]:
+        """Return the classes of an item that a weighing may find, the most probable class first."""
+        record = self._records.find(item)
+        if self._is_weighed(record):
+            return [record.label]
+        similar_classes = (
+            other for other in self._classes.values() if other.detected_label == record.detected_label
+        )
+        return [record.label, *(other.label for other in similar_classes if other.label != record.label)]
+
+    def describe(self, item: Item) -> KnownItem:
+        """Return the present knowledge about an item."""
+        record = self._records.find(item)
+        return record.describe(is_exempt=bool(self._explain_exemption(record)))
+
+    def list_known_items(self) -> Sequence[KnownItem]:
+        """Return all items that exist with a probability of at least 0.5, in the order of detection."""
+        records = (record for record in self._records if record.state is not State.PHANTOM)
+        return [self.describe(record.item) for record in records if record.belief.is_probable]
+
+    def count_objects_in(self, bin: str, label: str | None = None) -> int:
+        """Return the number of objects in a bin; `label` restricts the count to one class."""
+        return self._bins.count_objects_in(bin, label)
+
+    def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
+        """Return the number of known items in a state, of one class (`label`) and in one bin, or of all."""
+        items = (item for item in self.list_known_items() if item.state == state)
+        return sum(label in (None, item.label) and bin in (None, item.bin) for item in items)
+
+    def count_used_slots(self, bin: str) -> int:
+        """Return the index of the next free slot of a bin."""
+        return self._bins.count_used_slots(bin)
+
+    def explain_exemption(self, label: str) -> str:
+        """Return the reason why the mission does not sort further objects of a class, or ""."""
+        return self._bins.explain_exemption(label)
+
+    def _explain_exemption(self, record: ItemRecord) -> str:
+        """Return the reason why the mission does not sort an item, whatever a weighing would find, or ""."""
+        reasons = [self._bins.explain_exemption(label) for label in self.list_possible_labels(record.item)]
+        return reasons[0] if all(reasons) else ""
+
+    def _is_weighed(self, record: ItemRecord) -> bool:
+        """Return True if the class of an item is certain according to its last weighing."""
+        belief = record.belief
+        fits = belief.weight_log_ratios.get(belief.label, -math.inf) >= MIN_LOG_RATIO_OF_WEIGHT
+        return fits and belief.class_error <= self._config.max_class_error
