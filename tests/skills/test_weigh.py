@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import at_hand
 import pytest
 
-from executive.cells.fake.cell import FakeCell, load_empty_cell
+from executive.cell.quotas import Quotas
+from executive.cell.workcell import CellOptions
+from executive.cells.fake.cell import FakeCell, SilentOperator, load_empty_cell
 from executive.geometry import GRAVITY
 from executive.skill import SkillFailed
 from executive.testing.run_skill import SkillResult, run_skill
@@ -16,14 +20,17 @@ from skills.weigh import Weigh
 ROUTES = {"bottle": ("red_bin",), "full_bottle": ("blue_bin",), "jar": ("yellow_bin",), "duck": ("red_bin",)}
 
 
-def make_fake(routes: dict[str, tuple[str, ...]] = ROUTES) -> FakeCell:
+def make_fake(
+    routes: dict[str, tuple[str, ...]] = ROUTES, limits: dict[tuple[str, str | None], int] | None = None
+) -> FakeCell:
     """A fake cell with empty and full bottles, which look alike, and jars, which weigh as full bottles."""
     config = load_empty_cell()
     bottle = config.objects["cube"].model_copy(update={"mass": 0.05})
     full = bottle.model_copy(update={"mass": 0.20, "looks_like": "bottle"})
     jar = bottle.model_copy(update={"mass": 0.20})
     objects = {"bottle": bottle, "full_bottle": full, "jar": jar, "duck": config.objects["duck"]}
-    return FakeCell(config.model_copy(update={"objects": objects}), routes=routes)
+    options = CellOptions(SilentOperator(), cell_folder=Path(), quotas=Quotas(limits or {}))
+    return FakeCell(config.model_copy(update={"objects": objects}), routes=routes, options=options)
 
 
 def pick(fake: FakeCell, label: str) -> str:
@@ -135,6 +142,22 @@ def test_a_look_alike_in_the_list_may_be_of_the_wanted_class() -> None:
     assert run_skill(select, fake).reason == "unseen"
     fake.ledger.reject("bottle-1", "slippery")
     assert run_skill(select, fake).reason == "no_candidate"
+
+
+def test_a_reached_quota_of_one_class_does_not_exempt_its_look_alikes_before_they_are_weighed() -> None:
+    fake = make_fake(limits={("red_bin", None): 1})
+    fake.ledger.record_placement(pick(fake, "bottle"), "red_bin")
+    fake.tool.open()
+    fake.world.objects.clear()
+    fake.world.put("bottle", 0.5, 0.1)
+    targets = [at_hand.look(fake, "full") for _ in range(4)][-1]
+    result = run_skill(SelectTarget(targets=targets), fake)
+    assert (result.outputs["item"], result.outputs["bin"]) == ("bottle-2", "blue_bin")
+    assert not fake.ledger.is_table_empty()
+    assert fake.ledger.describe("bottle-2").state == "open"
+    assert weigh(fake, at_hand.pick(fake, result.outputs["target"])).reason == "no_bin"
+    fake.ledger.record_put_down("bottle-2", targets[0].position)
+    assert fake.ledger.describe("bottle-2").state == "skipped"
 
 
 def test_an_item_that_falls_during_the_measurement_is_dropped_and_not_weighed() -> None:
