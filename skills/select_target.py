@@ -51,8 +51,8 @@ class SelectTarget(Skill):
             raise self._explain_missing_candidate(cell)
         # The candidates are sorted by distance, and `min` returns the first of equal ones.
         best = min(candidates, key=lambda target: self._rank(cell, target))
-        rank = cell.ledger.describe(best.item).deferral_rank
-        if rank and (names := self._list_uncertain(cell, rank)):
+        turn = cell.ledger.describe(best.item).turn
+        if turn and (names := self._list_uncertain(cell, turn)):
             message = f"{best.item} is deferred, and not enough looks agree on {names} yet; look again"
             raise self.failure("doubtful", message)
         self.target, self.item = best, best.item
@@ -65,8 +65,8 @@ class SelectTarget(Skill):
         """Return the sort key of a candidate; the smallest key comes first."""
         known = cell.ledger.describe(target.item)
         if self.prefer == "surest":
-            return known.deferral_rank, -target.confidence, target.item
-        return known.deferral_rank, known.attempts if self.prefer == "least_tried" else 0
+            return known.turn, -target.confidence, target.item
+        return known.turn, known.attempts if self.prefer == "least_tried" else 0
 
     def _is_permitted(self, cell: Cell, item: Item) -> bool:
         """Return True if the mission permits an item of any class, and a bin for the item is free."""
@@ -76,10 +76,10 @@ class SelectTarget(Skill):
     def _is_requested(self, cell: Cell, item: Item) -> bool:
         return self.wanted in (None, cell.ledger.get_label(item)) and self._is_permitted(cell, item)
 
-    def _list_uncertain(self, cell: Cell, max_rank: float = math.inf) -> str:
-        """Return the requested items before a deferral rank on which not enough looks agree, with commas."""
+    def _list_uncertain(self, cell: Cell, max_turn: float = math.inf) -> str:
+        """Return the requested items before `max_turn` on which not enough looks agree, with commas."""
         items = (item for item in cell.ledger.find_uncertain_items() if self._is_requested(cell, item))
-        return ", ".join(item for item in items if cell.ledger.describe(item).deferral_rank < max_rank)
+        return ", ".join(item for item in items if cell.ledger.describe(item).turn < max_turn)
 
     def _is_nothing_left(self, cell: Cell) -> bool:
         """Return True if no requested item is left, or if none of the items in `among` is open or lost.

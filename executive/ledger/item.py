@@ -87,7 +87,7 @@ class ItemRecord:
         bin_log_odds: Log odds, by bin, that the dropped item lies in the bin.
         is_untracked: True if the tool may have moved the item while the journal was incomplete.
         deferral_count: Number of times that the item was deferred.
-        deferral_rank: Rank among the deferred items; 0 if the item is not deferred.
+        turn: Rank among the deferred items; 0 if the item is not deferred.
         is_missing: True for a dropped item that someone, and not the tool, took from its place.
         slot: Index of the slot of the bin over which the item was released, or None.
     """
@@ -120,7 +120,7 @@ class ItemRecord:
     bin_log_odds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     is_untracked: bool = False
     deferral_count: int = 0
-    deferral_rank: int = 0
+    turn: int = 0
     is_missing: bool = False
     slot: int | None = None
 
@@ -159,10 +159,10 @@ class ItemRecord:
         if self.state is State.DROPPED:
             state = State.REJECTED.value if self.reason else State.LOST.value
         elif self.state is State.SEEN:
-            state = State.SKIPPED.value if is_exempt else "deferred" if self.deferral_rank else "open"
+            state = State.SKIPPED.value if is_exempt else "deferred" if self.turn else "open"
         return KnownItem(
             self.item, self.label, state, self.bin, self.position, self.attempt_count, self.deferral_count,
-            self.deferral_rank,
+            self.turn,
         )  # fmt: skip
 
     def distance_to(self, position: Array) -> float:

@@ -177,7 +177,7 @@ class Tracker(LedgerQueries):
         """Move an item behind all others; it stays open."""
         record = self._records.find(item)
         self._deferral_count += 1
-        record.deferral_rank = self._deferral_count
+        record.turn = self._deferral_count
         record.deferral_count += 1
 
     def invalidate_positions(self) -> None:

@@ -155,6 +155,19 @@ def test_the_slot_of_an_item_that_is_gone_stays_used_until_the_bin_is_empty(plac
     assert (placed.ledger.count_objects_in("red_bin"), placed.ledger.count_used_slots("red_bin")) == (0, 0)
 
 
+def test_an_item_that_was_taken_for_gone_and_is_shown_again_uses_no_second_slot(placed: Bench) -> None:
+    for _ in range(3):
+        placed.look(ELSEWHERE)
+    placed.place("cube-2")
+    for _ in range(2):
+        placed.verify("cube-1", SLOT_2)
+    assert placed.states()["cube-1"] == ("dropped", "")
+    for _ in range(2):
+        placed.look(SLOT_1, SLOT_2, view="full")
+    assert placed.states()["cube-1"] == ("placed", "red_bin")
+    assert placed.ledger.count_used_slots("red_bin") == 2
+
+
 def test_in_a_bin_with_two_layers_no_item_is_gone(bench: Bench) -> None:
     places = [("cube", 0.44 + 0.09 * (number % 3), 0.09 * (number // 3) - 0.12) for number in range(7)]
     for _ in range(3):

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from executive.cell.counters import read_counter
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.has_counted import HasCounted
@@ -41,3 +42,11 @@ def test_it_succeeds_up_to_the_number_of_counted_items(counted: FakeCell, values
 def test_the_failure_states_what_was_counted(counted: FakeCell) -> None:
     result = run_skill(HasCounted(at_least=2, of_class="cube", inside="red_bin"), counted)
     assert result.message == "1 of 2 required items of class cube are placed in red_bin"
+
+
+def test_a_rejected_item_that_left_its_place_counts_as_rejected(counted: FakeCell) -> None:
+    counted.ledger.record_grasp("sphere-1")
+    counted.ledger.record_drop("sphere-1")
+    assert counted.ledger.describe("sphere-1").state == "rejected"
+    assert run_skill(HasCounted(at_least=1, counter="rejected"), counted).reason == ""
+    assert read_counter(counted, "rejected") == 1
