@@ -33,6 +33,8 @@ class FlowAnalysis:
     Args:
         tree: Expanded tree with paths.
         skills: Installed skills by name.
+        entry: State in which the tree starts.
+        is_first_tick: True to analyse only the first tick, so that a skill that takes time does not end.
 
     Attributes:
         nodes: Every node by its path.
@@ -42,15 +44,22 @@ class FlowAnalysis:
         root_flow: Possible ends of the whole tree.
     """
 
-    def __init__(self, tree: Node, skills: Mapping[str, type[Skill]]) -> None:
+    def __init__(
+        self,
+        tree: Node,
+        skills: Mapping[str, type[Skill]],
+        entry: FlowState = INITIAL_STATE,
+        *,
+        is_first_tick: bool = False,
+    ) -> None:
         self.nodes = {node.path: node for node in tree.walk()}
         self.entry_states: dict[str, FlowState] = {}
         self.flows: dict[str, Flow] = {}
         self.body_end_states: dict[str, FlowState | None] = {}
-        self._skills = skills
+        self._skills, self._is_first_tick = skills, is_first_tick
         self._flows_by_entry: dict[tuple[str, FlowState], Flow] = {}
         self._instances: dict[str, ControlNode] = {}
-        self.root_flow = self._analyse(tree, INITIAL_STATE)
+        self.root_flow = self._analyse(tree, entry)
 
     def find_skill_or_most_similar(self, name: str) -> type[Skill] | None:
         """Return the skill `name`, or the most similar one to avoid further findings, or None."""
@@ -99,7 +108,10 @@ class FlowAnalysis:
             for key in (*skill.reasons, HALT_KEY)
         }
         failures = {PossibleFailure(node.skill, key, node.path): end_states[key] for key in skill.reasons}
-        return Flow(success, failures, None if skill.is_instantaneous() else end_states[HALT_KEY])
+        if skill.is_instantaneous():
+            return Flow(success, failures, None)
+        halted = end_states[HALT_KEY]
+        return Flow(None, {}, halted) if self._is_first_tick else Flow(success, failures, halted)
 
     def _compute_condition_flow(self, node: SkillNode, skill: type[Skill], state: FlowState) -> Flow:
         # A condition does not fill the tool: after its failure, a tool that was empty is still empty.

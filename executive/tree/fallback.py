@@ -20,9 +20,10 @@ class Fallback(OrderedNode):
     again: children that have failed are tried again while a later child runs, and the later child is halted
     if one of them succeeds or takes time.
 
-    * BehaviorTree.CPP: `Fallback`; without memory `ReactiveFallback`. Here, no child is skipped, and the
-      checker reports a second child that takes time, which BehaviorTree.CPP reports in a run, if enabled.
-    * py_trees: `Selector(memory=True)`, which may be empty; without memory `Selector(memory=False)`.
+    * BehaviorTree.CPP: `Fallback`; without memory `ReactiveFallback`. Here, children are never skipped.
+      The checker warns of a second child that takes time, unless the first may fail at once;
+      BehaviorTree.CPP throws an exception in the run in each case, but only if this is enabled.
+    * py_trees: `Selector(memory=True)` or `Selector(memory=False)`. There, a fallback may be empty.
     """
 
     keyword = "fallback"

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.errors import Fault
+from executive.skill import HOLDING
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.inspection import (
     Counterpart,
@@ -23,7 +24,7 @@ class Guard(ControlNode):
     """Run the body while a condition holds; when the condition fails, halt the body and fail with `broken`.
 
     Every tick checks the condition before it ticks the body. If the condition fails at the first tick, the
-    body does not start. The guard otherwise ends as its body.
+    body does not start. Otherwise, the guard returns the status of the body.
 
     * BehaviorTree.CPP: `ReactiveSequence` with condition and body.
     * py_trees: `decorators.EternalGuard`, with a function as the condition.
@@ -42,18 +43,19 @@ class Guard(ControlNode):
         self._gate = self.make_gate(self.holds)
 
     def start(self) -> None:
-        """Let the events of the first check pass."""
+        """Reset the event filter, so that the first check of this activation emits events."""
         self._gate.forget()
 
     def step(self) -> Status:
         """Check the condition, then tick the body.
 
         Raises:
-            Fault: The condition did not decide within the tick.
+            Fault: The condition returned RUNNING.
         """
         status = self._gate.tick()
         if status is Status.RUNNING:
-            raise Fault(f"{self.holds.name} is a condition, but it did not decide within one tick", self.path)
+            message = "is a condition, but returned RUNNING; a condition must succeed or fail in one tick"
+            raise Fault(f"{self.holds.name} {message}", self.path)
         if status is Status.FAILURE:
             self.halt_children([self.do])
             cause = self.get_failure(self.holds)
@@ -91,10 +93,22 @@ class Guard(ControlNode):
             yield NodeFinding(self.holds, "useless-guard", message, is_warning=True)
         elif body.halted is None:
             message = f"this guard cannot stop its body: {analysis.get_name(self.do)} ends in its first tick"
-            hint = "Write a list with the condition and the body."
+            hint = "Use a sequence (a list) of the condition and the body instead of a guard."
             yield NodeFinding(self.do, "useless-guard", message, hint, is_warning=True)
+        elif body.success and self._fails_after_release(analysis, body.success):
+            message = f"{name} fails as soon as the body of this guard releases the object"
+            hint = "Put the release after the guard."
+            yield NodeFinding(self.do, "always-breaks", message, hint, is_warning=True)
+
+    def _fails_after_release(self, analysis: NodeAnalysis, body_end: FlowState) -> bool:
+        """Return True if the body ends with an empty tool, and the condition cannot succeed with that tool.
+
+        A body that releases an object waits until the object lies still, and thus fails in the meantime.
+        """
+        is_empty = body_end.tool_states is not None and body_end.find_tool_state(HOLDING) is None
+        return is_empty and analysis.compute_flow(self.holds, body_end).success is None
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return a text for a failure of the body: the condition did not fail."""
+        """Return why the guard passed on a failure of its body."""
         del failure
-        return "handles no failures; its condition still held"
+        return "handles no failures of its body"

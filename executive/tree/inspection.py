@@ -8,7 +8,7 @@ from typing import Protocol, TypeAlias
 
 from executive.skill import Skill
 from executive.tree.failure import Reason
-from executive.tree.flow import Flow
+from executive.tree.flow import Flow, FlowState
 from executive.tree.keys import Child
 
 MinTimeFunction: TypeAlias = Callable[[Child], float]
@@ -48,6 +48,12 @@ class NodeAnalysis(Protocol):
 
     def get_flow(self, child: Child) -> Flow | None:
         """Return the possible outcomes of a child; None if the child never runs."""
+
+    def compute_flow(self, child: Child, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
+        """Return the possible outcomes of a child that starts in a state.
+
+        If `is_first_tick` is True, only outcomes in the first tick of the child are possible.
+        """
 
     def get_name(self, child: Child) -> str:
         """Return the name of a child in paths."""

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.tree.flow import Flow, FlowFunction, FlowState
+from executive.tree.flow import UNKNOWN_STATE, Flow, FlowFunction, FlowState
 from executive.tree.inspection import NodeAnalysis, NodeFinding
-from executive.tree.keys import Children, key
+from executive.tree.keys import Child, Children, key
 from executive.tree.node import ControlNode, NodeContext
 
 
@@ -80,23 +80,30 @@ class OrderedNode(ControlNode):
         """Yield a warning for each use of `memory: false` without effect or with a wrong effect."""
         if self.memory:
             return
-        flows = [analysis.get_flow(child) for child in self.do]
-        slow = [child for child, flow in zip(self.do, flows, strict=True) if flow and flow.halted is not None]
-        if not slow:
-            message = "without memory, this node does the same as with memory: no child takes time"
+        flows = {child: analysis.get_flow(child) for child in self.do}
+        slow = [child for child, flow in flows.items() if flow and flow.halted is not None]
+        if not slow or slow == [self.do[0]]:
+            message = "without memory, this node does the same as with memory: no later child takes time"
             yield NodeFinding("memory", "useless-reactive", message, is_warning=True)
             return
-        name = analysis.get_name(slow[0])
-        for child in slow[1:]:
+        # While a child after `blocker` would run, each tick runs `blocker` again, which takes time again.
+        blocker = next((child for child in slow if not self._may_pass_at_once(child, analysis)), slow[-1])
+        name = analysis.get_name(blocker)
+        for child in slow[slow.index(blocker) + 1 :]:
             message = (
                 f"{analysis.get_name(child)} takes time, and so does {name}: without memory, every tick "
                 f"runs {name} again, which halts {analysis.get_name(child)}"
             )
             hint = "Only one child may take time: put these nodes into a list, which is one child."
             yield NodeFinding(child, "two-running", message, hint, is_warning=True)
-        for child in self.do[: self.do.index(slow[0])] if len(slow) == 1 else ():
-            skills = analysis.list_skills(child).items()
+        for child in self.do[: self.do.index(blocker)]:
+            skills = analysis.list_skills(child).items() if child not in slow else ()
             if actions := [name for name, skill in skills if skill is not None and not skill.is_condition]:
                 message = f"{actions[0]} is no condition, but runs again at every tick of {name}"
                 hint = "Put it before this node, or use a condition."
                 yield NodeFinding(child, "repeated-action", message, hint, is_warning=True)
+
+    def _may_pass_at_once(self, child: Child, analysis: NodeAnalysis) -> bool:
+        """Return True if a child may end in its first tick with the status `passed_status`."""
+        flow = analysis.compute_flow(child, UNKNOWN_STATE, is_first_tick=True)
+        return bool(flow.failures) if self.passed_status is Status.FAILURE else flow.success is not None

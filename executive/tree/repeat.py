@@ -41,9 +41,9 @@ class CounterLimits(KeySection):
 
 
 class Repeat(Loop):
-    """Run the body repeatedly: up to a number of iterations, an expected failure, or the limit of a counter.
+    """Run the body until a number of iterations, an expected failure, or the limit of a counter is reached.
 
-    The loop succeeds in these cases. It reads the counters before each iteration, and does not interrupt an
+    Each of these three conditions ends the loop with success. The loop reads the counters before each iteration, and does not interrupt an
     iteration. Any other failure of the body ends the loop and is passed on.
 
     * BehaviorTree.CPP: `Repeat`; with `until`, a custom node `repeat`, because failures have no reasons.
@@ -51,7 +51,7 @@ class Repeat(Loop):
     """
 
     keyword = "repeat"
-    keyword_hints: ClassVar = {"loop": "Write repeat, or while for a loop with a condition."}
+    keyword_hints: ClassVar = {"loop": "Write repeat; for a loop with a condition, write while."}
     any_of = ("times", "until")
 
     times: int | None = key(default=None, ge=0, doc="Maximum number of iterations.")
@@ -146,7 +146,9 @@ class Repeat(Loop):
         skills = analysis.list_skills().values()
         if not any(skill is None or skill.tool_state in ((HOLDING, EMPTY), (ANY, EMPTY)) for skill in skills):
             message = "this loop never succeeds: its body releases no object, so `placed` does not increase"
-            yield NodeFinding("", "endless", message, "Add a reason or elapsed to until, or add times.")
+            yield NodeFinding(
+                "", "endless", message, "Add a failure reason or elapsed to until, or add times."
+            )
 
     def explain_unreachable(self, child: Child) -> str:
         """Return a text that explains why the body never runs: the number of iterations is 0."""
@@ -154,7 +156,7 @@ class Repeat(Loop):
         return "the body runs 0 times"
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the condition under which the loop succeeds."""
+        """Return why the loop passed on a failure of its body."""
         del failure
         if self.until:
             return f"succeeds only with {format_reasons(self.until)}"

@@ -16,9 +16,10 @@ class Sequence(OrderedNode):
     Without memory, every tick begins with the first child again: children that have succeeded are checked
     again while a later child runs, and the later child is halted if one of them fails or takes time.
 
-    * BehaviorTree.CPP: `Sequence`; without memory `ReactiveSequence`. Here, no child is skipped, and the
-      checker reports a second child that takes time, which BehaviorTree.CPP reports in a run, if enabled.
-    * py_trees: `Sequence(memory=True)`, which may be empty; without memory `Sequence(memory=False)`.
+    * BehaviorTree.CPP: `Sequence`; without memory `ReactiveSequence`. Here, children are never skipped.
+      The checker warns of a second child that takes time, unless the first may succeed at once;
+      BehaviorTree.CPP throws an exception in the run in each case, but only if this is enabled.
+    * py_trees: `Sequence(memory=True)` or `Sequence(memory=False)`. There, a sequence may be empty.
     """
 
     keyword = "sequence"
@@ -51,7 +52,7 @@ class Sequence(OrderedNode):
 
     @property
     def first_child(self) -> Child | None:
-        """The first child; None without memory, because later ticks read the inputs of the child again."""
+        """The first child, which runs once; None without memory, because each tick runs the child again."""
         return self.do[0] if self.memory else None
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +10,8 @@ from build_nodes import sequence
 from py_trees.common import Status
 
 from executive.events import BranchChosen, NodeStarted
+from executive.mission.load import load_mission
+from executive.plugins import load_skills
 from executive.tree.fallback import Fallback
 from executive.tree.sequence import Sequence
 
@@ -76,3 +79,30 @@ def test_a_fallback_reports_its_choice_only_when_the_choice_changes(
 def test_a_node_with_memory_runs_a_child_once(leaf: Any, site: Any, ticks: Any, log: Any) -> None:
     ticks(sequence(site(), [leaf("A"), leaf("B", "R R S")]))
     assert log == ["A starts", "B starts"]
+
+
+MISSION = """
+mission: fresh_approach
+cell: cells/overhead.yaml
+library: library/sorting.yaml
+routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
+tree:
+  - {use: look}
+  - SelectTarget
+  - NODE
+  - [Grasp, Transit, Release]
+"""
+
+
+@pytest.mark.parametrize(
+    "node",
+    [
+        "sequence: {memory: false, do: [{fallback: [IsFresh, [{use: look}, SelectTarget]]}, Approach]}",
+        "sequence: {memory: false, do: [{succeed: {all: [IsFresh, IsReachable]}}, Approach]}",
+        "fallback: {memory: false, do: [[IsFresh, Approach], [{use: look}, SelectTarget, Approach]]}",
+    ],
+)
+def test_a_child_that_may_decide_at_once_lets_a_later_child_take_time(node: str, tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text(MISSION.replace("NODE", node))
+    warnings = load_mission(tmp_path / "m.yaml", load_skills()).warnings
+    assert [str(warning) for warning in warnings] == []

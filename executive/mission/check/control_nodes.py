@@ -10,6 +10,7 @@ from executive.mission.check.context import CheckContext
 from executive.mission.check.node_min_times import compute_min_time
 from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning
+from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model.conversion import WrongType, convert_constant
 from executive.mission.model.instance import find_upper_bound, get_mission_node, make_inspection_instance
 from executive.mission.model.node_paths import get_path_name
@@ -17,7 +18,7 @@ from executive.mission.model.nodes import InnerNode, KeyValue, NodeSection, Skil
 from executive.mission.model.values import FailureName, Literal, Reference
 from executive.skill import Skill
 from executive.tree.failure import Reason
-from executive.tree.flow import Flow
+from executive.tree.flow import Flow, FlowState
 from executive.tree.inspection import NodeFinding
 from executive.tree.keys import ELEMENT_WORDS, Child, Key, KeyKind
 from executive.tree.node import ControlNode
@@ -116,6 +117,11 @@ class CheckerAnalysis:
     def get_flow(self, child: Child) -> Flow | None:
         """Return the possible ends of a child; None if the child can never run."""
         return self._context.flow_analysis.flows.get(get_mission_node(child).path)
+
+    def compute_flow(self, child: Child, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
+        """Return the possible ends of a child from a state; with `is_first_tick`, those in the first tick."""
+        node = get_mission_node(child)
+        return FlowAnalysis(node, self._context.skills, entry, is_first_tick=is_first_tick).root_flow
 
     def get_name(self, child: Child) -> str:
         """Return the name of a child in paths."""
