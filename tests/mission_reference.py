@@ -119,8 +119,8 @@ def _control_nodes() -> Iterator[str]:
 
 def _key_rows(owner: str, node: type[ControlNode | KeySection], prefix: str = "") -> Iterator[list[str]]:
     for name, key in node.keys.items():
-        written = f"`{prefix}{name}`" + (f", beside `{owner}`" if key.is_sibling else "")
-        if key.is_shorthand:
+        written = f"`{prefix}{name}`" + (f", beside `{owner}`" if key.sibling else "")
+        if key.shorthand:
             written = (f"{written}, or " if find_inner_keys(node) else "") + f"the value of `{owner}`"
         value = KINDS.get(key.kind) or _value(key.make_validator().json_schema())
         value += f", at most {key.max_count}" if key.max_count else ""

@@ -157,7 +157,7 @@ def _find_parent_key(
         if parts and parts[-1] == name:
             del parts[-1]
     if not parts and isinstance(parent, ControlNode):
-        omitted_keys = [name for name, key in parent.keys.items() if not key.is_in_path]
+        omitted_keys = [name for name, key in parent.keys.items() if not key.in_path]
         parts = [name for name in omitted_keys if node in parent.list_children(name)]
     return " ".join(parts)
 

@@ -22,8 +22,8 @@ class ForEach(Loop):
 
     * BehaviorTree.CPP: custom node `for_each`. `LoopString` and the other loops begin each element in a new
       tick, need one more tick at the end, and keep the variable.
-    * py_trees: `decorators.ForEach`. It runs the body once for an empty list, and stops at the first element that
-      is None.
+    * py_trees: `decorators.ForEach`. It runs the body once for an empty list, and stops at the first element
+      that is None.
     """
 
     keyword = "for_each"

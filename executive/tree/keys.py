@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum, auto
 from functools import cache
 from inspect import get_annotations
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias, Union, cast, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, ParamSpec, TypeAlias, Union, cast, get_args, get_origin
 
 from py_trees.behaviour import Behaviour
 from pydantic import Field, TypeAdapter
@@ -60,7 +60,7 @@ class KeyKind(Enum):
     CONSTANT = auto()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Key:
     """A key of a control node or of a section.
 
@@ -70,12 +70,12 @@ class Key:
         ge, gt: Inclusive and exclusive lower bound of a number, or None.
         max_key: For a number: key of the list of nodes whose length is the maximum of the number, or "".
         max_count: For a list of nodes: maximum number of nodes, or None.
-        is_shorthand: True if the key may be omitted and its value written directly under the keyword.
-        is_sibling: True if the key is a sibling of the keyword in the mission file: `catch` next to `try`.
-        is_in_path: True if the paths of the nodes under the key contain the key.
+        shorthand: True if the key may be omitted and its value written directly under the keyword.
+        sibling: True if the key is a sibling of the keyword in the mission file: `catch` next to `try`.
+        in_path: True if the paths of the nodes under the key contain the key.
         raising_key: For a list of reasons: key with the nodes that may fail with the reasons.
         list_key: For a loop variable: key of the list of its values; otherwise "".
-        takes_conditions: True if each node under the key must be a condition.
+        conditions: True if each node under the key must be a condition.
         name: Name of the key in the mission file.
         attribute: Name of the attribute in the class.
         kind: Kind of the value.
@@ -88,12 +88,12 @@ class Key:
     gt: float | None = None
     max_key: str = ""
     max_count: int | None = None
-    is_shorthand: bool = False
-    is_sibling: bool = False
-    is_in_path: bool = True
+    shorthand: bool = False
+    sibling: bool = False
+    in_path: bool = True
     raising_key: str = "do"
     list_key: str = ""
-    takes_conditions: bool = False
+    conditions: bool = False
     name: str = ""
     attribute: str = ""
     kind: KeyKind = KeyKind.CONSTANT
@@ -114,27 +114,20 @@ class Key:
         return _make_validator(self.value_type, self.ge, self.gt, max_value)
 
 
-def key(
-    *,
-    doc: str,
-    default: object = ...,
-    ge: float | None = None,
-    gt: float | None = None,
-    max_key: str = "",
-    max_count: int | None = None,
-    shorthand: bool = False,
-    sibling: bool = False,
-    in_path: bool = True,
-    raising_key: str = "do",
-    list_key: str = "",
-    conditions: bool = False,
-) -> Any:
-    """Declare a key in the body of a class; the arguments set attributes of `Key`, such as `is_shorthand`.
+_Arguments = ParamSpec("_Arguments")
 
-    The name of the key is the name of the attribute, without a trailing underscore.
-    """
-    flags = shorthand, sibling, in_path
-    return Key(doc, default, ge, gt, max_key, max_count, *flags, raising_key, list_key, conditions)
+
+def _return_any(key_class: Callable[_Arguments, Key]) -> Callable[_Arguments, Any]:
+    """Return a class as a function whose result mypy accepts as the value of an attribute of any type."""
+    return key_class
+
+
+key = _return_any(Key)
+"""Declare a key in the body of a class: `seconds: float = key(gt=0, doc="Limit [s].")`.
+
+`KeyOwner` derives name, kind and type from the attribute. The name of the key is the name of the
+attribute, without a trailing underscore.
+"""
 
 
 class KeyOwner:

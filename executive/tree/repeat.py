@@ -43,8 +43,9 @@ class CounterLimits(KeySection):
 class Repeat(Loop):
     """Run the body until a number of iterations, an expected failure, or the limit of a counter is reached.
 
-    Each of these three conditions ends the loop with success. The loop reads the counters before each iteration, and does not interrupt an
-    iteration. Any other failure of the body ends the loop and is passed on.
+    Each of these three conditions ends the loop with success. The loop reads the counters before each
+    iteration, and does not interrupt an iteration. Any other failure of the body ends the loop and is passed
+    on.
 
     * BehaviorTree.CPP: `Repeat`; with `until`, a custom node `repeat`, because failures have no reasons.
     * py_trees: `decorators.Repeat`. Each iteration begins in a new tick, and there is no `until`.

@@ -11,7 +11,7 @@ from executive.mission.findings import Finding, make_error, make_warning, sugges
 from executive.mission.model.values import Literal, LocatedName
 from executive.tree.keys import Key
 
-_LIMIT = Key("Maximum number of objects.", ge=1, value_type=int)
+_LIMIT = Key(doc="Maximum number of objects.", ge=1, value_type=int)
 
 
 def check_names(context: CheckContext) -> Iterator[Finding]:

@@ -72,7 +72,7 @@ def _assign_value_paths(owner: NodeOrSection, path: str, section_path: str = "")
         # In the path of a child below `do` of a section, the key `do` is omitted.
         key_path = section_path if section_path and key.name == "do" else _join(section_path, key.name)
         if isinstance(value, Node):
-            value = _assign_path(value, path, key_path if key.is_in_path or _is_list(value) else "")
+            value = _assign_path(value, path, key_path if key.in_path or _is_list(value) else "")
         elif isinstance(value, NodeSection):
             value = replace(value, values=_assign_value_paths(value, path, key_path))
         elif isinstance(value, tuple) and key.kind is KeyKind.NODES:

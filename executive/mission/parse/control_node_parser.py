@@ -29,7 +29,7 @@ KeyClass: TypeAlias = type[ControlNode] | type[KeySection]
 
 def find_shorthand_key(owner: KeyClass) -> Key | None:
     """Return the key whose value may directly follow the keyword of a node or section, or None."""
-    return next((key for key in owner.keys.values() if key.is_shorthand), None)
+    return next((key for key in owner.keys.values() if key.shorthand), None)
 
 
 def has_optional_body(node_class: KeyClass) -> bool:
@@ -40,13 +40,13 @@ def has_optional_body(node_class: KeyClass) -> bool:
 
 def find_inner_keys(owner: KeyClass) -> Mapping[str, Key]:
     """Return the keys of the mapping below a keyword; no keys if the value must not be a mapping."""
-    inner_keys = {name: key for name, key in owner.keys.items() if not key.is_sibling}
-    return {} if all(key.is_shorthand for key in inner_keys.values()) else inner_keys
+    inner_keys = {name: key for name, key in owner.keys.items() if not key.sibling}
+    return {} if all(key.shorthand for key in inner_keys.values()) else inner_keys
 
 
 def find_sibling_keys(owner: KeyClass) -> Mapping[str, Key]:
     """Return the keys at the level of the keyword."""
-    return {name: key for name, key in owner.keys.items() if key.is_sibling}
+    return {name: key for name, key in owner.keys.items() if key.sibling}
 
 
 def read_control_node(
@@ -125,7 +125,7 @@ class _KeyReader:
         """Return the value of a key, or None after an error and for an omitted optional child."""
         match key.kind:
             case KeyKind.NODE:
-                is_omitted = is_empty(node) and key.is_shorthand and not key.is_required
+                is_omitted = is_empty(node) and key.shorthand and not key.is_required
                 return None if is_omitted else self.parser.read_node(node, span)
             case KeyKind.NODES:
                 return self._read_nodes(reader, key, node)

@@ -79,7 +79,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     siblings: dict[str, Schema] = {grammar.USE_KEYWORD: _make_properties(grammar.USE_SIBLINGS)}
     requirements: dict[str, Schema] = {}
     for word, node_class in node_classes.items():
-        keys = {name: key for name, key in node_class.keys.items() if key.is_sibling}
+        keys = {name: key for name, key in node_class.keys.items() if key.sibling}
         siblings[word] = _make_properties(keys)
         requirements[word] = _require_any_of(node_class.any_of) if set(node_class.any_of) & set(keys) else {}
     return {
@@ -139,7 +139,7 @@ def _make_value_schema(key: Key | GrammarKey) -> Schema:
     match key.kind:
         case KeyKind.NODE:
             node = _make_reference("node")
-            may_be_empty = key.is_shorthand and not key.is_required
+            may_be_empty = key.shorthand and not key.is_required
             return {"allOf": [{"anyOf": [node, {"type": "null"}]}]} if may_be_empty else node
         case KeyKind.NODES:
             return _SCHEMAS_BY_KIND["nodes"]
