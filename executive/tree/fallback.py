@@ -59,7 +59,6 @@ class Fallback(OrderedNode):
 
     def explain_unreachable(self, child: Child) -> str:
         """Return a text that explains why `child` never runs: an earlier child cannot fail."""
-        del child
         return "an earlier child never fails"
 
     def explain(self, failure: PropagatedFailure) -> str:

@@ -119,7 +119,6 @@ class ForEach(Loop):
 
     def explain_unreachable(self, child: Child) -> str:
         """Return a text that explains why the body never runs: the list is empty."""
-        del child
         return "the body runs 0 times"
 
     def explain(self, failure: PropagatedFailure) -> str:

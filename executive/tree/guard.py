@@ -110,5 +110,4 @@ class Guard(ControlNode):
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return why the guard passed on a failure of its body."""
-        del failure
         return "handles no failures of its body"

@@ -1,6 +1,6 @@
 """Base classes of the nodes of a tree.
 
-A control node is one class in one file, registered by an entry point. The class declares its keys in the
+A control node is a class that an entry point registers. The class declares its keys in the
 mission file, and implements `start` and `step` for the run, `compute_flow` and `min_time` for the checker,
 and `explain` for the diagnosis.
 """
@@ -163,7 +163,6 @@ class ControlNode(KeyOwner, TreeNode):
 
     def describe_trigger(self, child: Child) -> str:
         """Return the failures that trigger a child: `on Grasp.missed`; "" if no failure triggers it."""
-        del child
         return ""
 
     # Methods for the run.
@@ -186,17 +185,14 @@ class ControlNode(KeyOwner, TreeNode):
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return a lower bound of the time to success [s]; `get_min_time` returns the bound for a child."""
-        del get_min_time
         return 0.0
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield mistakes in the use of this control node in the mission."""
-        del analysis
         yield from ()
 
     def explain_unreachable(self, child: Child) -> str:
         """Return a text that explains why a child never runs; "" if another finding explains it."""
-        del child
         return ""
 
     @property
@@ -218,17 +214,14 @@ class ControlNode(KeyOwner, TreeNode):
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return a text that explains why the node passed a failure on; "" if it passes on all failures."""
-        del failure
         return ""
 
     def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int] | None:
         """Return the number of the failed attempt and the maximum number; None if the node never retries."""
-        del failure
         return None
 
     def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
         """Yield changes of the mission after which this node would handle a failure."""
-        del failure
         yield from ()
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:

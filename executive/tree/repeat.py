@@ -153,12 +153,10 @@ class Repeat(Loop):
 
     def explain_unreachable(self, child: Child) -> str:
         """Return a text that explains why the body never runs: the number of iterations is 0."""
-        del child
         return "the body runs 0 times"
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return why the loop passed on a failure of its body."""
-        del failure
         if self.until:
             return f"succeeds only with {format_reasons(self.until)}"
         return f"a failure ends the loop before its {self.times} iterations are complete"

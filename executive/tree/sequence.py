@@ -47,7 +47,6 @@ class Sequence(OrderedNode):
 
     def explain_unreachable(self, child: Child) -> str:
         """Return a text that explains why `child` never runs: an earlier child cannot succeed."""
-        del child
         return "an earlier child never succeeds"
 
     @property

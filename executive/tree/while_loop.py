@@ -75,10 +75,8 @@ class While(Loop):
 
     def explain_unreachable(self, child: Child) -> str:
         """Return a text that explains why the body never runs: the condition cannot succeed."""
-        del child
         return "the condition never succeeds"
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the cause of a failure: the body, not the condition, failed."""
-        del failure
         return "a failure of the body ends the loop"
