@@ -6,9 +6,9 @@ The checks and the tree builder get only the expanded tree, in which every refer
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import TypeVar, cast
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import cast
 
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
 from executive.mission.model.mission import Mission, Quota, Subtree
@@ -17,12 +17,12 @@ from executive.mission.model.nodes import (
     InnerNode,
     InvalidNode,
     Node,
-    NodeSection,
     SkillNode,
     SubtreeNode,
     iterate_keys,
+    map_parts,
 )
-from executive.mission.model.values import InvalidValue, Literal, LocatedName, Reference, Setting, Value
+from executive.mission.model.values import InvalidValue, Literal, LocatedName, Reference, Value
 from executive.mission.model.wiring import find_control_node_outputs, find_written_variables
 from executive.mission.source import Span
 from executive.skill import Direction, Skill
@@ -37,9 +37,6 @@ _CALLER_PREFIX = "^"
 
 ValuesByName = Mapping[str, Value]
 """Values of params and arguments by name."""
-
-PartT = TypeVar("PartT")
-"""Type of a node or of a part of a node."""
 
 
 @dataclass(frozen=True)
@@ -154,10 +151,10 @@ class _Expander:
                 return self._expand_node(part, values, callers, depth + 1)
             if isinstance(part, Reference):
                 return self._resolve_name(part, values, callers)
-            return _map_parts(part, expand_part)
+            return map_parts(part, expand_part)
 
         self.findings += self._find_shadowed_names(node, values)
-        expanded = self._expand_words(_map_parts(node, expand_part))
+        expanded = self._expand_words(map_parts(node, expand_part))
         return self._expand_use(expanded, callers, depth) if isinstance(expanded, SubtreeNode) else expanded
 
     def _expand_words(self, node: Node) -> Node:
@@ -257,7 +254,7 @@ class _Expander:
         def rename_part(part: object) -> object:
             if isinstance(part, Reference | LocatedName):
                 return replace(part, name=rename(part.name))
-            part = _map_parts(part, rename_part)
+            part = map_parts(part, rename_part)
             if isinstance(part, SubtreeNode):
                 return replace(part, written_variables=tuple(map(rename, part.written_variables)))
             if isinstance(part, SkillNode) and part.skill in self.skills:
@@ -308,16 +305,3 @@ class _Expander:
 
 def _prefix_variable(value: Value) -> Value:
     return replace(value, name=_CALLER_PREFIX + value.name) if isinstance(value, Reference) else value
-
-
-def _map_parts(part: PartT, change: Callable[[object], object]) -> PartT:
-    """Return a copy of `part` with `change(value)` in place of every value that `part` directly contains."""
-    mapped: object = part
-    if isinstance(part, tuple):
-        mapped = tuple([change(item) for item in part])
-    elif isinstance(part, dict):
-        mapped = {key: change(item) for key, item in part.items()}
-    elif isinstance(part, Node | Setting | NodeSection):
-        values = {field.name: change(getattr(part, field.name)) for field in fields(part)}
-        mapped = replace(part, **values)  # type: ignore[arg-type] # `change` keeps the type of each field.
-    return cast("PartT", mapped)

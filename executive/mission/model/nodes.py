@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar, cast
 
 from executive.mission.model.values import FailureName, LocatedName, Setting, Value
 from executive.mission.source import Span
@@ -130,6 +130,9 @@ class SubtreeNode(Node):
 KeyValue: TypeAlias = Value | LocatedName | Node | NodeSection | tuple[Node | FailureName | NodeSection, ...]
 """Value of a key of a control node."""
 
+PartT = TypeVar("PartT")
+"""Type of a node or of a part of a node."""
+
 NodeOrSection: TypeAlias = InnerNode | NodeSection
 """Control node, or a section of a control node."""
 
@@ -148,3 +151,16 @@ def list_nodes(value: KeyValue) -> list[Node]:
     if isinstance(value, tuple):
         return [node for item in value if not isinstance(item, FailureName) for node in list_nodes(item)]
     return [value] if isinstance(value, Node) else []
+
+
+def map_parts(part: PartT, change: Callable[[object], object]) -> PartT:
+    """Return a copy of `part` with `change(value)` in place of every value that `part` directly contains."""
+    mapped: object = part
+    if isinstance(part, tuple):
+        mapped = tuple([change(item) for item in part])
+    elif isinstance(part, dict):
+        mapped = {key: change(item) for key, item in part.items()}
+    elif isinstance(part, Node | Setting | NodeSection):
+        values = {field.name: change(getattr(part, field.name)) for field in fields(part)}
+        mapped = replace(part, **values)  # type: ignore[arg-type] # `change` keeps the type of each field.
+    return cast("PartT", mapped)
