@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
 from itertools import compress
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
@@ -15,9 +14,6 @@ from executive.cli.streams import keep_stdout_clean, print_json
 
 if TYPE_CHECKING:
     from executive.cell.protocols import Cell
-    from executive.mission.load import LoadedMission
-    from executive.mission.outline import OutlineNode
-    from executive.skill import Skill
 
 
 @click.command(name="tree")
@@ -45,23 +41,32 @@ def command(
     MISSION is a file or the name of a shipped mission. All subtrees are expanded, except in the format btcpp,
     in which each subtree is a tree of its own.
     """
-    flags = {"svg": as_svg, "dot": as_dot, "json": as_json}
-    formats = [f"--{name}" for name, is_given in flags.items() if is_given]
-    formats += [f"--format {format_name}"] if format_name else []
+    flags = {"--svg": as_svg, "--dot": as_dot, "--json": as_json, f"--format {format_name}": format_name}
+    formats = [flag for flag, is_given in flags.items() if is_given]
     details = list(compress(("--ports", "--reasons"), (ports, reasons)))
     conflict_message = f"{' and '.join(formats)} exclude each other; give one of them"
     redundancy_message = f"{''.join(formats)} always contains ports and reasons; omit {' and '.join(details)}"
     check_usage((len(formats) > 1, conflict_message), (formats and details, redundancy_message))
     with keep_stdout_clean():
+        from executive.events import discard_event
+        from executive.mission.build import build_tree
+        from executive.mission.load import load_mission
+        from executive.mission.outline import make_outline
+        from executive.plugins import load_skills
         from executive.record.recorded_mission import format_tree
+        from executive.tree.blackboard import Blackboard
         from executive.view.tree.btcpp import format_btcpp
         from executive.view.tree.dot import format_dot
         from executive.view.tree.svg import make_svg
         from executive.view.tree.tree_text import draw_text, fold_subtrees
 
-        loaded, skills, nodes = _load_outline(mission, overrides)
+        skills = load_skills()
+        loaded = load_mission(mission, skills, overrides)
+        # No node of the tree is executed, so that none needs a clock or a ledger.
+        placeholder_cell = cast("Cell", SimpleNamespace(clock=None, ledger=None))
+        nodes = make_outline(build_tree(loaded, skills, placeholder_cell, Blackboard(), discard_event))
         nodes = fold_subtrees(nodes) if fold else nodes
-        match next((name for name, is_given in flags.items() if is_given), format_name):
+        match "".join(formats).removeprefix("--format ").removeprefix("--"):
             case "svg":
                 output = make_svg(nodes, loaded.mission.name)
             case "dot":
@@ -73,22 +78,3 @@ def command(
             case _:
                 output = draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
     print_json(output) if as_json else click.echo(output)
-
-
-def _load_outline(
-    mission: str, overrides: dict[str, str]
-) -> tuple[LoadedMission, Mapping[str, type[Skill]], Sequence[OutlineNode]]:
-    """Return a mission, the installed skills, and the nodes of the expanded tree."""
-    from executive.events import discard_event
-    from executive.mission.build import build_tree
-    from executive.mission.load import load_mission
-    from executive.mission.outline import make_outline
-    from executive.plugins import load_skills
-    from executive.tree.blackboard import Blackboard
-
-    skills = load_skills()
-    loaded_mission = load_mission(mission, skills, overrides)
-    # No node of the tree is executed, so that none needs a clock or a ledger.
-    placeholder_cell = cast("Cell", SimpleNamespace(clock=None, ledger=None))
-    tree = build_tree(loaded_mission, skills, placeholder_cell, Blackboard(), discard_event)
-    return loaded_mission, skills, make_outline(tree)
