@@ -17,10 +17,10 @@ from executive.tree.inspection import (
     PropagatedFailure,
 )
 from executive.tree.keys import Child, key
-from executive.tree.node import ControlNode, NodeContext
+from executive.tree.reactive_node import ReactiveNode
 
 
-class Guard(ControlNode):
+class Guard(ReactiveNode):
     """Run the body while a condition holds; when the condition fails, halt the body and fail with `broken`.
 
     Every tick checks the condition before it ticks the body. If the condition fails at the first tick, the
@@ -38,21 +38,13 @@ class Guard(ControlNode):
     holds: Child = key(conditions=True, doc="Condition that must succeed at every tick.")
     do: Child = key(doc="Body.")
 
-    def __init__(self, context: NodeContext, **values: object) -> None:
-        super().__init__(context, **values)
-        self._gate = self.make_gate(self.holds)
-
-    def start(self) -> None:
-        """Reset the event filter, so that the first check of this activation emits events."""
-        self._gate.forget()
-
     def step(self) -> Status:
         """Check the condition, then tick the body.
 
         Raises:
             Fault: The condition returned RUNNING.
         """
-        status = self._gate.tick()
+        status = self.tick_again(self.holds)
         if status is Status.RUNNING:
             message = "is a condition, but returned RUNNING; a condition must succeed or fail in one tick"
             raise Fault(f"{self.holds.name} {message}", self.path)

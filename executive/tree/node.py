@@ -20,7 +20,6 @@ from executive.cell.protocols import Clock
 from executive.errors import Fault, InputError
 from executive.events import BranchChosen, Emit, Event, NodeEnded, NodeStarted, discard_event
 from executive.tree.blackboard import Blackboard
-from executive.tree.event_gate import EventGate
 from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.halting import halt
@@ -69,11 +68,9 @@ class TreeNode(Behaviour):
         label: Label of the node in the mission, or "".
         blackboard: Variables of the run.
         subtree_names: Names of the subtrees with this node as root, the outermost first.
-        event_gate: Gate of the events of this node and of all nodes below it, or None.
     """
 
     subtree_names: tuple[str, ...] = ()
-    event_gate: EventGate | None = None
 
     def __init__(self, context: NodeContext, name: str) -> None:
         super().__init__(context.label or name)
@@ -94,9 +91,7 @@ class TreeNode(Behaviour):
         self.feedback_message = f"{failure}: {failure.message}" if failure else ""
 
     def emit(self, event: Event) -> None:
-        """Emit an event of this node or of a node below, unless a gate on the way to the root holds it."""
-        if self.event_gate is not None and self.event_gate.hold(event):
-            return
+        """Emit an event of this node or of a node below, through all ancestors."""
         emit = self.parent.emit if isinstance(self.parent, TreeNode) else self._emit_from_root
         emit(event)
 
@@ -247,13 +242,6 @@ class ControlNode(KeyOwner, TreeNode):
         if status is Status.INVALID:
             raise Fault(f"{child.name} was ticked but has no status", self.path)
         return status
-
-    def make_gate(self, child: Child) -> EventGate:
-        """Return a gate of the events of a child; its method `tick` replaces `tick_child`."""
-        gate = EventGate(child, self.tick_child, self.emit)
-        if isinstance(child, TreeNode):
-            child.event_gate = gate
-        return gate
 
     def halt_children(self, children: Iterable[Child]) -> None:
         """Halt the children and all running nodes below the children, one child after the other.

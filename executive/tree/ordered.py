@@ -10,10 +10,10 @@ from py_trees.common import Status
 from executive.tree.flow import UNKNOWN_STATE, Flow, FlowFunction, FlowState
 from executive.tree.inspection import NodeAnalysis, NodeFinding
 from executive.tree.keys import Child, Children, key
-from executive.tree.node import ControlNode, NodeContext
+from executive.tree.reactive_node import ReactiveNode
 
 
-class OrderedNode(ControlNode):
+class OrderedNode(ReactiveNode):
     """Run the children in order until a child takes time, or ends with another status than `passed_status`.
 
     Without memory, every tick begins with the first child. A child that runs again and ends as before emits
@@ -31,15 +31,10 @@ class OrderedNode(ControlNode):
     )
     do: Children
 
-    def __init__(self, context: NodeContext, **values: object) -> None:
-        super().__init__(context, **values)
-        self._gates = [] if self.memory else [self.make_gate(child) for child in self.do]
-
     def start(self) -> None:
         """Begin with the first child."""
+        super().start()
         self._child_index = 0
-        for gate in self._gates:
-            gate.forget()
 
     def step(self) -> Status:
         """Tick the children in order until one of them decides the status of the tick."""
@@ -48,7 +43,8 @@ class OrderedNode(ControlNode):
         for index in range(previous_index if self.memory else 0, len(self.do)):
             if index > previous_index:
                 self.report_next(index)
-            status = self.tick_child(self.do[index]) if self.memory else self._gates[index].tick()
+            child = self.do[index]
+            status = self.tick_child(child) if self.memory else self.tick_again(child)
             if status is not self.passed_status:
                 break
         if index < previous_index:
