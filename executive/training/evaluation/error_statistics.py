@@ -61,32 +61,17 @@ class ErrorStatistics:
         counts.update(false_detections=len(false_detections))
 
     @property
-    def object_count(self) -> int:
-        """Number of objects in all images."""
-        return sum(count for (label, _), count in self.confusion.items() if label != NO_OBJECT)
+    def labels(self) -> list[str]:
+        """True and detected classes, sorted."""
+        return sorted({label for labels in self.confusion for label in labels} - {NO_OBJECT})
 
-    @property
-    def precision(self) -> float:
-        """Fraction of the detections that are correct; 0 without detections."""
-        detection_count = sum(count for (_, label), count in self.confusion.items() if label != NO_OBJECT)
-        return self._correct_count / max(detection_count, 1)
-
-    @property
-    def recall(self) -> float:
-        """Fraction of the objects that are detected with their class; 0 without objects."""
-        return self._correct_count / max(self.object_count, 1)
-
-    def compute_class_metrics(self) -> dict[str, ClassMetrics]:
-        """Return the metrics of every class in the images."""
-        object_counts, detection_counts = Counter[str](), Counter[str]()
-        for (true_label, detected_label), count in self.confusion.items():
-            object_counts[true_label] += count
-            detection_counts[detected_label] += count
-        metrics = {}
-        for label in sorted(object_counts.keys() - {NO_OBJECT}):
-            correct, count = self.confusion[label, label], object_counts[label]
-            metrics[label] = ClassMetrics(count, correct / max(detection_counts[label], 1), correct / count)
-        return metrics
+    def compute_metrics(self, labels: Sequence[str]) -> ClassMetrics:
+        """Return the accuracy for some classes together; precision and recall are 0 without objects."""
+        object_count = sum(count for (label, _), count in self.confusion.items() if label in labels)
+        detection_count = sum(count for (_, label), count in self.confusion.items() if label in labels)
+        correct_count = sum(self.confusion[label, label] for label in labels)
+        precision, recall = correct_count / max(detection_count, 1), correct_count / max(object_count, 1)
+        return ClassMetrics(object_count, precision, recall)
 
     def make_confusion_matrix(self) -> dict[str, dict[str, int]]:
         """Return the number of objects by true class (row), then by detected class (column)."""
@@ -111,11 +96,6 @@ class ErrorStatistics:
             repeated=repeats.repeated_fraction,
             bias=repeats.bias,
         )
-
-    @property
-    def _correct_count(self) -> int:
-        """Number of objects that are detected with their class: the diagonal of the confusion matrix."""
-        return sum(count for (row, column), count in self.confusion.items() if row == column)
 
     def _measure_errors(self, match: BoxMatch, index: int, sample: LabelledImage, frame: Frame) -> None:
         """Measure the position errors of a correct detection of the object `index`."""

@@ -82,12 +82,11 @@ def evaluate(
         if mistakes is not None:
             mistakes.add(matches, sample)
     map50, map50_95 = average_precision.compute()
+    metrics_by_class = {label: errors.compute_metrics([label]) for label in errors.labels}
     return Evaluation(
         threshold=detector.threshold if threshold is None else threshold,
         images=unavailable_count + answer_counts.total(),
-        objects=errors.object_count,
-        precision=errors.precision,
-        recall=errors.recall,
+        **vars(errors.compute_metrics(errors.labels)),
         map50=map50,
         map50_95=map50_95,
         centre=Distribution.compute(errors.centre_errors),
@@ -95,7 +94,7 @@ def evaluate(
         localized=Distribution.compute(errors.localization_errors),
         # The first request is slower: it fills caches and opens connections.
         latency=Distribution.compute(latencies[1:] or latencies),
-        by_class=errors.compute_class_metrics(),
+        by_class={label: metrics for label, metrics in metrics_by_class.items() if metrics.objects},
         confusion=errors.make_confusion_matrix(),
         unavailable=unavailable_count,
         why=unavailable_reason,

@@ -39,12 +39,12 @@ class Distribution:
 
 @dataclass(frozen=True)
 class ClassMetrics:
-    """Accuracy of a detector for one class.
+    """Accuracy of a detector for one or more classes.
 
     Attributes:
-        objects: Number of objects of this class.
-        precision: Fraction of the detections of this class that are correct.
-        recall: Fraction of the objects of this class that are detected with this class.
+        objects: Number of objects of these classes.
+        precision: Fraction of the detections of these classes that are correct.
+        recall: Fraction of the objects that are detected with their class.
     """
 
     objects: int

@@ -105,7 +105,7 @@ class LivePage:
         empty_results = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._enqueue(messages.SceneChange(shapes=shapes))
-        self._enqueue(messages.PageChange(tree=make_svg(nodes, run.mission, empty_results)))
+        self._enqueue({"tree": make_svg(nodes, run.mission, empty_results)})
         run.control.call_between_ticks(self._send_state)
         self._send_state()
 
@@ -128,7 +128,7 @@ class LivePage:
 
     def show_message(self, message: str) -> None:
         """Show a message about the record of the run."""
-        self._enqueue(messages.PageChange(note=message))
+        self._enqueue({"note": message})
 
     def finish(self, result: Result | None = None, report_path: str = "") -> None:
         """Show the result of the run, and end the server; a second call does nothing."""
@@ -136,8 +136,8 @@ class LivePage:
             return
         if result is not None:
             message = result.message if result.diagnosis is None else result.diagnosis.verdict
-            outcome = messages.RunOutcome(result.status, message, result.run, report_path)
-            self._enqueue(messages.PageChange(result=outcome))
+            texts = {"status": result.status, "message": message, "run": result.run, "report": report_path}
+            self._enqueue({"result": texts})
         self._queue.put(None)
         try:
             if self._server.wait(SHUTDOWN_TIMEOUT) != 0:
@@ -159,9 +159,9 @@ class LivePage:
         with self._catch_errors():
             if self._run.control.is_paused != self._was_paused:
                 self._was_paused = not self._was_paused
-                self._enqueue(messages.PageChange(is_paused=self._was_paused))
+                self._enqueue({"is_paused": self._was_paused})
             if self._can_send_images and self._visuals is not None:
-                self._enqueue(messages.PageChange(clock=self._run.now))
+                self._enqueue({"clock": self._run.now})
                 self._enqueue(messages.SceneChange(body_poses=messages.encode_poses(self._visuals.poses())))
 
     @property

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import base64
 from collections import Counter
-from dataclasses import asdict
 from typing import cast
 
 import numpy as np
 
 from executive import events
 from executive.record.timeline.timeline import Timeline
-from executive.view.live.messages import CameraImage, Message, PageChange
+from executive.view.live.messages import CameraImage, JsonObject, Message
 
 JPEG_QUALITY = 80
 """JPEG quality of the camera image, 0 to 100."""
 OCCLUSION_DARKENING = 0.45
 """Fraction by which the brightness of pixels that the arm occludes is reduced: 0 not at all, 1 to black."""
-
-JsonObject = dict[str, object]
-"""Values of a JSON object, by key."""
 
 
 class PageState:
@@ -43,10 +39,8 @@ class PageState:
                 self._apply_event(message.event)
             case CameraImage():
                 self._set_values(look=_encode_camera_image(message))
-            case PageChange():
-                self._set_values(
-                    **{key: value for key, value in asdict(message).items() if value is not None}
-                )
+            case dict():
+                self._set_values(**message)
 
     def take_changes(self) -> JsonObject:
         """Return the values that changed since the last call, by key."""
