@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 @click.argument("missions", metavar="MISSION...", nargs=-1, required=True)
 @overrides_option
 @json_option
-@click.pass_context
-def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, str], as_json: bool) -> None:
+def command(missions: tuple[str, ...], overrides: dict[str, str], as_json: bool) -> ExitCode:
     """Check missions without running them.
 
     Prints the errors and warnings of each MISSION (a file or the name of a shipped mission), and the failures
@@ -55,7 +54,7 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
         print_json(reports)
     else:
         click.echo("\n".join(texts))
-    ctx.exit(ExitCode.SUCCESS if all(report["ok"] for report in reports) else ExitCode.INVALID_INPUT)
+    return ExitCode.SUCCESS if all(report["ok"] for report in reports) else ExitCode.INVALID_INPUT
 
 
 def _describe_mission(mission: str, warnings: Sequence[Finding], failures: Sequence[UnhandledFailure]) -> str:

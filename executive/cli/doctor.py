@@ -56,8 +56,7 @@ class CheckResult(NamedTuple):
 
 @click.command(name="doctor")
 @json_option
-@click.pass_context
-def command(ctx: click.Context, as_json: bool) -> None:
+def command(as_json: bool) -> ExitCode:
     """Check this installation.
 
     Checks Python, packages, plugins, renderer, display and the server of Roboflow. Exit code 1 if a
@@ -73,7 +72,7 @@ def command(ctx: click.Context, as_json: bool) -> None:
         for status, subject, message, fix in results:
             click.echo(f"{status:7}  {subject:{width}}  {'; '.join(filter(None, (message, fix)))}")
         click.echo(f"{problem_count or 'no'} problem{'' if problem_count == 1 else 's'}")
-    ctx.exit(ExitCode.FAILURE if problem_count else ExitCode.SUCCESS)
+    return ExitCode.FAILURE if problem_count else ExitCode.SUCCESS
 
 
 def run_checks() -> Iterator[CheckResult]:

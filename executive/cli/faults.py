@@ -34,11 +34,10 @@ def parse_fault_numbers(text: str) -> tuple[int, ...]:
 @options.overrides_option
 @options.runs_option
 @options.json_option
-@click.pass_context
 def command(
-    ctx: click.Context, mission: str, oracle: bool, pairs: int | None, fault_numbers: tuple[int, ...] | None,
+    mission: str, oracle: bool, pairs: int | None, fault_numbers: tuple[int, ...] | None,
     list_only: bool, workers: int, seed: int, overrides: dict[str, str], runs: Path, as_json: bool,
-) -> None:  # fmt: skip
+) -> int:  # fmt: skip
     """Inject each possible fault into a run of a mission.
 
     MISSION is a file or the name of a shipped mission. Its tree determines the faults: every reason of every
@@ -75,4 +74,4 @@ def command(
                 text = fault_results.format_results(results)
                 exit_code = int(bool(results.failed_trials)) if results.is_complete else ExitCode.HALTED
     print_json(output) if as_json else click.echo(text)
-    ctx.exit(exit_code)
+    return exit_code

@@ -16,8 +16,7 @@ from executive.exit_codes import ExitCode
 @click.option("--mission", "mission_file", type=FILE, help="Mission file instead of the recorded mission.")
 @runs_option
 @json_option
-@click.pass_context
-def command(ctx: click.Context, run: str, mission_file: Path | None, runs: Path, as_json: bool) -> None:
+def command(run: str, mission_file: Path | None, runs: Path, as_json: bool) -> ExitCode:
     """Repeat the decisions of a recorded run.
 
     RUN is a run directory or `latest`. Nothing moves and nothing is simulated: tree, skills and ledger get
@@ -36,4 +35,4 @@ def command(ctx: click.Context, run: str, mission_file: Path | None, runs: Path,
         click.echo(f"{result.decisions} decisions{comparison} ({path})", err=True)
     if as_json:
         print_json({"run": str(path), "same": result.is_equal, **result.as_json()})
-    ctx.exit(ExitCode.SUCCESS if result.is_equal else ExitCode.FAILURE)
+    return ExitCode.SUCCESS if result.is_equal else ExitCode.FAILURE

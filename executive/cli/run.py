@@ -15,6 +15,7 @@ from executive.cli.streams import keep_stdout_clean, open_unescaped_stderr, prin
 
 if TYPE_CHECKING:
     from executive.events import RunStarted
+    from executive.exit_codes import ExitCode
     from executive.record.recorded_run import RecordOptions
     from executive.record.result import Result
     from executive.run.assembly import RunOptions
@@ -44,7 +45,7 @@ def command(
     ctx: click.Context, mission: str | None, resume: str | None, seed: int, overrides: dict[str, str],
     scene: Path | None, runs: Path, as_json: bool, quiet: bool, has_page: bool, paused: bool, gui: bool,
     realtime: bool, requests: tuple[str, ...],
-) -> None:  # fmt: skip
+) -> ExitCode:  # fmt: skip
     """Run a mission and record the run.
 
     MISSION is a file or the name of a shipped mission.
@@ -115,7 +116,7 @@ def command(
             click.echo("\n".join(filter(None, (result.disagreement, end_description))), err=True)
     if as_json:
         print_json(to_json(result))
-    ctx.exit(find_exit_code(result))
+    return find_exit_code(result)
 
 
 def _run_mission(

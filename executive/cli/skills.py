@@ -32,8 +32,7 @@ Declaration = Mapping[str, Any]
 @click.argument("name", required=False)
 @click.option("--conform", is_flag=True, help="Check that NAME, or every skill, conforms to the skill rules.")
 @json_option
-@click.pass_context
-def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) -> None:
+def command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
     """List the installed skills, or describe one skill.
 
     With NAME, prints all ports, params and failure reasons of this skill. Exit code 1 if a check of --conform
@@ -50,12 +49,13 @@ def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) 
         if name is not None:
             skills = {name: skills[name]}
     if conform:
-        ctx.exit(ExitCode.SUCCESS if _check_conformance(skills, as_json) else ExitCode.FAILURE)
+        return ExitCode.SUCCESS if _check_conformance(skills, as_json) else ExitCode.FAILURE
     declarations = [collect_declarations(key, skill) for key, skill in skills.items()]
     if as_json:
         print_json(declarations if name is None else declarations[0])
     else:
         click.echo("\n".join(map(_describe_skill if name else _summarize_skill, declarations)))
+    return ExitCode.SUCCESS
 
 
 def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:

@@ -35,11 +35,10 @@ def parse_seed_range(text: str) -> range:
 @options.scene_option
 @options.runs_option
 @options.json_option
-@click.pass_context
 def command(
-    ctx: click.Context, mission: str, seeds: range, workers: int, frames: bool, overrides: dict[str, str],
+    mission: str, seeds: range, workers: int, frames: bool, overrides: dict[str, str],
     scene: Path | None, runs: Path, as_json: bool,
-) -> None:  # fmt: skip
+) -> int:  # fmt: skip
     """Run a mission once for every seed, and summarize the runs.
 
     MISSION is a file or the name of a shipped mission. Exit code 1 if a run did not succeed, or recorded
@@ -70,7 +69,7 @@ def command(
         settings = {"mission": mission, "seeds": [seeds[0], seeds[-1]], "scene": scene and str(scene)}
         print_json({**settings, **summary, "results": to_json(results)})
     has_problem = summary["succeeded"] < summary["runs"] or bool(summary["disagreements"])
-    ctx.exit(ExitCode.HALTED if summary["cut_off"] else int(has_problem))
+    return ExitCode.HALTED if summary["cut_off"] else int(has_problem)
 
 
 def _describe_summary(summary: dict[str, Any]) -> str:

@@ -75,6 +75,11 @@ class Result:
     diagnosis: Diagnosis | None = None
 
     @property
+    def verdict(self) -> str:
+        """Cause of the end according to the diagnosis; without a diagnosis, the message of the end."""
+        return self.message if self.diagnosis is None else self.diagnosis.verdict
+
+    @property
     def disagreement(self) -> str:
         """Message with the counts of audit and ledger if they disagree, else ""."""
         return describe_disagreement(self.audit, self.items)

@@ -45,7 +45,7 @@ def campaigns(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 
         def _figures(self, *, pairs):
             trial = Trial(**{**vars(TRIAL), "problems": fake.problems})
-            ways = (Branch("sort.yaml:14", "recover", ("tree/retry/recover",)),)
+            ways = (Branch("sort.yaml:14", "recover"),)
             return FaultCampaignResults(self._name, "fake", 0, 11.5, 1, (trial,), ways, fake.complete, pairs)
 
     monkeypatch.setattr("executive.campaign.faults.campaign.Campaign", Campaign)

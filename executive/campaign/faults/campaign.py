@@ -176,7 +176,7 @@ def find_branches(tree: Node, trials: Sequence[Trial]) -> tuple[Branch, ...]:
     branches = []
     for (file, line, _, name), paths in paths_by_place.items():
         trial_count = sum(not trial.entered_paths.isdisjoint(paths) for trial in trials)
-        branches.append(Branch(f"{file}:{line}", name, tuple(paths), trial_count))
+        branches.append(Branch(f"{file}:{line}", name, trial_count))
     return tuple(branches)
 
 

@@ -78,13 +78,11 @@ class Branch:
     Attributes:
         mission_line: File and line of the branch in the mission.
         name: Name of the branch: `catch on Grasp.missed`, `recover`, `choice 2`, `finally`.
-        paths: Path of the root of the branch, for each use of the subtree that contains the branch.
         trial_count: Number of trials that entered the branch.
     """
 
     mission_line: str
     name: str
-    paths: tuple[str, ...]
     trial_count: int = 0
 
 

@@ -23,9 +23,9 @@ def is_assignable(source: object, target: object) -> bool:
     """Return True if every value of the type `source` is also a value of the type `target`."""
     if source is Any or target is Any or source == target or source is NoReturn:
         return True
-    if _is_union(source):
+    if is_union(source):
         return all(is_assignable(part, target) for part in get_args(source))
-    if _is_union(target):
+    if is_union(target):
         return any(is_assignable(source, part) for part in get_args(target))
     if source is int and target is float:
         return True
@@ -68,7 +68,7 @@ def describe_type(declared_type: object) -> str:
     """Return a description of the values of a type, for a sentence: `a list of Target`."""
     if declared_type in _DESCRIPTIONS:
         return _DESCRIPTIONS[declared_type]
-    if _is_union(declared_type):
+    if is_union(declared_type):
         return " or ".join(describe_type(part) for part in get_args(declared_type))
     element_type = find_element_type(declared_type)
     if element_type is not None and declared_type is not object:
@@ -78,7 +78,8 @@ def describe_type(declared_type: object) -> str:
     return getattr(declared_type, "__name__", str(declared_type))
 
 
-def _is_union(declared_type: object) -> bool:
+def is_union(declared_type: object) -> bool:
+    """Return True if a type is a union of types."""
     return get_origin(declared_type) in (Union, types.UnionType)
 
 

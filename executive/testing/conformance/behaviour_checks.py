@@ -5,13 +5,12 @@ Each public function is a rule: its docstring states the rule, and the function 
 
 from __future__ import annotations
 
-import types
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from typing import Any, Union, get_args, get_origin
+from typing import Any, get_args
 
 from executive.mission.check.conditions import list_effects
-from executive.mission.model.port_types import describe_type, find_element_type
+from executive.mission.model.port_types import describe_type, find_element_type, is_assignable, is_union
 from executive.skill import ANY, EMPTY, HOLDING, Skill, ToolState
 from executive.testing.conformance.declaration_checks import HALT
 from executive.testing.conformance.situations import ArrangementFailed
@@ -233,13 +232,9 @@ def _is_of_type(value: Any, declared_type: Any) -> bool:
     """Return True if a value, and each element of a list, has the declared type."""
     if declared_type is Any:
         return True
-    origin = get_origin(declared_type)
-    if origin in (Union, types.UnionType):
+    if is_union(declared_type):
         return any(_is_of_type(value, part) for part in get_args(declared_type))
-    if declared_type is float:
-        return isinstance(value, float | int)
-    runtime_type = origin or declared_type
-    if isinstance(runtime_type, type) and not isinstance(value, runtime_type):
-        return False
-    element_type = None if isinstance(value, str | Mapping) else find_element_type(declared_type)
-    return element_type is None or all(_is_of_type(element, element_type) for element in value)
+    element_type = find_element_type(declared_type)
+    elements = () if element_type is None or isinstance(value, str) else value
+    has_type = is_assignable(type(value), declared_type)
+    return has_type and all(_is_of_type(element, element_type) for element in elements)

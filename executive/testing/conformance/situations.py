@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import types
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Union, get_args, get_origin
+from typing import Any, get_args
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from executive.cell.objects import Item, Target
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import SHIPPED_ROUTES, FakeCell, SilentOperator, load_empty_cell
 from executive.geometry import make_tool_down_pose
-from executive.mission.model.port_types import describe_type
+from executive.mission.model.port_types import describe_type, is_union
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
 
 GENERATED_NUMBER = 0.1
@@ -153,7 +152,7 @@ def _find_value_of_type(value_type: Any, refers_to: str, scene: SkillScene) -> A
     """Return a value of this type from the scene; None if the scene has none."""
     if value_type is str:
         return _find_name_in_scene(refers_to, scene)
-    if get_origin(value_type) in (Union, types.UnionType):
+    if is_union(value_type):
         values = (_find_value_of_type(member, refers_to, scene) for member in get_args(value_type))
         return next((value for value in values if value is not None), None)
     if value_type == list[Target]:

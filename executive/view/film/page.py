@@ -104,8 +104,7 @@ def describe_result(result: Result | RunEnded | None) -> tuple[str, str, str]:
     if isinstance(result, RunEnded):
         return result.status, result.message, ""
     counts = ", ".join(f"{count} {state}" for state, count in asdict(result.items).items() if count)
-    verdict = result.message if result.diagnosis is None else result.diagnosis.verdict
-    return result.status, verdict, f"{counts}; {result.robot_time_s:.1f} s"
+    return result.status, result.verdict, f"{counts}; {result.robot_time_s:.1f} s"
 
 
 def _draw_header(frame: Image.Image, title: str, subtitle: str, time: float, duration: float) -> None:

@@ -135,9 +135,8 @@ class LivePage:
         if not self._threads:
             return
         if result is not None:
-            message = result.message if result.diagnosis is None else result.diagnosis.verdict
-            texts = {"status": result.status, "message": message, "run": result.run, "report": report_path}
-            self._enqueue({"result": texts})
+            end = {"status": result.status, "message": result.verdict}
+            self._enqueue({"result": {**end, "run": result.run, "report": report_path}})
         self._queue.put(None)
         try:
             if self._server.wait(SHUTDOWN_TIMEOUT) != 0:

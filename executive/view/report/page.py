@@ -92,10 +92,8 @@ def _describe_end(data: ReportData) -> str:
     result, end = data.result, data.end
     if end is None:
         return "The journal has no end: the run was killed, or is still running."
-    if result is not None and result.diagnosis is not None:
-        return result.diagnosis.verdict
-    if end.message:
-        return end.message
+    if verdict := end.message if result is None else result.verdict:
+        return verdict
     if result is None:
         return "The run ended, but its result.json is missing."
     items = result.items

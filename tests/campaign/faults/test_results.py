@@ -36,8 +36,8 @@ WRONG = replace(
     STUCK, faults={6: TAKEN}, problems=("the arm is not at rest",), remark="it says Release.stuck"
 )
 BRANCHES = (
-    Branch("sort.yaml:12", "catch on Grasp.missed", ("tree/try/catch/1",), 2),
-    Branch("sort.yaml:14", "recover", ("tree/retry/recover",)),
+    Branch("sort.yaml:12", "catch on Grasp.missed", 2),
+    Branch("sort.yaml:14", "recover"),
 )
 TRIALS = (MISSED, LASTING, AGAIN, STUCK, NOWHERE, WRONG)
 FIGURES = FaultCampaignResults("sort", "fake", 3, 11.5, 6, TRIALS, BRANCHES, True)
