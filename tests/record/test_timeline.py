@@ -75,7 +75,7 @@ def test_an_activation_lasts_from_the_start_of_its_node_to_its_end() -> None:
     assert (tree.start, tree.end, tree.status, tree.failure) == (0, 3, "FAILURE", "Detect.unsure: too dark")
     assert (detect.start_tick, detect.end_tick, detect.skill) == (240, 480, "Detect")
     assert timeline.activation_by_path == {"tree": tree, "tree/Detect": detect}
-    assert timeline.last_end == tree
+    assert timeline.root == tree
 
 
 def test_the_item_of_a_skill_may_be_known_at_its_start_or_only_at_its_end() -> None:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-_STATUS_TEXTS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted", "RUNNING": "running"}
+STATUS_TEXTS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted", "RUNNING": "running"}
 """Text for each status, in the order of the texts in `format_counts`."""
 
 
@@ -89,7 +89,7 @@ def group_by_node(activations: Iterable[Activation]) -> dict[str, list[Activatio
 def format_counts(activations: Iterable[Activation]) -> str:
     """Return the number of activations with each status as text: `3 done, 1 failed`."""
     counts = Counter(activation.status for activation in activations)
-    return ", ".join(f"{counts[status]} {text}" for status, text in _STATUS_TEXTS.items() if counts[status])
+    return ", ".join(f"{counts[status]} {text}" for status, text in STATUS_TEXTS.items() if counts[status])
 
 
 def find_last_failure(activations: Sequence[Activation]) -> str:

@@ -36,7 +36,6 @@ class Timeline:
         tick, clock: Control step and time of the last event [s].
         activation_by_path: Last activation of each node, by path of the node.
         end_counts: Number of ended activations by status, for each node by path.
-        last_end: Activation that ended last, or None.
         halted_skills: Paths of the skills halted after the last start, success or failure of a node.
         activations: All activations in the order of their starts.
         items: History of the items.
@@ -47,7 +46,6 @@ class Timeline:
         requests: Requests of the operator; None for the request to quit.
         faults: Time [s] and name of each injected fault.
         traceback: Traceback of the exception that ended the run, or "".
-        _root_path: Path of the root of the tree; "" before its start.
         _reading_by_input: Last reading of each input by name, sorted by time.
     """
 
@@ -58,7 +56,6 @@ class Timeline:
     clock: float = 0.0
     activation_by_path: dict[str, Activation] = field(default_factory=dict)
     end_counts: dict[str, Counter[str]] = field(default_factory=dict)
-    last_end: Activation | None = None
     halted_skills: tuple[str, ...] = ()
     activations: list[Activation] = field(default_factory=list)
     items: ItemsTimeline = field(default_factory=ItemsTimeline)
@@ -69,7 +66,6 @@ class Timeline:
     requests: list[str | None] = field(default_factory=list)
     faults: list[tuple[float, str]] = field(default_factory=list)
     traceback: str = ""
-    _root_path: str = ""
     _activation_count: int = 0
     _reading_by_input: dict[str, Reading] = field(default_factory=dict)
 
@@ -97,7 +93,8 @@ class Timeline:
             case events.BranchChosen():
                 self._add_choice(event)
             case events.ItemChanged():
-                self.items.add_change(event, self.clock, is_after_tree_end=self._has_tree_ended())
+                is_after_tree_end = self.root is not None and self.root.status != "RUNNING"
+                self.items.add_change(event, self.clock, is_after_tree_end=is_after_tree_end)
             case events.FrameSearched():
                 self.items.add_look(event, self.clock)
             case events.TargetSelected():
@@ -138,16 +135,16 @@ class Timeline:
             ancestor_path = ancestor_path.rpartition("/")[0]
         return last
 
-    def _has_tree_ended(self) -> bool:
-        root = self.activation_by_path.get(self._root_path)
-        return root is not None and root.status != "RUNNING"
+    @property
+    def root(self) -> Activation | None:
+        """Last activation of the root of the tree, which starts before all other nodes; None at first."""
+        return next(iter(self.activation_by_path.values()), None)
 
     def _add_start(self, event: events.NodeStarted) -> None:
         interrupted = self.activation_by_path.get(event.node)
         if interrupted is not None and interrupted.status == "RUNNING":
             # A resumed run restarts the nodes that were running at the interruption.
             self._end_activation(interrupted, "INVALID")
-        self._root_path = self._root_path or event.node
         self._activation_count += 1
         number, start = self._activation_count, (self.tick, self.clock)
         activation = Activation(event.node, number, event.skill, event.item, "RUNNING", *start, *start)
@@ -175,7 +172,6 @@ class Timeline:
     def _end_activation(self, activation: Activation, status: str) -> None:
         activation.status, activation.end_tick, activation.end = status, self.tick, self.clock
         self.end_counts.setdefault(activation.node, Counter())[status] += 1
-        self.last_end = activation
 
     def _add_choice(self, event: events.BranchChosen) -> None:
         activation = self.activation_by_path.get(event.node)

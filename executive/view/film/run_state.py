@@ -47,7 +47,7 @@ class FilmRunState:
         timeline = self.timeline
         if running := timeline.find_running_activations():
             return frozenset(activation.node for activation in running)
-        end = _get_end_key(timeline.last_end)
+        end = _get_end_key(timeline.root)
         activations = timeline.activation_by_path.items()
         return frozenset(path for path, activation in activations if _get_end_key(activation) == end)
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
-import pickle
 import queue
 import secrets
 import socket
@@ -15,6 +13,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib.util import find_spec
+from multiprocessing import Pipe
 
 from executive.cell.frame import Frame, FrameCaptured
 from executive.cell.visuals import Visuals
@@ -64,13 +63,15 @@ class LivePage:
             )
         token = secrets.token_urlsafe(24)
         self._error_file = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the page)
-        with socket.create_server((LOOPBACK, 0)) as listener:
+        self._connection, server_connection = Pipe()
+        with socket.create_server((LOOPBACK, 0)) as listener, server_connection:
             port = listener.getsockname()[1]
             self.address = f"http://{LOOPBACK}:{port}/{token}/"
+            descriptors = [listener.fileno(), server_connection.fileno()]
             self._server = subprocess.Popen(
-                build_command("executive.view.live", str(listener.fileno())),
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._error_file,
-                pass_fds=[listener.fileno()],
+                build_command("executive.view.live", *map(str, descriptors)),
+                stdin=subprocess.DEVNULL, stdout=self._error_file, stderr=self._error_file,
+                pass_fds=descriptors,
                 # In a separate session the server gets no Ctrl-C, and can still show the result of the run.
                 start_new_session=True,
             )  # fmt: skip
@@ -86,7 +87,7 @@ class LivePage:
         self._last_camera_image: messages.CameraImage | None = None
         self.problem = ""
         """Description of the first error of the page, or ""."""
-        # The token is sent through the pipe, because every user of the machine can read process arguments.
+        # The token is no process argument, because every user of the machine can read process arguments.
         self._queue.put((token, port))
         self._threads = [
             threading.Thread(target=target, name="page", daemon=True)
@@ -147,6 +148,7 @@ class LivePage:
         for thread in self._threads:
             thread.join()
         self._threads = []
+        self._connection.close()
         self._error_file.close()
 
     def _send_state(self) -> None:
@@ -182,19 +184,18 @@ class LivePage:
             self.problem = self.problem or f"the page is incomplete: {type(error).__name__}: {error}"
 
     def _send_messages(self) -> None:
-        """Send the queued messages in batches, up to the end marker None."""
-        assert self._server.stdin is not None
+        """Send the queued messages in batches, up to the end marker None, and then the end marker."""
         is_last_batch = False
-        with contextlib.suppress(BrokenPipeError), self._server.stdin as pipe:
+        with contextlib.suppress(OSError):
             while not is_last_batch:
                 batch = [self._queue.get()]
                 while not self._queue.empty():
                     batch.append(self._queue.get())
                 is_last_batch = None in batch
-                pickle.dump(list(filter(None, batch)), pipe, pickle.HIGHEST_PROTOCOL)
-                pipe.flush()
+                self._connection.send(list(filter(None, batch)))
                 if not is_last_batch:
                     time.sleep(BATCH_PERIOD)
+            self._connection.send(None)
         self._has_server_ended = True
 
     def _read_last_error(self) -> str:
@@ -204,11 +205,12 @@ class LivePage:
         return lines[-1] if lines else f"exit status {self._server.returncode}"
 
     def _read_commands(self) -> None:
-        """Run the commands that the server writes to stdout, until the server ends."""
-        assert self._server.stdout is not None
-        for line in self._server.stdout:
-            with self._catch_errors():
-                self._run_command(messages.PageCommand(**json.loads(line)))
+        """Run the commands of the server until it ends."""
+        with contextlib.suppress(EOFError, OSError):
+            while True:
+                command = self._connection.recv()
+                with self._catch_errors():
+                    self._run_command(command)
         self._browser_count, self._has_server_ended = 0, True
 
     def _run_command(self, command: messages.PageCommand) -> None:

@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING, TextIO
 
 from executive import events
 from executive.mission.outline import make_outline
+from executive.record.timeline.activation import STATUS_TEXTS
 from executive.record.timeline.timeline import Timeline
 from executive.view.tree.tree_text import find_skill_names
 
 if TYPE_CHECKING:
     from executive.run.run import Run
-
-STATUS_TEXTS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted"}
-"""Text for each status of a node that has ended."""
 
 
 class LineView:
