@@ -9,11 +9,13 @@ from typing import Any, ClassVar
 
 import pytest
 
-import executive.cells.sim.cell
+import executive.mission.load
 from executive.cell.config import CellConfig
+from executive.cells.sim.cell import SimCell
 from executive.mission.load import LoadedMission, load_mission
-from executive.mission.parse import cell_file
+from executive.mission.parse import cell_file, read_mission
 from executive.skill import In, Metres, Out, Skill, param, port
+from executive.tree.node_registry import load_control_nodes
 
 
 class Look(Skill):
@@ -65,19 +67,21 @@ SMALL_CELL = Path(__file__).with_name("small_cell.yaml").read_text()
 
 @pytest.fixture(scope="module")
 def shared_cells() -> Iterator[None]:
-    """Read each cell file once, and look once at the poses of each cell, for all missions of a module."""
-    unfit_poses, found = executive.cells.sim.cell.find_pose_errors, {}
+    """Read each file once, check each cell once, and load the control nodes once, per module."""
+    check, found = SimCell.check, {}
 
-    def look_once(config: CellConfig) -> Any:
-        key = config.model_dump_json()
+    def check_once(config: CellConfig, cell_folder: Path) -> Any:
+        key = config.model_dump_json(), cell_folder
         if key not in found:
-            found[key] = list(unfit_poses(config))
+            found[key] = check(config, cell_folder)
         return found[key]
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cell_file, "read_source", functools.cache(cell_file.read_source))
-        patch.setattr(cell_file, "parse_yaml", functools.cache(cell_file.parse_yaml))
-        patch.setattr(executive.cells.sim.cell, "find_pose_errors", look_once)
+        for module in (cell_file, read_mission):
+            patch.setattr(module, "parse_yaml", functools.cache(module.parse_yaml))
+        patch.setattr(SimCell, "check", staticmethod(check_once))
+        patch.setattr(executive.mission.load, "load_control_nodes", functools.cache(load_control_nodes))
         yield
 
 
