@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from py_trees.common import Status
-
 from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
+from executive.tree.generator_node import NodeRun
 from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Child, Elements, VariableName, key
 from executive.tree.loop import Loop
@@ -43,42 +42,25 @@ class ForEach(Loop):
         elements = self.in_ if self.in_ == "items" else f"[{', '.join(map(str, self.in_))}]"
         return f"${self.each} in {elements}"
 
-    def start(self) -> None:
-        """Read the list, and write its first element to the variable `each`.
+    def run(self) -> NodeRun:
+        """Read the list, then write each element to the variable `each` and run the body.
 
         Raises:
             Fault: The variable with the list was never written, or its value is not a list.
         """
-        super().start()
-        self._elements, self._element_index = self._read_list(), 0
-        if self._elements:
-            self._write_element()
-
-    def step(self) -> Status:
-        """Tick the body; after its end, begin the next iteration, in the same tick if possible."""
-        while self._element_index < len(self._elements):
-            status = self.tick_in_iteration(self.do)
-            if status is Status.RUNNING:
-                return status
-            if status is Status.FAILURE:
-                return self.fail(self.get_failure(self.do))
-            self._element_index += 1
-            if self._element_index == len(self._elements):
-                break
-            self._write_element()
-            if not self.begin_iteration():
-                return Status.RUNNING
-        return Status.SUCCESS
+        elements = self._read_list()
+        for number, element in enumerate(elements, 1):
+            self.blackboard[self.each] = element
+            self.report_choice(f"element {number} of {len(elements)}: {_describe_element(element)}")
+            if number > 1:
+                yield from self.end_iteration()
+            if failure := (yield from self.run_child(self.do)):
+                return failure
+        return None
 
     def clean_up(self) -> None:
         """Remove the variable that holds the current element."""
         self.blackboard.pop(self.each, None)
-
-    def _write_element(self) -> None:
-        element = self._elements[self._element_index]
-        self.blackboard[self.each] = element
-        position = f"element {self._element_index + 1} of {len(self._elements)}"
-        self.report_choice(f"{position}: {_describe_element(element)}")
 
     def _read_list(self) -> tuple[object, ...]:
         variable = self.in_

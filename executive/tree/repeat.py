@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar
 
-from py_trees.common import Status
-
 from executive.skill import ANY, EMPTY, HOLDING
 from executive.tree.failure import Reason
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
+from executive.tree.generator_node import NodeRun
 from executive.tree.inspection import (
     Counterpart,
     MinTimeFunction,
@@ -69,29 +68,21 @@ class Repeat(Loop):
             conditions.append(f"until {format_reasons(self.until)}")
         return " or ".join(conditions)
 
-    def start(self) -> None:
-        """Begin the first iteration."""
-        super().start()
-        self._iteration_count = 0
-
-    def step(self) -> Status:
-        """Tick the body; after its end, begin the next iteration, in the same tick if possible."""
-        while self.do.status is Status.RUNNING or not self._is_complete():
-            status = self.tick_in_iteration(self.do)
-            if status is Status.RUNNING:
-                return status
-            if status is Status.FAILURE:
-                failure = self.get_failure(self.do)
+    def run(self) -> NodeRun:
+        """Run the body until the loop is complete, or the body fails."""
+        iteration_count = 0
+        while not self._is_complete(iteration_count):
+            if failure := (yield from self.run_child(self.do)):
                 if not failure.matches(self._expected_reasons):
-                    return self.fail(failure)
+                    return failure
                 self.report_choice("done", failure)
-                return Status.SUCCESS
-            self._iteration_count += 1
-            if not self.begin_iteration() and not self._is_complete():
-                return Status.RUNNING
+                return None
+            iteration_count += 1
+            if not self._is_complete(iteration_count):
+                yield from self.end_iteration()
         if reached_limit := self._find_reached_limit():
             self.report_choice(f"done, {reached_limit}")
-        return Status.SUCCESS
+        return None
 
     @property
     def _expected_reasons(self) -> list[Reason]:
@@ -108,9 +99,9 @@ class Repeat(Loop):
         """True if the body never runs."""
         return self.times == 0 or any(limit == 0 for _, limit in self._limits)
 
-    def _is_complete(self) -> bool:
+    def _is_complete(self, iteration_count: int) -> bool:
         """Return True if no further iteration may begin."""
-        return self._iteration_count == self.times or bool(self._find_reached_limit())
+        return iteration_count == self.times or bool(self._find_reached_limit())
 
     def _find_reached_limit(self) -> str:
         """Return the first limit that a counter has reached, as a text: `placed: 4`; "" without one."""

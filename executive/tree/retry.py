@@ -6,12 +6,9 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from math import inf, isfinite
 
-from py_trees.common import Status
-
-from executive.cell.protocols import Steps
 from executive.skill import Seconds
-from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, find_fixed_point, join_states
+from executive.tree.generator_node import NodeRun
 from executive.tree.inspection import (
     Advice,
     Counterpart,
@@ -74,51 +71,22 @@ class Retry(Loop):
         backoff_text = "" if self.backoff is None else f", backoff {self.backoff}"
         return f"up to {self.attempts} attempts, on {reasons}{backoff_text}"
 
-    def start(self) -> None:
-        """Begin the first attempt."""
-        super().start()
-        self._attempt = 1
-        self._pending_failure: Failure | None = None
-
-    def step(self) -> Status:
-        """Tick body or recovery; after the recovery, begin the next attempt, in the same tick if possible."""
+    def run(self) -> NodeRun:
+        """Run the body until it succeeds or no attempt is left; between attempts, wait and run `recover`."""
+        attempt = 1
         while True:
-            if self._pending_failure is None:
-                status = self.tick_in_iteration(self.do)
-                if status is not Status.FAILURE:
-                    return status
-                failure = self.get_failure(self.do)
-                if self._attempt == self.attempts or (self.on and not failure.matches(self.on)):
-                    return self.fail(failure)
-                self._pending_failure, self._delay_steps = failure, self._begin_delay(failure)
-            status = self._tick_recovery(self._pending_failure)
-            if status is not Status.SUCCESS:
-                return status
-            self._pending_failure = None
-            if not self.begin_iteration():
-                return Status.RUNNING
-
-    def _begin_delay(self, failure: Failure) -> Steps:
-        """Report the next attempt, and return a generator that waits for the delay before the attempt."""
-        delay = 0.0 if self.backoff is None else self.backoff.compute_delay(self._attempt)
-        self._attempt += 1
-        delay_text = f" in {delay:g} s" if delay else ""
-        self.report_choice(f"attempt {self._attempt} of {self.attempts}{delay_text}", failure)
-        return self.clock.sleep(delay)
-
-    def _tick_recovery(self, failure: Failure) -> Status:
-        """Continue the delay, then tick `recover`; return SUCCESS if the next attempt may begin."""
-        # `next` returns None while the delay lasts.
-        if next(self._delay_steps, "end of the delay") is None:
-            self.has_tick_passed = True
-            return Status.RUNNING
-        if self.recover is None:
-            return Status.SUCCESS
-        status = self.tick_in_iteration(self.recover)
-        if status is Status.FAILURE:
-            self.report_choice("give up: the recovery failed", self.get_failure(self.recover))
-            return self.fail(failure)
-        return status
+            failure = yield from self.run_child(self.do)
+            if not failure or attempt == self.attempts or (self.on and not failure.matches(self.on)):
+                return failure
+            delay = 0.0 if self.backoff is None else self.backoff.compute_delay(attempt)
+            delay_text = f" in {delay:g} s" if delay else ""
+            attempt += 1
+            self.report_choice(f"attempt {attempt} of {self.attempts}{delay_text}", failure)
+            yield from self.clock.sleep(delay)
+            if self.recover and (recovery_failure := (yield from self.run_child(self.recover))):
+                self.report_choice("give up: the recovery failed", recovery_failure)
+                return failure
+            yield from self.end_iteration()
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes, by fixed-point iteration over body and recovery."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar
 
-from py_trees.common import Status
-
 from executive.tree.failure import Failure, Reason
 from executive.tree.flow import Flow, FlowFunction, FlowState, join_states
+from executive.tree.generator_node import GeneratorNode, NodeRun
 from executive.tree.inspection import (
     Advice,
     MinTimeFunction,
@@ -18,7 +17,6 @@ from executive.tree.inspection import (
     format_reasons,
 )
 from executive.tree.keys import Child, KeySection, Reasons, key
-from executive.tree.node import ControlNode
 
 
 class Catch(KeySection):
@@ -28,7 +26,7 @@ class Catch(KeySection):
     do: Child = key(doc="Node to run after one of the failures in `on`.")
 
 
-class TryCatch(ControlNode):
+class TryCatch(GeneratorNode):
     """Run the body, a handler if the body fails, and `finally` at the end.
 
     The node succeeds if the body or the handler succeeds. `finally` runs after success and failure, but not
@@ -57,27 +55,14 @@ class TryCatch(ControlNode):
         """Return the failures after which the handler `child` runs, as a text: `on Grasp.missed`."""
         return next((f"on {format_reasons(handler.on)}" for handler in self.catch if handler.do is child), "")
 
-    def start(self) -> None:
-        """Begin with the body."""
-        self._current_child = self.do
-        self._pending_failure: Failure | None = None
-
-    def step(self) -> Status:
-        """Tick the current child; after its end, tick the next child in the same tick."""
-        while True:
-            child = self._current_child
-            status = self.tick_child(child)
-            if status is Status.RUNNING:
-                return status
-            failure = self.get_failure(child) if status is Status.FAILURE else None
-            if failure is not None and child is self.do and (handler := self._find_handler(failure)):
-                self.report_choice("catch", failure)
-                self._current_child = handler
-            elif self.finally_ is not None and child is not self.finally_:
-                self._pending_failure, self._current_child = failure, self.finally_
-            else:
-                failure = self._pending_failure or failure
-                return Status.SUCCESS if failure is None else self.fail(failure)
+    def run(self) -> NodeRun:
+        """Run the body, then the handler of its failure, then `finally`."""
+        failure = yield from self.run_child(self.do)
+        if failure and (handler := self._find_handler(failure)):
+            self.report_choice("catch", failure)
+            failure = yield from self.run_child(handler)
+        failure_of_finally = (yield from self.run_child(self.finally_)) if self.finally_ else None
+        return failure or failure_of_finally
 
     def _find_handler(self, failure: Failure) -> Child | None:
         return next((handler.do for handler in self.catch if failure.matches(handler.on)), None)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from py_trees.common import Status
-
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
+from executive.tree.generator_node import NodeRun
 from executive.tree.inspection import NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, key
 from executive.tree.loop import Loop
@@ -28,30 +27,14 @@ class While(Loop):
     condition: Child = key(doc="Condition; its failure ends the loop with success.")
     do: Child = key(doc="Body of the loop.")
 
-    def start(self) -> None:
-        """Begin with the condition."""
-        super().start()
-        self._current_child = self.condition
-
-    def step(self) -> Status:
-        """Tick condition or body; after the body, begin the next iteration, in the same tick if possible."""
-        while True:
-            child = self._current_child
-            status = self.tick_in_iteration(child)
-            if status is Status.RUNNING:
-                return status
-            if status is Status.FAILURE:
-                failure = self.get_failure(child)
-                if child is self.do:
-                    return self.fail(failure)
-                self.report_choice("done", failure)
-                return Status.SUCCESS
-            if child is self.condition:
-                self._current_child = self.do
-            else:
-                self._current_child = self.condition
-                if not self.begin_iteration():
-                    return Status.RUNNING
+    def run(self) -> NodeRun:
+        """Run condition and body in turn until the condition or the body fails."""
+        while not (failure := (yield from self.run_child(self.condition))):
+            if body_failure := (yield from self.run_child(self.do)):
+                return body_failure
+            yield from self.end_iteration()
+        self.report_choice("done", failure)
+        return None
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes, by fixed-point iteration over condition and body."""
