@@ -30,6 +30,7 @@ class Fallback(OrderedNode):
     keyword_hints: ClassVar = {"selector": "Write fallback."}
     symbol, shape = "?", "octagon"
     passed_status = Status.FAILURE
+    unreachable_reason = "an earlier child never fails"
 
     do: Children = key(shorthand=True, doc="Alternatives, in order.")
 
@@ -56,10 +57,6 @@ class Fallback(OrderedNode):
     def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the shortest minimum time of a child [s]."""
         return min(map(get_min_time, self.do))
-
-    def explain_unreachable(self, child: Child) -> str:
-        """Return a text that explains why `child` never runs: an earlier child cannot fail."""
-        return "an earlier child never fails"
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the cause of a failure: all children failed. The text contains the handled failures."""

@@ -28,6 +28,7 @@ class ForEach(Loop):
     keyword = "for_each"
     keyword_hints: ClassVar = {"for": "Write for_each."}
     symbol = "∀"
+    unreachable_reason = "the body runs 0 times"
 
     each: VariableName = key(list_key="in", doc="Variable that holds the current element.")
     in_: Elements = key(doc="List, variable that holds a list, or `poses`, `bins`, `classes` or `items`.")
@@ -98,10 +99,6 @@ class ForEach(Loop):
     def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the minimum time of all iterations [s]; 0 if the number of iterations is unknown."""
         return len(self.in_) * get_min_time(self.do) if isinstance(self.in_, tuple) else 0.0
-
-    def explain_unreachable(self, child: Child) -> str:
-        """Return a text that explains why the body never runs: the list is empty."""
-        return "the body runs 0 times"
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the element at which the body failed."""

@@ -87,7 +87,6 @@ class PropagatedFailure:
         last_handled_name: Name of the failure that the node handled last, or "".
         last_choice: Last decision of the node as a text: `attempt 2 of 3`.
         duration: Time from the start of the node to its end [s].
-        has_child_failed: Function that returns True if a child ran and failed in this activation of the node.
     """
 
     child: Child | None
@@ -98,7 +97,6 @@ class PropagatedFailure:
     last_handled_name: str
     last_choice: str
     duration: float
-    has_child_failed: Callable[[Child], bool]
 
     def matches(self, reasons: Sequence[Reason]) -> bool:
         """Return True if one of `reasons` denotes the failure."""

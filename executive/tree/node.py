@@ -186,8 +186,9 @@ class ControlNode(KeyOwner, TreeNode):
         """Yield mistakes in the use of this control node in the mission."""
         yield from ()
 
-    def explain_unreachable(self, child: Child) -> str:
-        """Return a text that explains why a child never runs; "" if another finding explains it."""
+    @property
+    def unreachable_reason(self) -> str:
+        """Reason why a child never runs; "" if another finding explains this."""
         return ""
 
     @property

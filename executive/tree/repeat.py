@@ -53,6 +53,7 @@ class Repeat(Loop):
     keyword = "repeat"
     keyword_hints: ClassVar = {"loop": "Write repeat; for a loop with a condition, write while."}
     any_of = ("times", "until")
+    unreachable_reason = "the body runs 0 times"
 
     times: int | None = key(default=None, ge=0, doc="Maximum number of iterations.")
     until: tuple[Reason | CounterLimits, ...] = key(
@@ -141,10 +142,6 @@ class Repeat(Loop):
             yield NodeFinding(
                 "", "endless", message, "Add a failure reason or elapsed to until, or add times."
             )
-
-    def explain_unreachable(self, child: Child) -> str:
-        """Return a text that explains why the body never runs: the number of iterations is 0."""
-        return "the body runs 0 times"
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return why the loop passed on a failure of its body."""

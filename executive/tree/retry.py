@@ -21,6 +21,9 @@ from executive.tree.inspection import (
 from executive.tree.keys import Child, KeySection, Reasons, key
 from executive.tree.loop import Loop
 
+_GIVE_UP = "give up: the recovery failed"
+"""Choice that a retry reports after a failure of its recovery."""
+
 
 class Backoff(KeySection):
     """Geometrically growing delays before the second and all further attempts."""
@@ -84,7 +87,7 @@ class Retry(Loop):
             self.report_choice(f"attempt {attempt} of {self.attempts}{delay_text}", failure)
             yield from self.clock.sleep(delay)
             if self.recover and (recovery_failure := (yield from self.run_child(self.recover))):
-                self.report_choice("give up: the recovery failed", recovery_failure)
+                self.report_choice(_GIVE_UP, recovery_failure)
                 return failure
             yield from self.end_iteration()
 
@@ -131,16 +134,17 @@ class Retry(Loop):
             message = "a retry with 1 attempt never runs its body again"
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
-    def explain_unreachable(self, child: Child) -> str:
-        """Return a text that explains why the recovery never runs; "" if `child` is the body."""
-        if child is not self.recover or (self.on and self.attempts > 1):
+    @property
+    def unreachable_reason(self) -> str:
+        """Reason why the recovery never runs; "" if another finding explains this."""
+        if self.on and self.attempts > 1:
             return ""
         return "there is only one attempt" if self.attempts == 1 else "the body never fails"
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the cause: a failed recovery, a failure that `on` does not list, or no attempts left."""
         counts = Counter(failure.handled_counts)
-        if self._has_recovery_failed(failure):
+        if failure.last_choice == _GIVE_UP:
             attempt, _ = self.count_attempts(failure)
             cause = f"{failure.last_handled_name}: {failure.last_messages[failure.last_handled_name]}"
             return f"gave up after attempt {attempt} of {self.attempts}: its recovery failed with {cause}"
@@ -157,12 +161,12 @@ class Retry(Loop):
         handled_count = sum(failure.handled_counts.values())
         # `handled_counts` lacks only the failure of the last attempt. After a failed recovery, however, it
         # contains the failures of all attempts, and also the failure of the recovery.
-        return handled_count + (-1 if self._has_recovery_failed(failure) else 1), self.attempts
+        return handled_count + (-1 if failure.last_choice == _GIVE_UP else 1), self.attempts
 
     def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
         """Yield the advice to handle a failure in the recovery, or to allow more attempts."""
         attempt, attempts = self.count_attempts(failure)
-        if self._has_recovery_failed(failure):
+        if failure.last_choice == _GIVE_UP:
             yield Advice(f"handle {failure.last_handled_name} in the recovery", child=self.recover)
         elif attempt == attempts and (not self.on or failure.matches(self.on)):
             yield Advice(f"allow more than {attempts} attempt{'s' if attempts > 1 else ''}", "attempts")
@@ -178,9 +182,6 @@ class Retry(Loop):
         if self.on or self.recover or self.backoff:
             return None
         return Counterpart("RetryUntilSuccessful", {"num_attempts": "attempts"})
-
-    def _has_recovery_failed(self, failure: PropagatedFailure) -> bool:
-        return self.recover is not None and failure.has_child_failed(self.recover)
 
 
 def _format_counts(counts: Mapping[str, int]) -> str:

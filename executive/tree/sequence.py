@@ -25,6 +25,7 @@ class Sequence(OrderedNode):
     keyword = "sequence"
     symbol, shape = "→", "box"
     passed_status = Status.SUCCESS
+    unreachable_reason = "an earlier child never succeeds"
 
     do: Children = key(shorthand=True, doc="Nodes to run, in order.")
 
@@ -44,10 +45,6 @@ class Sequence(OrderedNode):
     def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the sum of the minimum times of all children [s]."""
         return sum(map(get_min_time, self.do))
-
-    def explain_unreachable(self, child: Child) -> str:
-        """Return a text that explains why `child` never runs: an earlier child cannot succeed."""
-        return "an earlier child never succeeds"
 
     @property
     def first_child(self) -> Child | None:

@@ -23,6 +23,7 @@ class While(Loop):
 
     keyword = "while"
     symbol = "↺"
+    unreachable_reason = "the condition never succeeds"
 
     condition: Child = key(doc="Condition; its failure ends the loop with success.")
     do: Child = key(doc="Body of the loop.")
@@ -55,10 +56,6 @@ class While(Loop):
         if condition is not None and not condition.failures and not analysis.is_halted_by_sibling:
             message = f"this loop never ends: its condition, {analysis.get_name(self.condition)}, cannot fail"
             yield NodeFinding("", "endless", message, "Use repeat with times or until.")
-
-    def explain_unreachable(self, child: Child) -> str:
-        """Return a text that explains why the body never runs: the condition cannot succeed."""
-        return "the condition never succeeds"
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the cause of a failure: the body, not the condition, failed."""

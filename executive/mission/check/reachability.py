@@ -7,13 +7,12 @@ from collections.abc import Iterator
 from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, make_error, make_warning
 from executive.mission.flow_analysis import FlowAnalysis
-from executive.mission.model.instance import get_mission_node, make_inspection_instance
+from executive.mission.model.instance import make_inspection_instance
 from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode
 from executive.mission.source import Span
 from executive.skill import EMPTY, HOLDING
 from executive.tree.flow import PossibleToolState
-from executive.tree.node import ControlNode
 
 
 def find_unreachable(context: CheckContext) -> Iterator[Finding]:
@@ -26,17 +25,13 @@ def _find_unreachable_below(node: Node, flow: FlowAnalysis) -> Iterator[Finding]
     for child in node.children:
         if child.path in flow.entry_states:
             yield from _find_unreachable_below(child, flow)
-        elif instance and (explanation := _explain_unreachable(instance, child)):
+        elif instance and instance.unreachable_reason:
             is_list = isinstance(child, InnerNode) and child.is_list and not child.label
             name = "this list" if is_list else get_path_name(child)
-            yield make_warning(child.span, "unreachable", f"{name} can never run: {explanation}")
+            yield make_warning(
+                child.span, "unreachable", f"{name} can never run: {instance.unreachable_reason}"
+            )
             return
-
-
-def _explain_unreachable(instance: ControlNode, child: Node) -> str:
-    children = [candidate for key in instance.keys for candidate in instance.list_children(key)]
-    children_by_path = {get_mission_node(candidate).path: candidate for candidate in children}
-    return instance.explain_unreachable(children_by_path[child.path])
 
 
 def check_tool_states(context: CheckContext) -> Iterator[Finding]:

@@ -11,7 +11,6 @@ from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
 from executive.tree.failure import Reason
 from executive.tree.inspection import PropagatedFailure
-from executive.tree.keys import Child
 from executive.tree.node import ControlNode
 
 _NO_ACTIVATION = Activation("", 0, "", "", "INVALID", 0, 0.0, 0, 0.0)
@@ -79,17 +78,11 @@ def _make_propagated_failure(
     """Return the failure that the node at `path` received from `child`; at the origin, `child` is None."""
     activation = timeline.activation_by_path.get(path) or _NO_ACTIVATION
     children = [each for key in control.keys for each in control.list_children(key)] if control else []
-
-    def has_failed(child: Child) -> bool:
-        last = timeline.activation_by_path.get(get_mission_node(child).path)
-        return last is not None and last.number > activation.number and last.status == "FAILURE"
-
     return PropagatedFailure(
         child=next((each for each in children if get_mission_node(each) is child), None),
         name=activation.reason, reasons=reasons, handled_counts=activation.handled_counts,
         last_messages=activation.message_by_reason, last_handled_name=activation.last_handled_reason,
         last_choice=activation.choice, duration=activation.end - activation.start,
-        has_child_failed=has_failed,
     )  # fmt: skip
 
 
