@@ -25,7 +25,7 @@ from executive.perception.envelope.measurement import (
     format_measurements,
     read_measurements,
 )
-from executive.perception.localization import build_localizer
+from executive.perception.localization import CellLocalizer
 from executive.record.atomic_file import write_atomically
 from executive.training.evaluation.cell_detector import CellDetector
 from executive.training.evaluation.evaluate import (
@@ -216,7 +216,7 @@ def _build_localizer(cell: CellConfig) -> Localizer | None:
     if cell.localization == "ray":
         return None
     classes = {label: build_object_class(label, config) for label, config in cell.objects.items()}
-    return build_localizer(cell.localization, classes)
+    return CellLocalizer(cell.localization, classes)
 
 
 def store_evaluation(

@@ -119,22 +119,19 @@ def _compute_height_error(label: str, height: float, classes: Mapping[str, Objec
 
 
 def describe_top_contradiction(
-    detection: Detection, position: Array, frame: Frame, region: Box, classes: Mapping[str, ObjectClass]
+    detection: Detection, position: Array, frame: Frame, classes: Mapping[str, ObjectClass]
 ) -> str:
     """Return a sentence on the contradiction between the depth image and the detected class; "" if none.
 
-    The result is also "" for a truncated or occluded box, or too few depth values. In a stack of two objects,
-    both boxes contain the top of the upper object; the height of the stack is permitted for both classes.
+    The result is also "" for too few depth values. In a stack of two objects, both boxes contain the top of
+    the upper object; the height of the stack is permitted for both classes.
 
     Args:
-        detection: Box and detected class.
+        detection: Completely visible box and detected class.
         position: Centre of the object `(3,)` [m].
         frame: The searched frame.
-        region: Searched region of the image [pixel].
         classes: Classes of the cell by label.
     """
-    if not _is_completely_visible(detection, frame, region):
-        return ""
     try:
         top = measure_top_height(detection, frame)
     except NoDepth:
@@ -157,23 +154,20 @@ def _list_top_heights(label: str, classes: Mapping[str, ObjectClass]) -> list[fl
 
 
 def describe_size_contradiction(
-    detection: Detection, position: Array, frame: Frame, region: Box, object_class: ObjectClass
+    detection: Detection, position: Array, frame: Frame, object_class: ObjectClass
 ) -> str:
     """Return a sentence on the contradiction between the size of a box and its class; "" if none.
 
-    The result is also "" for a truncated or occluded box. A cylinder with the size of the class encloses the
-    object. The longer side of the box is at most the longer side of the image of the cylinder, and at least
-    the side of the square that is inscribed in the base of the cylinder.
+    A cylinder with the size of the class encloses the object. The longer side of the box is at most the
+    longer side of the image of the cylinder, and at least the side of the square that is inscribed in the
+    base of the cylinder.
 
     Args:
-        detection: Box and detected class.
+        detection: Completely visible box and detected class.
         position: Centre of the object `(3,)` [m].
         frame: The searched frame.
-        region: Searched region of the image [pixel].
         object_class: The detected class.
     """
-    if not _is_completely_visible(detection, frame, region):
-        return ""
     left, top, right, bottom = detection.box
     cylinder_length = _compute_cylinder_length(position, frame, object_class)
     scale = float(frame.matrix[0, 0]) / frame.compute_depth(position)
@@ -188,8 +182,8 @@ def describe_size_contradiction(
     )
 
 
-def _is_completely_visible(detection: Detection, frame: Frame, region: Box) -> bool:
-    """Return True if a box is inside the searched region and the arm does not occlude it."""
+def is_completely_visible(detection: Detection, frame: Frame, region: Box) -> bool:
+    """Return True if a box is inside the searched region [pixel] and the arm does not occlude it."""
     left, top, right, bottom = detection.box
     border_distance = min(left - region[0], top - region[1], region[2] - right, region[3] - bottom)
     return border_distance >= MIN_BORDER_DISTANCE and frame.compute_visible_fraction(detection.box) >= 1.0

@@ -36,7 +36,7 @@ from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.file_search import get_shipped_folder
 from executive.motion.arms import find_arm_errors
 from executive.perception.detectors.screening import screen_detectors
-from executive.perception.localization import build_localizer
+from executive.perception.localization import CellLocalizer
 
 SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
 """Permitted bins of each class of the shipped cells."""
@@ -126,7 +126,7 @@ class FakeCell(CellWithoutHardware):
             tool=self.tool,
             camera=self.camera,
             detectors=screen_detectors(self.detectors, classes),
-            localizer=build_localizer("plane", classes, bins),
+            localizer=CellLocalizer("plane", classes, bins),
         )
 
     @staticmethod

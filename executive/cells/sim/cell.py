@@ -36,7 +36,7 @@ from executive.perception.detectors.detector_registry import find_detectable_lab
 from executive.perception.detectors.requests import ClosableDetector
 from executive.perception.detectors.screening import screen_detectors
 from executive.perception.envelope.rated_detectors import build_rated_detectors
-from executive.perception.localization import build_localizer
+from executive.perception.localization import CellLocalizer
 
 MIN_CENTRE_HEIGHT = -0.05
 """Minimum height of the centre of an object that is still on the table [m]."""
@@ -98,7 +98,7 @@ class SimCell(CellWithoutHardware):
         if options.resume is not None:
             self._camera.set_counts(options.resume.frame_count, options.resume.pose_count)
         classes = {label: build_simulated_class(label, section) for label, section in config.objects.items()}
-        localizer = build_localizer(config.localization, classes, bins, self._world.cast_ray)
+        localizer = CellLocalizer(config.localization, classes, bins, self._world.cast_ray)
         # Detectors are built last, because their processes would outlive an exception in a later statement.
         folders = (options.cell_folder, get_shipped_folder() / "cells")
         self._detectors = build_detectors(

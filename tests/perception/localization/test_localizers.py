@@ -14,11 +14,11 @@ from executive.cell.frame import Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.perception.camera_model import compute_camera_matrix, compute_look_at_pose, project
-from executive.perception.localization import build_localizer
+from executive.perception.localization import CellLocalizer
 
 SIDE = 0.05
 CLASSES = {"cube": ObjectClass("cube", SIDE, 0.0354)}
-PLANE, DEPTH = build_localizer("plane", CLASSES), build_localizer("depth", CLASSES)
+PLANE, DEPTH = CellLocalizer("plane", CLASSES), CellLocalizer("depth", CLASSES)
 K = compute_camera_matrix(640, 480, 55)
 ABOVE = compute_look_at_pose([0.5, 0.0, 1.2], [0.5, 0.0, 0.0], [1, 0, 0])
 ASKEW = compute_look_at_pose([0.3, 0.3, 1.0], [0.5, 0.0, 0.0], [1, 0, 0])
@@ -82,7 +82,7 @@ def test_a_ray_is_cast_from_the_lens_through_the_middle_of_the_box():
         assert origin == pytest.approx(ABOVE.position)
         return origin + (centre[2] + SIDE / 2 - origin[2]) / direction[2] * direction
 
-    found = build_localizer("ray", CLASSES, cast_ray=onto_the_top).locate(*showing_cube(centre))
+    found = CellLocalizer("ray", CLASSES, cast_ray=onto_the_top).locate(*showing_cube(centre))
     assert found == pytest.approx(centre, abs=0.002)
 
 
@@ -109,7 +109,7 @@ def with_one_pixel(detection, frame):
             "frame 7 has no depth image; set `localization: plane` in the cell file, or `depth` of",
         ),
         (
-            build_localizer("ray", CLASSES, cast_ray=lambda origin, direction: None),
+            CellLocalizer("ray", CLASSES, cast_ray=lambda origin, direction: None),
             lambda one, frame: (one, frame),
             "the ray through pixel (320, 240) of frame 7 hits nothing",
         ),
