@@ -43,9 +43,6 @@ class Kinematics(Protocol):
     def compute_tool_pose(self, q: ArrayLike) -> Pose:
         """Return the tool pose `X_WT` at the joint positions `q` `(n,)` [rad]."""
 
-    def compute_flange_pose(self, q: ArrayLike) -> Pose:
-        """Return the flange pose `X_WF` at `q` `(n,)` [rad]."""
-
     def compute_joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
         """Return the frame of each joint at `q` `(n,)` [rad]; each origin is the centre of its joint."""
 

@@ -63,10 +63,8 @@ def find_configuration_pairs(
     raise _make_unreachable_error(kinematics, poses, (upper, lower))
 
 
-def find_vertical_waypoints(
-    kinematics: Kinematics, q: Array, length: float, count: int = WAYPOINT_COUNT
-) -> Array | None:
-    """Return evenly spaced waypoints `(count, n)` [rad] on a vertical line of the tool, or None.
+def find_vertical_waypoints(kinematics: Kinematics, q: Array, length: float) -> Array | None:
+    """Return evenly spaced waypoints `(WAYPOINT_COUNT, n)` [rad] on a vertical line of the tool, or None.
 
     The line leads from the tool at `q` `(n,)` [rad] upwards, is `length` [m] long, and stays in the branch of
     `q`. The result is None if the tool does not point down, or if a joint would leave its range.
@@ -75,7 +73,7 @@ def find_vertical_waypoints(
     if -X_WT.rotation[2, 2] < MIN_COSINE_ON_LINE:
         return None
     try:
-        waypoints = _solve_waypoints(kinematics, X_WT, length, count, kinematics.find_branch(q))
+        waypoints = _solve_waypoints(kinematics, X_WT, length, kinematics.find_branch(q))
     except Unreachable:
         return None
     is_inside = kinematics.joint_range.contains(waypoints).all()
@@ -90,15 +88,13 @@ def solve_vertical_waypoints(kinematics: Kinematics, q: Array, length: float, br
     Raises:
         Unreachable: A point of the line is too far from the arm or too near to the arm.
     """
-    waypoints = _solve_waypoints(kinematics, kinematics.compute_tool_pose(q), length, WAYPOINT_COUNT, branch)
+    waypoints = _solve_waypoints(kinematics, kinematics.compute_tool_pose(q), length, branch)
     return waypoints + wrap_angles(q - waypoints[0])
 
 
-def _solve_waypoints(
-    kinematics: Kinematics, X_WT: Pose, length: float, count: int, branch: BranchKey
-) -> Array:
-    """Return continuous waypoints `(count, n)` [rad] on a vertical line upwards from the tool pose."""
-    positions = X_WT.position + np.outer(np.linspace(0.0, length, count), [0.0, 0.0, 1.0])
+def _solve_waypoints(kinematics: Kinematics, X_WT: Pose, length: float, branch: BranchKey) -> Array:
+    """Return continuous waypoints `(WAYPOINT_COUNT, n)` [rad] on a vertical line upwards from `X_WT`."""
+    positions = X_WT.position + np.outer(np.linspace(0.0, length, WAYPOINT_COUNT), [0.0, 0.0, 1.0])
     waypoints = np.array([kinematics.solve(Pose(X_WT.rotation, p), branch) for p in positions])
     waypoints[1:] = waypoints[0] + wrap_angles(waypoints[1:] - waypoints[0])
     return waypoints

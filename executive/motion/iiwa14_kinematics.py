@@ -75,7 +75,6 @@ class Iiwa14:
             max_angle = interpolate_max_joint_6_angle(min_link_distance)
             lower[5], upper[5] = max(lower[5], -max_angle), min(upper[5], max_angle)
         self.joint_range = JointRange(lower, upper)
-        self._tool_length = tool_length
         self._wrist_to_tool = WRIST_TO_FLANGE + tool_length
         cos4 = math.cos(max(-lower[3], upper[3]))
         # Law of cosines in the triangle of shoulder, elbow and wrist.
@@ -85,11 +84,6 @@ class Iiwa14:
     def compute_tool_pose(self, q: ArrayLike) -> Pose:
         """Return the tool pose `X_WT` at the joint positions `q` `(7,)` [rad]."""
         return self._compute_frames(q)[-1]
-
-    def compute_flange_pose(self, q: ArrayLike) -> Pose:
-        """Return the flange pose `X_WF` at `q` `(7,)` [rad]."""
-        X_WT = self.compute_tool_pose(q)
-        return Pose(X_WT.rotation, X_WT.position - self._tool_length * X_WT.rotation[:, 2])
 
     def compute_joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
         """Return the frame of each joint at `q` `(7,)` [rad]: origin in the joint, z along the next link."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
@@ -79,8 +80,8 @@ class MotionSearch:
         tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, self._locate_free_part_end(), strict=True))
         self._clearance = ClearanceModel(config, task.obstacles, tcps[:, :2])
         self._clearance.relax_end_margins(tcps, axes, self._discs)
-        # Results of `_plan_rise` by its arguments, because all candidates share them.
-        self._rises: dict[tuple[float, bool], tuple[list[MotionPiece], JointState]] = {}
+        # All candidates share the rises.
+        self._get_rise = functools.cache(self._plan_rise)
         self._departure = departure = self._plan_departure(start, float(tcps[0, 2]))
         self._start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
 
@@ -199,9 +200,7 @@ class MotionSearch:
         """
         height, end = self._travel_height + extra_height, candidate.free_part_end
         connect = self._connector.connect
-        if (height, is_straight) not in self._rises:
-            self._rises[height, is_straight] = self._plan_rise(height, is_straight)
-        rise, start_corner = self._rises[height, is_straight]
+        rise, start_corner = self._get_rise(height, is_straight)
         (x, y, z), _ = self._locate_tool(end.q)
         if candidate.branch is None or z >= height:
             return [*rise, connect(start_corner, end)]

@@ -129,14 +129,13 @@ def compute_view_matrix(X_WC: Pose) -> tuple[float, ...]:
     return tuple((np.diag([1.0, -1.0, -1.0, 1.0]) @ view).T.ravel().tolist())
 
 
-def compute_projection_matrix(
-    matrix: Array, region: Box, near: float = NEAR_PLANE, far: float = FAR_PLANE
-) -> tuple[float, ...]:
+def compute_projection_matrix(matrix: Array, region: Box) -> tuple[float, ...]:
     """Return OpenGL's projection matrix for a region of an image: 16 numbers in column-major order.
 
     A renderer with the matrix draws only `region` (left, top, right, bottom [pixel]) of the full image.
-    `near` and `far` are the distances of the clipping planes [m].
+    The clipping planes are at `NEAR_PLANE` and `FAR_PLANE`.
     """
+    near, far = NEAR_PLANE, FAR_PLANE
     # Sides of the region in the near plane [m], in OpenGL's camera frame.
     left, right = ((x - matrix[0, 2]) / matrix[0, 0] * near for x in region[::2])
     top, bottom = ((matrix[1, 2] - y) / matrix[1, 1] * near for y in region[1::2])

@@ -106,10 +106,7 @@ def _render_samples(
     cv2.setNumThreads(1)
     cameras = [next(iter(cell.cameras)) for cell in cells]
     with contextlib.ExitStack() as stack:
-        renderers = [
-            SceneRenderer(cell, camera, is_random=scene is None, scene=scene or DECLARED_SCENE)
-            for cell, camera in zip(cells, cameras, strict=True)
-        ]
+        renderers = [SceneRenderer(cell, camera, scene) for cell, camera in zip(cells, cameras, strict=True)]
         for renderer in renderers:
             stack.callback(renderer.close)
         for number in image_numbers:

@@ -51,7 +51,7 @@ def find_waypoints(
         Unreachable: A waypoint is out of reach.
     """
     x, y, z = kinematics.compute_tool_pose(start).position.tolist()
-    line = find_vertical_waypoints(kinematics, start, max(0.0, height - z), 2)
+    line = find_vertical_waypoints(kinematics, start, max(0.0, height - z))
     up = reach(kinematics, (x, y, height), start) if line is None else line[-1]
     fetch = find_configuration_pairs(kinematics, touch, height - touch.position[2], start)
     carry = find_configuration_pairs(kinematics, drop, height - drop.position[2], start)

@@ -108,7 +108,7 @@ class SceneGenerator:
         for _ in range(MAX_TRIES):
             for body in tuple(self._world.labels):
                 self._world.remove_object(body)
-            bodies = spawn_objects(self._world, self._cell, int(self._random.integers(2**31)))
+            bodies = spawn_objects(self._world, int(self._random.integers(2**31)))
             if not bodies:
                 continue
             try:

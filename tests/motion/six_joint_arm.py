@@ -34,10 +34,6 @@ class SixJointArm:
         R, p = self._last_frame(q)
         return Pose(R, p + self._wrist_to_tool * R[:, 2])
 
-    def compute_flange_pose(self, q: ArrayLike) -> Pose:
-        R, p = self._last_frame(q)
-        return Pose(R, p + WRIST_TO_FLANGE * R[:, 2])
-
     def compute_joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
         frames = []
         R, p = np.eye(3), np.array([0.0, 0.0, HEIGHT])

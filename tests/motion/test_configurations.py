@@ -53,10 +53,10 @@ def test_a_free_yaw_turns_joint_7_no_more_than_the_way_down_asks_for() -> None:
 
 def test_there_is_no_line_up_where_the_tool_does_not_point_down_or_a_joint_leaves_its_range() -> None:
     tilted = START + np.eye(7)[5] * 0.1
-    assert find_vertical_waypoints(ARM, START, 0.1, 5) is not None
-    assert find_vertical_waypoints(ARM, tilted, 0.1, 5) is None
+    assert find_vertical_waypoints(ARM, START, 0.1) is not None
+    assert find_vertical_waypoints(ARM, tilted, 0.1) is None
     narrow = arm_within(np.minimum(LIMITS.position.upper, np.abs(START) + 0.01))
-    assert find_vertical_waypoints(narrow, START, 0.2, 5) is None
+    assert find_vertical_waypoints(narrow, START, 0.2) is None
 
 
 @pytest.mark.parametrize(

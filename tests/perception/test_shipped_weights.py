@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from executive.cells.sim.scene_file import DECLARED_SCENE
 from executive.cells.sim.scenes import SceneRenderer
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
@@ -37,7 +38,7 @@ def test_fresh_scenes_of_a_shipped_cell_are_read_almost_without_error(
     missions, name, scenes, randomized, precision, recall
 ):
     config = load_cell(missions / "cells" / f"{name}.yaml")
-    renderer = SceneRenderer(config, next(iter(config.cameras)), is_random=randomized)
+    renderer = SceneRenderer(config, next(iter(config.cameras)), None if randomized else DECLARED_SCENE)
     samples = []
     for seed in scenes:
         drawn = renderer.render_sample(seed)

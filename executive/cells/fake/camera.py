@@ -17,6 +17,7 @@ from executive.cells.fake.world import FakeWorld
 from executive.errors import Unavailable
 from executive.geometry import Pose
 from executive.perception.mounted_camera import MountedCamera
+from executive.perception.visibility import compute_hull_mask
 
 DEFAULT_CONFIDENCE = 0.9
 """Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""
@@ -67,10 +68,8 @@ class FakeCamera(MountedCamera):
         return mask
 
     def _is_table_in_image(self) -> bool:
-        corners = self._compute_pose().inverse().apply(self._corners) @ self.matrix.T
-        pixels = corners[:, :2] / corners[:, 2:]
-        is_inside = (pixels >= 0) & (pixels < (self.config.width, self.config.height))
-        return bool(np.all(corners[:, 2] > 0) and np.all(is_inside))
+        size = self.config.width, self.config.height
+        return compute_hull_mask(self._corners, self.matrix, self._compute_pose(), size) is not None
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
 from executive.cell.layout import build_bin, compute_travel_height
 from executive.cell.protocols import MinTimes, Routes
@@ -21,7 +19,6 @@ from executive.cells.fake.state_log import FakeStateLog, restore_world
 from executive.cells.fake.visuals import FakeVisuals
 from executive.cells.fake.world import (
     TOUCH_DISTANCE,
-    FakeObject,
     FakeWorld,
     describe_lack_of_room,
     put_random_objects,
@@ -178,20 +175,15 @@ class FakeCell(CellWithoutHardware):
     def audit(self) -> dict[str, int]:
         """Return the number of objects by outcome, such as `right`, `wrong_bin`, `left` and `elsewhere`."""
         held, removed = self.world.held_object, self.world.removed_objects
-        final_objects = [
-            FinalObject(o.label, self._find_bin(o), o.rest_positions, o.is_dropped, o is held, o in removed)
-            for o in (*self.world.objects, *removed)
-        ]
+        final_objects = []
+        for each in (*self.world.objects, *removed):
+            bin, positions, is_removed = self.world.find_bin(each), each.rest_positions, each in removed
+            name = bin.name if bin else ""
+            final_objects.append(
+                FinalObject(each.label, name, positions, each.is_dropped, each is held, is_removed)
+            )
         max_distance = self.config.ledger.gate
         return count_outcomes(final_objects, self.ledger.records, self.cell.bins, self.routes, max_distance)
-
-    def _find_bin(self, fake_object: FakeObject) -> str:
-        """Return the name of the bin that contains an object, or ""."""
-        # An object on the wall of a bin counts as in this bin, unless the object is inside another bin.
-        wall_margin = BIN_THICKNESS + self.cell.classes[fake_object.label].radius / 2
-        position = fake_object.position
-        margins_and_bins = itertools.product((0.0, wall_margin), self.cell.bins.values())
-        return next((bin.name for margin, bin in margins_and_bins if bin.contains(position, margin)), "")
 
     def close(self) -> None:
         """Close the log."""

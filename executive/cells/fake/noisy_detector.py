@@ -83,7 +83,7 @@ class NoisyDetector:
         detections = [detection for detection in answer.confident if rng.random() >= self._config.miss_rate]
         detections = [self._shift_box(self._replace_class(detection, rng), rng) for detection in detections]
         false_count = rng.poisson(self._config.false_detections)
-        detections += [self._make_false_detection(frame, view, rng) for _ in range(false_count)]
+        detections += [self._make_false_detection(view, rng) for _ in range(false_count)]
         detections.sort(key=lambda detection: -detection.confidence)
         return Answer(self._context.name, tuple(detections), self._config.error_rates)
 
@@ -100,10 +100,9 @@ class NoisyDetector:
         shift = rng.normal(0.0, self._config.jitter, 2)
         return replace(detection, box=tuple(np.add(detection.box, [*shift, *shift])))
 
-    def _make_false_detection(self, frame: Frame, view: str, rng: np.random.Generator) -> Detection:
+    def _make_false_detection(self, view: str, rng: np.random.Generator) -> Detection:
         """Return a detection with random class, confidence and box in the region of a view."""
-        height, width = frame.image.shape[:2]
-        region = self._context.camera.table_view if view == "table" else (0, 0, width, height)
+        region = self._context.camera.get_view_box(view)
         x, y = rng.uniform(region[:2], region[2:])
         half_width, half_height = rng.uniform(*FALSE_BOX_SIDE_RANGE, 2) / 2
         box = (x - half_width, y - half_height, x + half_width, y + half_height)

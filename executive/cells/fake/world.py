@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
@@ -102,18 +103,20 @@ class FakeWorld:
                 fake_object.position[:2] = obstacle.position[:2] + min_distance * direction
         self._move_into_bin(fake_object)
 
+    def find_bin(self, fake_object: FakeObject) -> Bin | None:
+        """Return the bin that contains an object; if there is none, the bin on whose wall the object lies."""
+        wall_margin = BIN_THICKNESS + self.classes[fake_object.label].radius / 2
+        margins_and_bins, position = itertools.product((0.0, wall_margin), self.bins), fake_object.position
+        return next((bin for margin, bin in margins_and_bins if bin.contains(position, margin)), None)
+
     def _move_into_bin(self, fake_object: FakeObject) -> bool:
         """Move an object on a bin wall into the bin, and return True if the object is then in a bin."""
-        radius = self.classes[fake_object.label].radius
-        if any(bin.contains(fake_object.position) for bin in self.bins):
-            return True
-        for bin in self.bins:
-            if bin.contains(fake_object.position, BIN_THICKNESS + radius / 2):
-                max_offset = np.maximum(bin.size[:2] / 2 - radius, 0.0)
-                offset = fake_object.position[:2] - bin.position[:2]
-                fake_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
-                return True
-        return False
+        bin = self.find_bin(fake_object)
+        if bin is not None and not bin.contains(fake_object.position):
+            max_offset = np.maximum(bin.size[:2] / 2 - self.classes[fake_object.label].radius, 0.0)
+            offset = fake_object.position[:2] - bin.position[:2]
+            fake_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
+        return bin is not None
 
     def find_touched_object(self, tip_position: Array) -> FakeObject | None:
         """Return the object that a cup at `tip_position` `(3,)` [m] touches from above, or None."""

@@ -83,8 +83,7 @@ class SimArm:
     @property
     def q(self) -> Array:
         """Measured joint positions `(n,)` [rad]."""
-        states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
-        return np.array([state[0] for state in states])
+        return self._world.get_joint_positions()
 
     @property
     def tool_pose(self) -> Pose:

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig
 from executive.cell.layout import compute_max_pile_height
-from executive.cells.sim.arm import SimArm
-from executive.cells.sim.robot_models import ROBOT_MODELS
+from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 from executive.motion.arm_model import Kinematics
 from executive.perception.visibility import (
@@ -29,7 +28,7 @@ class ArmOcclusion:
     """Occlusion of camera images by the arm, its tool and a held object.
 
     Args:
-        arm: The arm.
+        world: The world with the arm.
         kinematics: Kinematics of the arm.
         config: The cell file.
         is_loaded: Returns True if the tool holds an object; the object is assumed to be of the largest class.
@@ -37,15 +36,15 @@ class ArmOcclusion:
 
     def __init__(
         self,
-        arm: SimArm,
+        world: World,
         kinematics: Kinematics,
         config: CellConfig,
         is_loaded: Callable[[], bool] = lambda: False,
     ) -> None:
-        self._arm = arm
+        self._world = world
         self._kinematics = kinematics
         self._is_loaded = is_loaded
-        self._link_radius = ROBOT_MODELS[config.arm.urdf].link_radius
+        self._X_TF = Pose.of([0.0, 0.0, -config.tool.length])
         models = config.objects.values()
         self._load_radius = max(model.radius for model in models) + MAX_LOAD_OFFSET
         self._load_height = max(model.height for model in models)
@@ -54,12 +53,13 @@ class ArmOcclusion:
 
     def compute_visibility_mask(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:
         """Return a mask `(H, W)` of the visible pixels; `size` is width and height of the image [pixel]."""
-        q = self._arm.q
-        X_WF, X_WT = self._kinematics.compute_flange_pose(q), self._kinematics.compute_tool_pose(q)
+        q = self._world.get_joint_positions()
+        X_WT = self._kinematics.compute_tool_pose(q)
+        X_WF = X_WT @ self._X_TF
         joint_frames = self._kinematics.compute_joint_frames(q)
         joints = [np.zeros(3), *(frame.position for frame in joint_frames), X_WF.position]
         tool_axis = [X_WF.position, X_WT.position]
-        parts: list[ArmPart] = [(joints, self._link_radius), (tool_axis, TOOL_SPHERE_RADIUS)]
+        parts: list[ArmPart] = [(joints, self._world.robot.link_radius), (tool_axis, TOOL_SPHERE_RADIUS)]
         if self._is_loaded():
             load_end = X_WT.apply(np.array([0.0, 0.0, self._load_height]))
             parts.append(([X_WT.position, load_end], self._load_radius))

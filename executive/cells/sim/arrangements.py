@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -12,9 +12,10 @@ import pybullet
 from numpy.random import Generator
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.cell.bins import BIN_THICKNESS
+from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.clock import STEP
-from executive.cell.config import BinConfig, CameraConfig, CellConfig, Colour, ObjectConfig
+from executive.cell.config import CameraConfig, CellConfig, Colour, ObjectConfig
+from executive.cell.layout import build_bins
 from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim.camera import Region
 from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, load_mesh
@@ -145,11 +146,12 @@ def draw_arrangement(
         margin = rng.uniform(0.0, 0.02 + 0.006 * count)
         low = np.maximum(low, np.array([config.table.x[0], config.table.y[0]]) - margin)
         high = np.minimum(high, np.array([config.table.x[1], config.table.y[1]]) + margin)
-    bins = [bin for bin in config.bins.values() if _overlaps_rectangle(bin, low, high)]
+    all_bins = build_bins(config).values()
+    bins = [bin for bin in all_bins if _overlaps_rectangle(bin, low, high)]
     random_number = rng.random()
     if random_number < 0.15:
         return simulate_fall(config, _draw_heap(objects[:MAX_SPARSE_OBJECT_COUNT], low, high, bins, rng))
-    objects = _place_side_by_side(config, objects, low, high, bins, rng)
+    objects = _place_side_by_side(objects, low, high, bins, all_bins, rng)
     if random_number < 0.23:
         drop_offset = np.array([0, 0, 0.04])
         raised = [replace(o, X_WO=Pose(_draw_rotation(rng), o.X_WO.position + drop_offset)) for o in objects]
@@ -209,24 +211,18 @@ def _draw_rotation(rng: Generator) -> Array:
     return rotation_from_quaternion(rng.normal(size=4))
 
 
-def _overlaps_rectangle(bin: BinConfig, low: Array, high: Array) -> bool:
+def _overlaps_rectangle(bin: Bin, low: Array, high: Array) -> bool:
     """Return True if a bin overlaps the rectangle from `low` to `high` `(2,)` [m] by over 4 cm."""
-    half_size = np.array(bin.size[:2]) / 2
-    centre = np.array(bin.position[:2])
+    centre, half_size = bin.position[:2], bin.size[:2] / 2
     return bool((centre + half_size > low + 0.04).all() and (centre - half_size < high - 0.04).all())
 
 
-def _outline_contains(bin: BinConfig, point: Array, margin: float) -> bool:
-    """Return True if a point `(2,)` [m] is inside the outline of a bin, enlarged by a margin [m]."""
-    return bool((np.abs(point - bin.position[:2]) < np.array(bin.size[:2]) / 2 + margin).all())
-
-
 def _draw_heap(
-    objects: Sequence[SceneObject], low: Array, high: Array, bins: list[BinConfig], rng: Generator
+    objects: Sequence[SceneObject], low: Array, high: Array, bins: list[Bin], rng: Generator
 ) -> list[SceneObject]:
     """Return objects above each other, over a point of the table or over a bin."""
     if bins and rng.random() < 0.6:
-        centre = np.array(bins[int(rng.integers(len(bins)))].position[:2])
+        centre = bins[int(rng.integers(len(bins)))].position[:2]
     else:
         centre = rng.uniform(low + 0.03, np.maximum(high - 0.03, low + 0.031))
     std = rng.uniform(0.01, 0.06)
@@ -254,11 +250,11 @@ def _stack_randomly(objects: list[SceneObject], rng: Generator) -> None:
 
 
 def _place_side_by_side(
-    config: CellConfig,
     objects: Sequence[SceneObject],
     low: Array,
     high: Array,
-    bins: list[BinConfig],
+    bins: list[Bin],
+    all_bins: Collection[Bin],
     rng: Generator,
 ) -> list[SceneObject]:
     """Return objects at random free positions on the table or in `bins`; objects without room are omitted."""
@@ -270,12 +266,12 @@ def _place_side_by_side(
             point, floor_height = rng.uniform(low, high), 0.0
             if bins and rng.random() < 0.35:
                 bin = bins[int(rng.integers(len(bins)))]
-                max_offset = np.maximum(np.array(bin.size[:2]) / 2 - radius, 0.0)
-                point = np.array(bin.position[:2]) + rng.uniform(-max_offset, max_offset)
-            bins_at_point = [bin for bin in config.bins.values() if _outline_contains(bin, point, -radius)]
+                max_offset = np.maximum(bin.size[:2] / 2 - radius, 0.0)
+                point = bin.position[:2] + rng.uniform(-max_offset, max_offset)
+            bins_at_point = [bin for bin in all_bins if bin.contains(point, -radius)]
             if bins_at_point:
                 floor_height = bins_at_point[0].position[2] + BIN_THICKNESS
-            elif any(_outline_contains(bin, point, radius + BIN_THICKNESS) for bin in config.bins.values()):
+            elif any(bin.contains(point, radius + BIN_THICKNESS) for bin in all_bins):
                 continue
             is_free = all(
                 np.linalg.norm(item.X_WO.position[:2] - point) > radius + item.model.radius + gap

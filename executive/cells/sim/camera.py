@@ -54,6 +54,8 @@ class Light(Section):
     """Specular coefficient of the Phong model, 0 to 3."""
     shadow: bool = False
     """True if objects cast shadows."""
+    brightness: float = Field(1.0, ge=0, le=5)
+    """Factor on `ambient`, `diffuse` and `specular`."""
 
 
 CELL_LIGHT = Light()
@@ -113,9 +115,9 @@ def render(world: World, matrix: Array, X_WC: Pose, region: Region, light: Light
         lightColor=light.colour,
         lightDistance=3.0,
         shadow=int(light.shadow),
-        lightAmbientCoeff=light.ambient,
-        lightDiffuseCoeff=light.diffuse,
-        lightSpecularCoeff=light.specular,
+        lightAmbientCoeff=light.brightness * light.ambient,
+        lightDiffuseCoeff=light.brightness * light.diffuse,
+        lightSpecularCoeff=light.brightness * light.specular,
         renderer=pybullet.ER_TINY_RENDERER,
     )
     image = np.ascontiguousarray(np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3])
@@ -163,8 +165,9 @@ def _compute_edge_mask(depth: Array, config: DepthConfig) -> Mask:
 class SimCamera(MountedCamera):
     """A camera of the simulated world; implements `executive.cell.protocols.Camera`.
 
-    The noise of a frame depends only on the seed and on the number of the frame. A depth sensor does not
-    change the image noise.
+    The cell file of the world contains the true extrinsics, intrinsics and noise of the camera. The frames
+    contain the matrix and the pose of `config`. The noise of a frame depends only on the seed and on the
+    number of the frame. A depth sensor does not change the image noise.
 
     Args:
         world: The observed world.
@@ -172,11 +175,9 @@ class SimCamera(MountedCamera):
         config: Section of the camera in the cell file.
         clock: Clock for the time stamps of the frames.
         seed: Seed of the noise.
-        occlusion: Occlusion by the arm; None: nothing is occluded, and the table is always visible.
+        occlusion: Occlusion by the arm.
         get_change_count: Returns the number of changes of the objects on the table so far.
         light: Light of the scene.
-        true_config: True extrinsics, intrinsics and noise of the camera; None: those of `config`. The frames
-            contain the matrix and the pose of `config`.
         bins: Bins that serve as landmarks for the detection of a displaced camera.
     """
 
@@ -188,14 +189,13 @@ class SimCamera(MountedCamera):
         clock: Clock,
         seed: int,
         *,
-        occlusion: ArmOcclusion | None = None,
+        occlusion: ArmOcclusion,
         get_change_count: Callable[[], int] = lambda: 0,
         light: Light = CELL_LIGHT,
-        true_config: CameraConfig | None = None,
         bins: Sequence[Bin] = (),
     ) -> None:
         super().__init__(name, config, world.get_flange_pose, clock, get_change_count)
-        self._true_config = true_config or config
+        self._true_config = world.config.cameras[name]
         self._world = world
         self._seed = seed
         self._occlusion = occlusion
@@ -204,8 +204,7 @@ class SimCamera(MountedCamera):
 
     def sees_table(self) -> bool:
         """Return True if the whole workspace is in the image now and not occluded by the arm."""
-        occlusion = self._occlusion
-        return occlusion is None or occlusion.is_table_visible(self.matrix, self._compute_pose(), self._size)
+        return self._occlusion.is_table_visible(self.matrix, self._compute_pose(), self._size)
 
     def describe_displacement(self, frame: Frame) -> str:
         """Return a message if a frame shows a displacement of the camera from the declared pose, else ""."""
@@ -230,6 +229,4 @@ class SimCamera(MountedCamera):
         return image, add_depth_noise(rendered.depth, self.config.depth, rng)
 
     def _compute_visibility_mask(self, X_WC: Pose) -> Mask:
-        if self._occlusion is None:
-            return np.ones(self._size[::-1], np.bool_)
         return self._occlusion.compute_visibility_mask(self.matrix, X_WC, self._size)

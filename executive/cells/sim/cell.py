@@ -21,7 +21,6 @@ from executive.cells.sim.models import build_simulated_class, find_model_errors
 from executive.cells.sim.poses import find_places_out_of_reach, find_pose_errors
 from executive.cells.sim.rebuild import InterruptedState, rebuild_world
 from executive.cells.sim.scene_file import load_scene
-from executive.cells.sim.scene_world import build_light
 from executive.cells.sim.spawn import build_initial_world, derive_seeds, find_lack_of_room
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.visuals import SimVisuals
@@ -89,10 +88,9 @@ class SimCell(CellWithoutHardware):
             camera_config,
             clock,
             camera_seed,
-            occlusion=ArmOcclusion(self._arm, planner.kinematics, config, lambda: self._tool.holding),
+            occlusion=ArmOcclusion(world, planner.kinematics, config, lambda: self._tool.holding),
             get_change_count=lambda: self.accounts.change_count,
-            light=build_light(scene.light),
-            true_config=self._world.config.cameras[name],
+            light=scene.light,
             bins=tuple(bins),
         )
         if options.resume is not None:

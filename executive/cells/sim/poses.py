@@ -14,7 +14,6 @@ from executive.cell.clock import StepClock
 from executive.cell.config import CellConfig
 from executive.cell.layout import find_unreachable_places
 from executive.cell.workcell import KeyPath
-from executive.cells.sim.arm import SimArm
 from executive.cells.sim.arm_occlusion import ArmOcclusion
 from executive.cells.sim.camera import SimCamera, get_camera_pose
 from executive.cells.sim.collision import ClearanceChecker
@@ -69,8 +68,7 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message for each scan pose or bin that hides a part of the workspace from a camera."""
     planner = build_planner(config)
-    arm = SimArm(world, planner, config, StepClock(lambda: 0.0))
-    occlusion = ArmOcclusion(arm, planner.kinematics, config)
+    occlusion = ArmOcclusion(world, planner.kinematics, config)
     for name, camera in config.cameras.items():
         if camera.partial_views:
             yield from _find_uncovered_areas(config, world, occlusion, name)

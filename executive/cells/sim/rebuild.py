@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BPoly
@@ -117,8 +116,12 @@ class SampledMotion:
 
     def __init__(self, states: JointState, duration: float) -> None:
         self.duration = duration
-        self._motion_times = np.append(np.arange(0.0, duration, STEP), duration)
-        self._states = states
+        motion_times = np.append(np.arange(0.0, duration, STEP), duration)
+        if len(motion_times) == 1:  # a motion of duration 0
+            q = BPoly(states.q[None], [0.0, 1.0])
+        else:
+            q = BPoly.from_derivatives(motion_times, np.stack(states, axis=1))
+        self._curves = q, q.derivative(), q.derivative(2)
 
     def state_at(self, s: float) -> JointState:
         """Return the state at the time `s` since the start of the motion [s]."""
@@ -127,12 +130,3 @@ class SampledMotion:
     def sample(self, times: Array) -> JointState:
         """Return the states at `times` `(N,)` [s]."""
         return JointState(*(curve(times) for curve in self._curves))
-
-    @cached_property
-    def _curves(self) -> tuple[BPoly, BPoly, BPoly]:
-        """Curves of the joint positions, velocities and accelerations over time."""
-        if len(self._motion_times) == 1:  # a motion of duration 0
-            q = BPoly(self._states.q[None], [0.0, 1.0])
-        else:
-            q = BPoly.from_derivatives(self._motion_times, np.stack(self._states, axis=1))
-        return q, q.derivative(), q.derivative(2)

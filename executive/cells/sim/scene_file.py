@@ -59,13 +59,6 @@ ModelRange = Annotated[
 Palette = Annotated[tuple[Colour, ...], AfterValidator(check_palette)]
 
 
-class LightConfig(Light):
-    """The directional light and the ambient light; the defaults apply to every simulated cell."""
-
-    brightness: float = Field(1.0, ge=0, le=5)
-    """Factor on `ambient`, `diffuse` and `specular`."""
-
-
 class SceneTableConfig(Section):
     """The surface of the table and the arrangement of the objects."""
 
@@ -129,7 +122,7 @@ class SceneConfig(Section):
 
     scene: str = Field(min_length=1)
     """Name of the scene."""
-    light: LightConfig = LightConfig()
+    light: Light = Light()
     """The directional light and the ambient light."""
     table: SceneTableConfig = SceneTableConfig()
     """The table, and the number and positions of the objects."""

@@ -9,10 +9,8 @@ from numpy.typing import ArrayLike
 from executive.cell.config import CalibrationConfig, CameraConfig, CellConfig, ObjectConfig
 from executive.cell.config.cameras import POSE_AND_FOV_KEYS, TransformConfig
 from executive.cells.sim.arrangements import DAMAGED_MODEL_NUMBER, load_unknown_model, scale_model
-from executive.cells.sim.camera import Light
 from executive.cells.sim.scene_file import (
     ANY_CLASS,
-    LightConfig,
     SceneCameraConfig,
     SceneConfig,
     SceneObjectConfig,
@@ -43,12 +41,6 @@ def apply_scene(config: CellConfig, scene: SceneConfig) -> CellConfig:
             "cameras": {**config.cameras, name: _change_camera(camera, scene.camera)},
         }
     )
-
-
-def build_light(light: LightConfig) -> Light:
-    """Return the light of a scene, with `brightness` applied to the coefficients."""
-    scaled = {key: light.brightness * getattr(light, key) for key in ("ambient", "diffuse", "specular")}
-    return Light.model_construct(**{**light.model_dump(exclude={"brightness"}), **scaled})
 
 
 def paint_table(world: World, scene: SceneConfig) -> None:

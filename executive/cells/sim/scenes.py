@@ -30,7 +30,7 @@ from executive.cells.sim.camera import (
 )
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
-from executive.cells.sim.scene_world import apply_scene, build_light, paint_table
+from executive.cells.sim.scene_world import apply_scene, paint_table
 from executive.cells.sim.silhouette import compute_bounding_box, compute_visible_fraction
 from executive.cells.sim.spawn import spawn_objects
 from executive.cells.sim.table_top import WOOD_TEXTURE
@@ -95,21 +95,17 @@ class SceneRenderer:
     Args:
         config: The cell file.
         camera: Name of the camera.
-        is_random: True for random scenes, which vary more than runs, for training. False for initial scenes
-            of runs, with the arm in a scan pose.
-        scene: Changes to initial scenes of runs.
+        scene: Changes to initial scenes of runs, with the arm in a scan pose; None for random scenes, which
+            vary more than runs, for training.
     """
 
-    def __init__(
-        self, config: CellConfig, camera: str, *, is_random: bool = True, scene: SceneConfig = DECLARED_SCENE
-    ) -> None:
-        self._is_random = is_random
+    def __init__(self, config: CellConfig, camera: str, scene: SceneConfig | None = None) -> None:
         self._scene = scene
         self._declared_camera = config.cameras[camera]
-        self._config = apply_scene(config, scene)
+        self._config = apply_scene(config, scene or DECLARED_SCENE)
         self._camera = self._config.cameras[camera]
         self._world = World(self._config)
-        paint_table(self._world, scene)
+        paint_table(self._world, scene or DECLARED_SCENE)
         self._matrix, _ = compute_calibration(self._camera)
 
     def render_sample(self, seed: int) -> Sample:
@@ -123,7 +119,7 @@ class SceneRenderer:
             rng = np.random.default_rng([seed, attempt])
             attempt += 1
             try:
-                sample = self._render_random(rng) if self._is_random else self._render_initial(rng)
+                sample = self._render_initial(self._scene, rng) if self._scene else self._render_random(rng)
                 if sample is not None:
                     return sample
             except InputError:
@@ -161,12 +157,12 @@ class SceneRenderer:
         sample = _build_sample(rendered, MIN_CONTRAST * noise.read, objects_by_body)
         return sample and replace(sample, image=_resize(add_noise(rendered.image, noise, rng)))
 
-    def _render_initial(self, rng: np.random.Generator) -> Sample | None:
+    def _render_initial(self, scene: SceneConfig, rng: np.random.Generator) -> Sample | None:
         """Return the sample of an initial scene, or None if too many objects are heavily occluded."""
         world, camera = self._world, self._camera
         pose = np.radians(self._config.arm.poses_deg[str(rng.choice(camera.scan_poses))])
         world.set_joint_positions(pose)
-        bodies = spawn_objects(world, self._config, int(rng.integers(2**32)), unknown=self._scene.unknown)
+        bodies = spawn_objects(world, int(rng.integers(2**32)), scene.unknown)
         world.set_joint_positions(pose)  # the arm may have sagged during the physics steps
         with _remove_at_end(world, bodies):
             X_WC = get_camera_pose(world, camera)
@@ -175,7 +171,7 @@ class SceneRenderer:
                 body: SceneObject(world.labels[body], world.models[body], world.get_object_pose(body))
                 for body in bodies
             }
-            whole_image, light = (0, 0, camera.width, camera.height), build_light(self._scene.light)
+            whole_image, light = (0, 0, camera.width, camera.height), scene.light
             rendered = render(world, self._matrix, X_WC, whole_image, light)
         frame = add_noise(rendered.image, camera.noise, rng)
         depth = None if camera.depth is None else add_depth_noise(rendered.depth, camera.depth, rng)

@@ -56,34 +56,25 @@ def build_initial_world(
     world = World(apply_scene(config, scene), gui=gui)
     paint_table(world, scene)
     object_seed, *_ = derive_seeds(seed)
-    spawn_objects(world, world.config, object_seed, unknown=scene.unknown)
+    spawn_objects(world, object_seed, scene.unknown)
     world.rest_positions.clear()
     return world
 
 
-def spawn_objects(
-    world: World,
-    config: CellConfig,
-    seed: int,
-    count: int | None = None,
-    unknown: UnknownConfig | None = None,
-) -> tuple[int, ...]:
+def spawn_objects(world: World, seed: int, unknown: UnknownConfig | None = None) -> tuple[int, ...]:
     """Put random objects on the table, simulate until they are at rest, and return the bodies.
 
     Args:
-        world: The world of the objects.
-        config: The cell file.
+        world: The world of the objects, whose cell file states the classes and the range of their number.
         seed: Seed of all random choices.
-        count: Number of objects of the cell's classes, or None for a random number in the cell file's range.
         unknown: Section of additional objects without a class, or None.
 
     Raises:
         InputError: The workspace has no room for the objects.
     """
     rng = np.random.default_rng(seed)
-    table = config.table
-    if count is None:
-        count = int(rng.integers(table.objects[0], table.objects[1], endpoint=True))
+    config, table = world.config, world.config.table
+    count = int(rng.integers(*table.objects, endpoint=True))
     labels = [str(label) for label in rng.choice(list(config.objects), count)]
     models = [(label, config.objects[label]) for label in labels]
     models += [(UNKNOWN_LABEL, model) for model in draw_unknown_models(unknown, rng)]

@@ -138,6 +138,11 @@ class World:
         X_WI = X_WO @ compute_upright_pose(self.models[body]) @ get_inertial_pose(self.client, body)
         self.client.resetBasePositionAndOrientation(body, X_WI.position, X_WI.quaternion)
 
+    def get_joint_positions(self) -> Array:
+        """Return the joint positions of the arm `(n,)` [rad]."""
+        states = self.client.getJointStates(self.arm, range(self.robot.joint_count))
+        return np.array([state[0] for state in states])
+
     def set_joint_positions(self, q: Sequence[float] | Array) -> None:
         """Move the arm to joint positions `q` `(n,)` [rad] at once, without physics or collision checks."""
         for joint, angle in enumerate(q):

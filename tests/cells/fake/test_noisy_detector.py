@@ -20,6 +20,7 @@ THINGS = tuple(
     Detection(label, 0.9, (x, 200.0, x + 20, 220.0))
     for label, x in zip(CLASSES, (210, 300, 400), strict=True)
 )
+VIEWS = {"table": TABLE, "full": (0, 0, 640, 480)}
 KNOWN = SimpleNamespace(
     request=lambda frame, view: SimpleNamespace(ready=True, result=lambda: Answer("known", THINGS, None))
 )
@@ -30,7 +31,12 @@ def answers(seed=1, view="table", **errors):
     none = {"miss_rate": 1e-9, "confusion_rate": 1e-9, "false_detections": 1e-9, "jitter": 1e-9}
     config = DetectorConfig(kind="noisy", of="known", classes=list(CLASSES), **{**none, **errors})
     context = DetectorContext(
-        "noisy", SimpleNamespace(table_view=TABLE), None, Path(), seed, lambda name: KNOWN
+        "noisy",
+        SimpleNamespace(get_view_box=lambda view: VIEWS[view]),
+        None,
+        Path(),
+        seed,
+        lambda name: KNOWN,
     )
     detector = NoisyDetector.from_config(config, context)
     frames = [SimpleNamespace(id=number, image=np.zeros((480, 640, 3))) for number in range(LOOKS)]
@@ -65,7 +71,7 @@ def test_its_boxes_are_off_by_as_much_as_it_says_and_keep_their_size():
     assert [one.box[2] - one.box[0] for one in found] == pytest.approx([20.0] * len(found))
 
 
-@pytest.mark.parametrize(("view", "part"), [("table", TABLE), ("full", (0, 0, 640, 480))])
+@pytest.mark.parametrize(("view", "part"), VIEWS.items())
 def test_what_it_invents_lies_in_the_searched_part(view, part):
     found = [one for answer in answers(false_detections=0.5, view=view) for one in answer.confident]
     invented = [one for one in found if one.confidence != 0.9]

@@ -6,9 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from executive.cell.clock import StepClock
 from executive.cell.config import CellConfig
-from executive.cells.sim.arm import SimArm
 from executive.cells.sim.arm_occlusion import ArmOcclusion
 from executive.cells.sim.camera import get_camera_pose
 from executive.cells.sim.world import World
@@ -20,8 +18,7 @@ Build = Callable[[CellConfig], World]
 
 def test_what_the_tool_holds_hides_what_lies_under_it(build: Build, overhead: CellConfig) -> None:
     world, planner, holds = build(overhead), build_planner(overhead), False
-    arm = SimArm(world, planner, overhead, StepClock(lambda: 0.0))
-    occlusion = ArmOcclusion(arm, planner.kinematics, overhead, lambda: holds)
+    occlusion = ArmOcclusion(world, planner.kinematics, overhead, lambda: holds)
     camera = overhead.cameras["overhead"]
     matrix, X_WC = compute_calibration(camera)[0], get_camera_pose(world, camera)
     x, y, z = world.get_tool_pose().position

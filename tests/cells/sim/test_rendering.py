@@ -21,6 +21,7 @@ from executive.cells.sim.arrangements import (
     simulate_fall,
 )
 from executive.cells.sim.models import load_mesh
+from executive.cells.sim.scene_file import DECLARED_SCENE
 from executive.cells.sim.scenes import IMAGE_SIZE, Sample, SceneRenderer
 from executive.cells.sim.silhouette import compute_silhouette_area
 from executive.errors import InputError
@@ -30,7 +31,7 @@ from executive.training.rendering import generate_dataset, render_run_frames, to
 
 
 def samples(config: CellConfig, seeds: range, *, is_random: bool = True) -> list[Sample]:
-    renderer = SceneRenderer(config, next(iter(config.cameras)), is_random=is_random)
+    renderer = SceneRenderer(config, next(iter(config.cameras)), None if is_random else DECLARED_SCENE)
     try:
         return [renderer.render_sample(seed) for seed in seeds]
     finally:

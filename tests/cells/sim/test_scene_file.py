@@ -23,7 +23,7 @@ from executive.cells.sim.camera import CELL_LIGHT
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, load_scene
-from executive.cells.sim.scene_world import apply_scene, build_light
+from executive.cells.sim.scene_world import apply_scene
 from executive.cells.sim.scenes import SceneRenderer
 from executive.cells.sim.spawn import build_initial_world
 from executive.cells.sim.world import World
@@ -89,7 +89,7 @@ def placed(world: World) -> list[tuple[str, list[float]]]:
 
 def test_a_scene_without_changes_is_the_declared_world(world: Build, overhead: CellConfig) -> None:
     assert apply_scene(overhead, scene()) == overhead
-    assert build_light(DECLARED_SCENE.light) == CELL_LIGHT
+    assert DECLARED_SCENE.light == CELL_LIGHT
     declared = build_initial_world(overhead, SEED)
     assert placed(world()) == placed(declared)
     declared.close()
@@ -255,9 +255,7 @@ def test_evaluated_frames_are_of_the_scene_and_say_what_the_cell_declares(overhe
     changed = scene(
         camera={"shift": [0.02, 0.0, 0.0]}, unknown={"count": [1, 1]}, objects={"any": {"colours": [BLACK]}}
     )
-    usual, other = (
-        SceneRenderer(overhead, "overhead", is_random=False, scene=s) for s in (DECLARED_SCENE, changed)
-    )
+    usual, other = (SceneRenderer(overhead, "overhead", s) for s in (DECLARED_SCENE, changed))
     one, sample = usual.render_sample(1), other.render_sample(1)
     assert (sample.X_WC.to_rounded_list(), UNKNOWN_LABEL in sample.labels) == (
         one.X_WC.to_rounded_list(),

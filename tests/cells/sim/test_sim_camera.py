@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CalibrationConfig, CameraConfig, CellConfig, DepthConfig, NoiseConfig
+from executive.cells.sim.arm_occlusion import ArmOcclusion
 from executive.cells.sim.camera import CELL_LIGHT, SimCamera, add_depth_noise, get_camera_pose, render
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.world import World
 from executive.geometry import Pose, rotate_about_z
+from executive.motion.arms import build_kinematics
 from executive.perception.camera_model import compute_calibration, project
 
 Build = Callable[[CellConfig], World]
@@ -83,8 +85,9 @@ def test_a_seed_repeats_the_noise_of_images_and_depth_and_a_depth_sensor_changes
     cube = world.add_object("cube", Pose.of([0.5, 0.0, 0.025]), (1, 0, 0))
     plain = overhead.cameras[name]
     deep = plain.model_copy(update={"depth": DepthConfig()})
+    occlusion = ArmOcclusion(world, build_kinematics(overhead), overhead)
     without, one, same, other = (
-        SimCamera(world, name, config, StoppedClock(), seed)
+        SimCamera(world, name, config, StoppedClock(), seed, occlusion=occlusion)
         for config, seed in ((plain, 7), (deep, 7), (deep, 7), (deep, 8))
     )
     frame = one.capture()
@@ -125,7 +128,8 @@ def test_a_frame_carries_what_is_needed_to_use_it_later(build: Build, overhead: 
     assert (frame.visible.sum(), frame.visible.shape) == (240 * 640, (480, 640))
     assert frame.X_WC.position == pytest.approx(config.position)
     assert not camera.sees_table()
-    assert SimCamera(world, name, config, StoppedClock(), 1).sees_table()
+    occlusion = ArmOcclusion(world, build_kinematics(overhead), overhead)
+    assert SimCamera(world, name, config, StoppedClock(), 1, occlusion=occlusion).sees_table()
 
 
 PERFECT = DepthConfig(floor=0, growth=0, grain=0, step=0, edge_dropout=0, dropout=0)

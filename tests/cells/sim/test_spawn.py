@@ -24,8 +24,10 @@ from executive.testing.oracle import make_oracle_kind
 Build = Callable[[CellConfig], World]
 
 
-def with_stacks(config: CellConfig, share: float) -> CellConfig:
-    return config.model_copy(update={"table": config.table.model_copy(update={"stacked": share})})
+def with_stacks(config: CellConfig, share: float, count: int | None = None) -> CellConfig:
+    """Return the cell with a share of stacked objects and, if a count is given, this number of objects."""
+    changes = {"stacked": share} if count is None else {"stacked": share, "objects": (count, count)}
+    return config.model_copy(update={"table": config.table.model_copy(update=changes)})
 
 
 def lowest(world: World, body: int) -> float:
@@ -53,12 +55,12 @@ def placed(world: World) -> list[tuple[str, float, float, float]]:
 
 
 def test_a_seed_decides_everything(build: Build, overhead: CellConfig) -> None:
-    plain, stacked = build(overhead), build(with_stacks(overhead, 1.0))
-    assert spawn_objects(plain, overhead, 1) == tuple(plain.labels)
+    plain, stacked = build(overhead), build(with_stacks(overhead, 1.0, 4))
+    assert spawn_objects(plain, 1) == tuple(plain.labels)
     for body, label in plain.labels.items():
         colour = plain.client.getVisualShapeData(body)[0][7][:3]
         assert tuple(round(value, 3) for value in colour) in overhead.objects[label].colours
-    spawn_objects(stacked, stacked.config, 2, count=4)
+    spawn_objects(stacked, 2)
     assert placed(plain) == [
         ("sphere", 0.6287, -0.0828, 0.03), ("duck", 0.5131, 0.1442, -0.0023), ("duck", 0.51, 0.0218, -0.0023),
         ("cube", 0.4261, 0.1115, 0.025),
@@ -73,9 +75,8 @@ def test_a_seed_decides_everything(build: Build, overhead: CellConfig) -> None:
 def test_objects_stand_still_apart_and_inside_the_workspace(
     build: Build, overhead: CellConfig, share: float
 ) -> None:
-    config = with_stacks(overhead, share)
-    world, table = build(config), overhead.table
-    bodies = spawn_objects(world, config, 0, count=6 if share else None)
+    world, table = build(with_stacks(overhead, share, 6 if share else None)), overhead.table
+    bodies = spawn_objects(world, 0)
     assert table.objects[0] <= len(bodies) <= table.objects[1]
     poses, pairs = {body: world.get_object_pose(body) for body in bodies}, carried(world)
     assert bool(pairs) is bool(share)
@@ -97,7 +98,7 @@ def test_objects_stand_still_apart_and_inside_the_workspace(
 
 def test_too_many_objects_are_refused_with_what_to_change(build: Build, overhead: CellConfig) -> None:
     with pytest.raises(InputError, match=r"100 objects found no room .* ask for fewer or widen table\.x"):
-        spawn_objects(build(overhead), overhead, seed=1, count=100)
+        spawn_objects(build(with_stacks(overhead, 0.0, 100)), 1)
 
 
 def test_a_load_travels_over_stacks_and_starts_from_their_tops(overhead: CellConfig) -> None:

@@ -16,7 +16,7 @@ from executive.cells.sim.world import World
 @pytest.fixture
 def world(overhead: CellConfig):
     world = World(overhead)
-    spawn_objects(world, overhead, 3)
+    spawn_objects(world, 3)
     yield world
     world.close()
 
