@@ -124,7 +124,6 @@ class SimArm:
             Fault: The arm is moving, or the cell file has no such pose.
         """
         self._require_rest("plan a motion")
-        self._require_pose(goal)
         return self._plans.plan(self._commanded_q, goal, task)
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
@@ -133,7 +132,6 @@ class SimArm:
         Raises:
             Fault: The cell file has no such pose.
         """
-        self._require_pose(goal)
         if self._braking_times is None:  # a braking arm does not reach the end of the motion
             self._plans.plan_ahead(self._end_q, goal, task)
 
@@ -200,11 +198,11 @@ class SimArm:
         return self._commanded_q if self._motion is None else self._motion.end
 
     def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> Trajectory:
-        return self.planner.plan(start, self._poses[goal] if isinstance(goal, str) else goal, task)
-
-    def _require_pose(self, goal: Goal | str) -> None:
-        if isinstance(goal, str) and goal not in self._poses:
+        if isinstance(goal, Goal):
+            return self.planner.plan(start, goal, task)
+        if goal not in self._poses:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
+        return self.planner.plan(start, self._poses[goal], task)
 
     def _check_positions(self, q: Array, tolerance: float, description: str) -> None:
         """Store a fault message with `description` if a joint is over `tolerance` [rad] away from `q`."""

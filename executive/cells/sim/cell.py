@@ -19,7 +19,7 @@ from executive.cells.sim.command_log import CommandLog, read_commands
 from executive.cells.sim.min_times import SimMinTimes
 from executive.cells.sim.models import build_simulated_class, find_model_errors
 from executive.cells.sim.poses import find_places_out_of_reach, find_pose_errors
-from executive.cells.sim.rebuild import InterruptedState, rebuild_world
+from executive.cells.sim.rebuild import InterruptedState, WorldRebuilder
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import build_initial_world, derive_seeds, find_lack_of_room
 from executive.cells.sim.tool import SuctionTool
@@ -174,7 +174,10 @@ class SimCell(CellWithoutHardware):
 
     def _rebuild_world(self, log: Path) -> InterruptedState:
         """Execute the commands of a log, continue the log, and return the state of the interrupted run."""
-        state = rebuild_world(self._world, self._tool, read_commands(log))
+        rebuilder = WorldRebuilder(self._world, self._tool)
+        for command in read_commands(log):
+            rebuilder.execute(command)
+        state = rebuilder.interrupted_state
         self.steps, self.last_command_step = state.step_count, state.last_command_step
         self._world.log = CommandLog(log, self._world.robot.joint_count, resume=True)
         return state

@@ -5,6 +5,7 @@ The check uses a separate world, because moving the arm of the running world wou
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -67,8 +68,8 @@ class ClearanceChecker:
     def __init__(self, config: CellConfig) -> None:
         self.world = World(config, visuals=False)
         self._margin = config.motion.margin
-        self._load_bodies: dict[ObjectClass, int] = {}
-        """Body that models a held object of each class."""
+        self._get_load_body = functools.cache(self._add_cylinder)
+        """Returns the body that models a held object, by radius and height [m]."""
         self._cylinders: dict[tuple[float, float], list[int]] = {}
         """Bodies that model obstacles, by radius and height [m]."""
         self._obstacles: dict[str, tuple[int, ...]] = {}
@@ -140,7 +141,8 @@ class ClearanceChecker:
         self, load: ObjectClass, bodies: Sequence[tuple[str, int]]
     ) -> Iterator[ClosestApproach]:
         """Yield the approaches within the margin of the load to the arm and to the named `bodies`."""
-        load_body, get_points = self._get_load_body(load), self.world.client.getClosestPoints
+        load_body = self._get_load_body(load.radius + load.contact_radius, load.height)
+        get_points = self.world.client.getClosestPoints
         X_WH = self.world.get_tool_pose() @ Pose.of([0, 0, load.height / 2])
         self.world.client.resetBasePositionAndOrientation(load_body, X_WH.position, X_WH.quaternion)
         part = name_load(load.label)
@@ -177,12 +179,6 @@ class ClearanceChecker:
                 for body in cylinders:
                     client.resetBasePositionAndOrientation(body, PARKING_POSITION, [0, 0, 0, 1])
             self._obstacles = {}
-
-    def _get_load_body(self, load: ObjectClass) -> int:
-        """Return the body that models a held object of a class, created at the first call."""
-        if load not in self._load_bodies:
-            self._load_bodies[load] = self._add_cylinder(load.radius + load.contact_radius, load.height)
-        return self._load_bodies[load]
 
     def _add_cylinder(self, radius: float, height: float) -> int:
         """Add a cylinder at `PARKING_POSITION`, and return the body."""

@@ -44,11 +44,13 @@ class Command(NamedTuple):
         kind: Kind of the command, for example `RUN_STEP`.
         numbers: Arguments of the command.
         states: States of the joints at the samples of a motion, as arrays `(N, n)`; None for other kinds.
+        end: Offset of the end of the command in the file [byte].
     """
 
     kind: int
-    numbers: tuple[float, ...] = ()
-    states: JointState | None = None
+    numbers: tuple[float, ...]
+    states: JointState | None
+    end: int
 
 
 class CommandLog:
@@ -67,7 +69,7 @@ class CommandLog:
         header = FILE_SIGNATURE + f"{FORMAT_VERSION} joints {joint_count}\n".encode()
         self._length = 0
         if path and resume:
-            self._length = max((end for _, end in _read_with_offsets(path)), default=len(header))
+            self._length = max((command.end for command in read_commands(path)), default=len(header))
         self._file = LogFile(path, "the log of the world", self._length)
         if not resume:
             try:
@@ -110,12 +112,6 @@ def read_commands(path: Path) -> Iterator[Command]:
     Raises:
         InputError: The file cannot be read, or is no valid log.
     """
-    for command, _ in _read_with_offsets(path):
-        yield command
-
-
-def _read_with_offsets(path: Path) -> Iterator[tuple[Command, int]]:
-    """Yield the complete commands of a log, each with the offset of its end in the file [byte]."""
     data = _read_content(path)
     if not data.startswith(FILE_SIGNATURE):
         signature = FILE_SIGNATURE.decode().strip()
@@ -155,7 +151,7 @@ def _read_with_offsets(path: Path) -> Iterator[tuple[Command, int]]:
         finite_numbers = (numbers[0], *np.ravel(states)) if states else numbers
         if not all(map(math.isfinite, finite_numbers)):
             raise _make_damage_error(path, command_offset)
-        yield Command(kind, numbers, states), offset
+        yield Command(kind, numbers, states, offset)
 
 
 def _make_damage_error(path: Path, offset: int) -> InputError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +67,7 @@ class WorldRebuilder:
 
     def execute(self, command: Command) -> None:
         """Execute the next command."""
-        kind, numbers, states = command
+        kind, numbers, states, _ = command
         if kind in (command_log.MOTION, command_log.VACUUM_ON, command_log.VACUUM_OFF):
             self._last_command_step = self._step_count
         world, tool = self._world, self._tool
@@ -96,14 +95,6 @@ class WorldRebuilder:
         else:
             actions = {command_log.VACUUM_ON: tool.close, command_log.VACUUM_OFF: tool.open}
             actions.get(kind, tool.break_seal)()
-
-
-def rebuild_world(world: World, tool: SuctionTool, commands: Iterable[Command]) -> InterruptedState:
-    """Execute all commands in a new world, and return the state at the interruption."""
-    rebuilder = WorldRebuilder(world, tool)
-    for command in commands:
-        rebuilder.execute(command)
-    return rebuilder.interrupted_state
 
 
 class SampledMotion:

@@ -15,6 +15,7 @@ import queue
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
@@ -49,7 +50,7 @@ def main() -> None:
         write(setup_error=f"{type(error).__name__}: {error}")
         # A normal exit would abort the interpreter, because the reading thread holds the lock of the input.
         os._exit(0)
-    logging.getLogger("backoff").addHandler(_RetryHandler(write))
+    logging.getLogger("backoff").addFilter(partial(_report_retry, write))
     logging.getLogger("backoff").setLevel(logging.DEBUG)
     write(ready=True)
     while True:
@@ -162,17 +163,11 @@ def _iterate_causes(error: BaseException | None) -> Iterator[BaseException]:
         error = error.__cause__ or error.__context__
 
 
-class _RetryHandler(logging.Handler):
-    """Log handler that reports each retry of a request by inference-sdk."""
-
-    def __init__(self, write: WriteMessage) -> None:
-        super().__init__()
-        self._write = write
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Write the HTTP status that caused a retry; None without a connection."""
-        cause = record.args[-1] if isinstance(record.args, tuple) else None
-        self._write(retry_status=getattr(cause, "status_code", None))
+def _report_retry(write: WriteMessage, record: logging.LogRecord) -> bool:
+    """Write the HTTP status that caused a retry by inference-sdk, None without a connection; log nothing."""
+    cause = record.args[-1] if isinstance(record.args, tuple) else None
+    write(retry_status=getattr(cause, "status_code", None))
+    return False
 
 
 if __name__ == "__main__":
