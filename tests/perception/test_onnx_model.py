@@ -71,6 +71,15 @@ def test_the_input_is_normalized_rgb_of_the_models_size(model, decoded):
     assert given[0, 2] == pytest.approx((0 - 0.406) / 0.225, abs=1e-5)
 
 
+def test_a_larger_image_is_shrunk_to_the_mean_of_all_pixels_and_a_box_is_in_its_pixels(model, decoded):
+    striped = np.zeros((4 * model.input_size, 4 * model.input_size, 3), np.uint8)
+    striped[:, ::4] = 200
+    (found,), given = decoded([[0.5, 0.5, 0.1, 0.2]], [[2.0, -9, -9, -9]], striped)
+    assert given[0, 0] == pytest.approx((50 / 255 - 0.485) / 0.229, abs=1e-5)
+    side = 4 * model.input_size
+    assert found.box == pytest.approx((0.45 * side, 0.4 * side, 0.55 * side, 0.6 * side))
+
+
 def test_a_file_that_is_no_model_of_these_classes_is_refused(tmp_path):
     with pytest.raises(InputError, match="has 3 classes, but there are 2 labels: cat, dog"):
         OnnxModel(MODEL_PATH, ("cat", "dog"))

@@ -20,12 +20,7 @@ ONNX = str(MODEL_PATH)
 class BrightSpots:
     """A model that finds the bounding box of what is brighter than half."""
 
-    def __init__(self, size):
-        self.input_size = size
-        self.shapes = []
-
-    def detect(self, image, floor):
-        self.shapes.append(image.shape)
+    def detect(self, image, min_confidence):
         rows, columns = np.nonzero(image[..., 0] > 127)
         if not len(rows):
             return []
@@ -53,27 +48,24 @@ def found_by(detector, frame, view):
     return request.result().confident
 
 
-def spots(size, left, top, view):
-    """Return the spots that a model of an input size finds, and the shapes that it was given."""
-    model = BrightSpots(size)
-    detector = RfdetrDetector(model, DetectorConfig(kind="rfdetr"), context())
-    return found_by(detector, frame_with_spot(left, top), view), model.shapes
+def spots(left, top, view):
+    """Return the spots that a model finds."""
+    detector = RfdetrDetector(BrightSpots(), DetectorConfig(kind="rfdetr"), context())
+    return found_by(detector, frame_with_spot(left, top), view)
 
 
-@pytest.mark.parametrize("size", [256, 128])
-def test_a_box_in_the_table_view_is_in_the_frames_pixels_and_a_larger_crop_is_shrunk(size):
-    (found,), shapes = spots(size, 300, 200, "table")
-    assert found.box == pytest.approx((300, 200, 320, 220), abs=256 / size)
-    assert shapes == [(size, size, 3)]
+def test_a_box_in_the_table_view_is_in_the_frames_pixels():
+    (found,) = spots(300, 200, "table")
+    assert found.box == pytest.approx((300, 200, 320, 220), abs=1.0)
 
 
 def test_the_table_view_does_not_show_what_lies_beside_it():
-    assert spots(256, 20, 20, "table")[0] == ()
+    assert spots(20, 20, "table") == ()
 
 
 @pytest.mark.parametrize(("left", "top"), [(0, 0), (250, 100), (620, 460), (180, 240)])
 def test_the_full_view_finds_an_object_anywhere_exactly_once(left, top):
-    (found,), _ = spots(256, left, top, "full")
+    (found,) = spots(left, top, "full")
     assert found.box == pytest.approx((left, top, left + 20, top + 20))
 
 
@@ -92,7 +84,7 @@ def test_any_exported_model_can_be_used_by_path_and_the_embedded_one_needs_no_op
 
 def test_an_answer_shows_after_the_latency_with_its_detector_and_the_cells_names():
     config = DetectorConfig(kind="rfdetr", threshold=0.6, miss_rate=0.2)
-    detector = RfdetrDetector(BrightSpots(256), config, context(), {"spot": "cube"})
+    detector = RfdetrDetector(BrightSpots(), config, context(), {"spot": "cube"})
     clock = detector._context.clock
     clock.now = 1.0
     request = detector.request(frame_with_spot(300, 200), "table")

@@ -82,7 +82,10 @@ class OnnxModel:
         """Return the normalized image `(1, 3, R, R)`."""
         size = (self.input_size, self.input_size)
         if image.shape[:2] != size:
-            image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_LINEAR), dtype=np.uint8)
+            # Area averaging uses all pixels and does not move edges; bilinear resizing would skip pixels.
+            is_larger = min(image.shape[:2]) > self.input_size
+            interpolation = cv2.INTER_AREA if is_larger else cv2.INTER_LINEAR
+            image = np.asarray(cv2.resize(image, size, interpolation=interpolation), dtype=np.uint8)
         normalized = (image.astype(np.float32) / 255 - CHANNEL_MEAN) / CHANNEL_STD
         return np.ascontiguousarray(normalized.transpose(2, 0, 1)[None])
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -112,19 +111,5 @@ class RfdetrDetector(ThreadedDetector):
             return None
 
     def _search(self, image: NDArray[np.uint8], regions: Sequence[Region]) -> list[Detection]:
-        return search_regions(image, regions, self._detect_in_crop, self._class_map)
-
-    def _detect_in_crop(self, crop: NDArray[np.uint8]) -> list[Detection]:
-        """Return the detections in a crop of a frame, with boxes in pixels of the crop."""
-        height, width = crop.shape[:2]
-        size = self._model.input_size
-        if height <= size or width <= size:
-            return self._model.detect(crop, self._config.floor)
-        # Area averaging uses all pixels and does not move edges; bilinear resizing would skip pixels.
-        small_crop = np.asarray(cv2.resize(crop, (size, size), interpolation=cv2.INTER_AREA), dtype=np.uint8)
-        scale_x, scale_y = width / size, height / size
-        return [
-            replace(detection, box=(left * scale_x, top * scale_y, right * scale_x, bottom * scale_y))
-            for detection in self._model.detect(small_crop, self._config.floor)
-            for left, top, right, bottom in [detection.box]
-        ]
+        detect = partial(self._model.detect, min_confidence=self._config.floor)
+        return search_regions(image, regions, detect, self._class_map)
