@@ -38,7 +38,15 @@ class Pose:
     @staticmethod
     def of(position: ArrayLike, quaternion: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Pose:
         """Return the pose with a position `(3,)` [m] and a quaternion `(x, y, z, w)` of any norm."""
-        return Pose(rotation_from_quaternion(quaternion), np.asarray(position, dtype=float))
+        x, y, z, w = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
+        rotation = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+        return Pose(rotation, np.asarray(position, dtype=float))
 
     def __matmul__(self, other: Pose) -> Pose:
         return Pose(self.rotation @ other.rotation, self.rotation @ other.position + self.position)
@@ -53,8 +61,24 @@ class Pose:
 
     @property
     def quaternion(self) -> Array:
-        """Rotation as a unit quaternion `(x, y, z, w)` with `w >= 0`."""
-        return quaternion_from_rotation(self.rotation)
+        """Rotation as a unit quaternion `(x, y, z, w)` with `w >= 0`.
+
+        Shepperd's method: the largest component is computed first, so that the result is numerically stable.
+        """
+        r = self.rotation
+        diagonal_and_trace = [r[0, 0], r[1, 1], r[2, 2], np.trace(r)]
+        i = int(np.argmax(diagonal_and_trace))  # index of the largest component
+        if i == 3:
+            q = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], 1 + np.trace(r)])
+        else:
+            j, k = (i + 1) % 3, (i + 2) % 3
+            q = np.empty(4)
+            q[i] = 1 + r[i, i] - r[j, j] - r[k, k]
+            q[j] = r[j, i] + r[i, j]
+            q[k] = r[k, i] + r[i, k]
+            q[3] = r[k, j] - r[j, k]
+        q /= np.linalg.norm(q)
+        return q if q[3] >= 0 else -q
 
     @property
     def rotation_vector(self) -> Array:
@@ -67,39 +91,6 @@ class Pose:
     def to_rounded_list(self, digits: int = 6) -> list[float]:
         """Return position and quaternion as seven numbers, rounded to `digits` decimal places."""
         return [round(float(value), digits) for value in (*self.position, *self.quaternion)]
-
-
-def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
-    """Return the rotation matrix `(3, 3)` of a quaternion `(x, y, z, w)` of any norm."""
-    x, y, z, w = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
-def quaternion_from_rotation(rotation: Array) -> Array:
-    """Return the unit quaternion `(x, y, z, w)` with `w >= 0` of a rotation matrix `(3, 3)`.
-
-    Shepperd's method: the largest component is computed first, so that the result is numerically stable.
-    """
-    r = rotation
-    diagonal_and_trace = [r[0, 0], r[1, 1], r[2, 2], np.trace(r)]
-    i = int(np.argmax(diagonal_and_trace))  # index of the largest component
-    if i == 3:
-        q = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], 1 + np.trace(r)])
-    else:
-        j, k = (i + 1) % 3, (i + 2) % 3
-        q = np.empty(4)
-        q[i] = 1 + r[i, i] - r[j, j] - r[k, k]
-        q[j] = r[j, i] + r[i, j]
-        q[k] = r[k, i] + r[i, k]
-        q[3] = r[k, j] - r[j, k]
-    q /= np.linalg.norm(q)
-    return q if q[3] >= 0 else -q
 
 
 def rotate_about_z(angle: float) -> Array:

@@ -177,9 +177,8 @@ class SimArm:
             return
         if self._braking_times is None:
             lip_may_touch = self._motion_time >= self._motion.guarded_start_time
-            self.collision = self._contact_monitor.describe_new_contact(lip_may_touch)
-            if self.collision is not None:
-                self.stop()
+            if message := self._contact_monitor.describe_new_contact(lip_may_touch):
+                self.stop_after_collision(message)
         if self._braking_times is None:
             self._motion_time += STEP
             has_ended = self._motion_time >= self._motion.duration

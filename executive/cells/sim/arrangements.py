@@ -21,7 +21,7 @@ from executive.cells.sim.camera import Region
 from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, load_mesh
 from executive.cells.sim.variations import draw_object_colour
 from executive.cells.sim.world import World, add_bin
-from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z, rotation_from_quaternion
+from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
 
 MAX_SPARSE_OBJECT_COUNT, MAX_DENSE_OBJECT_COUNT = 7, 20
 """Maximum number of objects in a sparse scene and in a dense scene."""
@@ -208,7 +208,7 @@ def _move_tool(world: World, X_WT: Pose) -> None:
 
 def _draw_rotation(rng: Generator) -> Array:
     """Return a random rotation matrix with uniform distribution."""
-    return rotation_from_quaternion(rng.normal(size=4))
+    return Pose.of(np.zeros(3), rng.normal(size=4)).rotation
 
 
 def _overlaps_rectangle(bin: Bin, low: Array, high: Array) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,7 +28,6 @@ from executive.cells.sim.world import World
 from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import InputError
 from executive.events import Emit
-from executive.geometry import Array
 from executive.mission.text.file_search import get_shipped_folder
 from executive.motion.arms import build_planner, find_arm_errors
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
@@ -75,7 +74,6 @@ class SimCell(CellWithoutHardware):
         _, camera_seed, detector_seed, load_seed = derive_seeds(seed)
         scene = load_scene(options.scene, config)
         world = self._world = build_initial_world(config, seed, gui=options.gui, scene=scene)
-        self._initial_positions = {body: world.get_object_pose(body).position for body in world.labels}
         self._clearance_checker = ClearanceChecker(config)
         planner = build_planner(config, self._clearance_checker.check)
         self._tool = SuctionTool(world, config.tool, load_seed)
@@ -160,10 +158,9 @@ class SimCell(CellWithoutHardware):
 
     def audit(self) -> dict[str, int]:
         """Return the number of objects by `AUDIT_KEYS`; `left` counts the objects on the table."""
-        world, tool, bins, moves = self._world, self._tool, self.cell.bins, self._world.rest_positions
-        rest_positions = {body: [p, *moves.get(body, ())] for body, p in self._initial_positions.items()}
-        objects = list_final_objects(world, rest_positions, bins, tool.held_body, tool.dropped_bodies)
-        return count_outcomes(objects, self.accounts.records, bins, self.routes, self.config.ledger.gate)
+        records, bins, max_distance = self.accounts.records, self.cell.bins, self.config.ledger.gate
+        objects = list_final_objects(self._world, self._tool, bins)
+        return count_outcomes(objects, records, bins, self.routes, max_distance)
 
     def close(self) -> None:
         """Close the detectors and the physics servers."""
@@ -191,25 +188,10 @@ def _find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, s
             yield ("localization",), message + 'section "depth: {}", or use "plane"'
 
 
-def list_final_objects(
-    world: World,
-    rest_positions: Mapping[int, Sequence[Array]],
-    bins: Mapping[str, Bin],
-    held_body: int | None = None,
-    dropped_bodies: Collection[int] = (),
-) -> Iterator[FinalObject]:
-    """Yield the objects of a simulated world, including removed objects, at the end of a run.
-
-    Args:
-        world: The simulated world at the end of the run.
-        rest_positions: Positions `(3,)` [m] of each body: initial position, and position after each move by
-            a test and after each release by the tool.
-        bins: The bins of the cell.
-        held_body: Body that the tool holds, or None.
-        dropped_bodies: Bodies that fell from the tool and have not been picked up since.
-    """
-    for body, positions in rest_positions.items():
-        is_removed = body not in world.labels
+def list_final_objects(world: World, tool: SuctionTool, bins: Mapping[str, Bin]) -> Iterator[FinalObject]:
+    """Yield the objects of a simulated world, including removed objects, at the end of a run."""
+    for body, positions in world.rest_positions.items():
+        is_removed, is_dropped = body not in world.labels, body in tool.dropped_bodies
         if is_removed:
             label, position = world.removed_objects[body]
         else:
@@ -217,4 +199,4 @@ def list_final_objects(
         # The centre of an object that leans on a bin wall may be above the wall.
         names = (name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS))
         bin_name = None if position[2] < MIN_CENTRE_HEIGHT else next(names, "")
-        yield FinalObject(label, bin_name, positions, body in dropped_bodies, body == held_body, is_removed)
+        yield FinalObject(label, bin_name, positions, is_dropped, body == tool.held_body, is_removed)

@@ -57,7 +57,7 @@ def build_initial_world(
     paint_table(world, scene)
     object_seed, *_ = derive_seeds(seed)
     spawn_objects(world, object_seed, scene.unknown)
-    world.rest_positions.clear()
+    world.rest_positions = {body: [world.get_object_pose(body).position] for body in world.labels}
     return world
 
 

@@ -62,7 +62,8 @@ class World:
         step_count: Number of physics steps.
         log: Log of the commands to the world; each command is appended before its execution.
         is_idle: True during physics steps that belong to no control step of the run.
-        rest_positions: Positions `(3,)` [m] of each object after a move or a release, by body.
+        rest_positions: Positions `(3,)` [m] of each object by body: initial position of the run, and position
+            after each move by a test and after each release by the tool.
         removed_objects: Class and last position `(3,)` [m] of each removed object, by body.
     """
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 
 from executive.cell.config import CameraConfig, DetectorConfig
@@ -40,26 +41,24 @@ def build_detectors(
     """
     kinds = find_detector_kinds()
     detectors: dict[str, ClosableDetector] = {}
-    unfinished_names: list[str] = []
 
-    def build(name: str) -> ClosableDetector:
+    def build(dependents: tuple[str, ...], name: str) -> ClosableDetector:
         if name in detectors:
             return detectors[name]
         if name not in configs:
             raise InputError(f'the cell has no detector "{name}"; it has: {", ".join(configs)}')
-        if name in unfinished_names:
-            raise InputError(f"the detectors {' -> '.join([*unfinished_names, name])} depend on each other")
+        if name in dependents:
+            raise InputError(f"the detectors {' -> '.join([*dependents, name])} depend on each other")
         kind = configs[name].kind
         if kind not in kinds:
             raise InputError(_describe_missing_kind(name, kind, kinds))
-        unfinished_names.append(name)
-        context = DetectorContext(name, camera, clock, base, seed, build)
+        get_detector = partial(build, (*dependents, name))
+        context = DetectorContext(name, camera, clock, base, seed, get_detector)
         detectors[name] = kinds[kind].load().from_config(configs[name], context)
-        unfinished_names.remove(name)
         return detectors[name]
 
     try:
-        return {name: build(name) for name in configs}
+        return {name: build((), name) for name in configs}
     except BaseException:
         for detector in detectors.values():
             detector.close()

@@ -24,6 +24,7 @@ class OneBody:
     def __init__(self, label: str = "cube", place: Sequence[float] = IN_BIN) -> None:
         self.labels = {7: label}
         self.removed_objects: dict[int, tuple[str, np.ndarray]] = {}
+        self.rest_positions = {7: [np.array([0.5, 0.0, 0.025])]}
         self._place = place
 
     def get_object_pose(self, body: int) -> Pose:
@@ -32,9 +33,9 @@ class OneBody:
 
 def counted(bins_of_cube: tuple[str, ...], world: OneBody | None = None, **more: Any) -> dict[str, int]:
     bins = {"red_bin": Bin("red_bin", np.array([0.2, -0.44, 0]), np.array([0.2, 0.2, 0.1]), np.zeros((1, 2)))}
-    stood = {7: [np.array([0.5, 0.0, 0.025])]}
     records = more.pop("records", [])
-    objects = list_final_objects(world or OneBody(), stood, bins, **more)  # type: ignore[arg-type]
+    tool: Any = SimpleNamespace(**{"held_body": None, "dropped_bodies": set(), **more})
+    objects = list_final_objects(world or OneBody(), tool, bins)  # type: ignore[arg-type]
     return count_outcomes(objects, records, bins, {"cube": bins_of_cube}, max_distance=0.025)
 
 
