@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.perception.detectors.views import (
-    RegionDetection,
     list_regions,
     merge_detections,
     remove_duplicates,
@@ -22,7 +21,7 @@ SIZE = (640, 480)
 
 
 def found(box, confidence=0.9, part=(0, 0, 256, 256), label="cube"):
-    return RegionDetection(Detection(label, confidence, box), part)
+    return Detection(label, confidence, box), part
 
 
 def test_the_table_view_is_the_square_of_the_cell_file_and_a_smaller_frame_is_one_tile():
@@ -82,7 +81,7 @@ OTHER = (192, 0, 448, 256)
     ],
 )
 def test_an_object_in_two_tiles_is_reported_once(one, other, kept):
-    expected = [(one, other)[number].detection for number in kept]
+    expected = [(one, other)[number][0] for number in kept]
     assert merge_detections([one, other], SIZE) == expected
     assert merge_detections([other, one], SIZE) == expected
 

@@ -13,7 +13,7 @@ from executive.cells.fake.arm import FakeArm
 from executive.cells.fake.world import FakeObject, FakeWorld
 from executive.cells.log_file import LogFile
 from executive.errors import InputError
-from executive.geometry import Array, Pose
+from executive.geometry import Pose
 
 
 class FakeStateLog(LogFile):
@@ -57,7 +57,7 @@ def restore_world(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]
         world.objects[:] = [_read_object(**fields) for fields in state["objects"]]
         world.removed_objects[:] = [_read_object(**fields) for fields in state["removed"]]
         world.held_object = None if state["held"] is None else world.objects[state["held"]]
-        rotation, position = map(_read_array, state["tool"])
+        rotation, position = (np.array(value, dtype=float) for value in state["tool"])
         arm.set_tool_pose(Pose(rotation.reshape(3, 3), position.reshape(3)))
         return int(state["steps"]), int(state["last_command"])
     except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
@@ -66,14 +66,9 @@ def restore_world(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]
         ) from error
 
 
-def _read_array(value: object) -> Array:
-    """Return the array of a list in the log."""
-    return np.array(value, dtype=np.float64)
-
-
 def _read_object(
     label: str, position: object, rest_positions: Sequence[object], is_dropped: bool
 ) -> FakeObject:
     """Return an object from its attributes in the log."""
-    positions = [_read_array(rest_position).reshape(3) for rest_position in rest_positions]
-    return FakeObject(str(label), _read_array(position).reshape(3), positions, bool(is_dropped))
+    current, *others = np.array([position, *rest_positions], dtype=float).reshape(-1, 3)
+    return FakeObject(str(label), current, others, bool(is_dropped))

@@ -53,7 +53,7 @@ class Command(NamedTuple):
     end: int
 
 
-class CommandLog:
+class CommandLog(LogFile):
     """Appends commands to a file, each before its execution.
 
     Args:
@@ -70,17 +70,17 @@ class CommandLog:
         self._length = 0
         if path and resume:
             self._length = max((command.end for command in read_commands(path)), default=len(header))
-        self._file = LogFile(path, "the log of the world", self._length)
+        super().__init__(path, "the log of the world", self._length)
         if not resume:
             try:
-                self._write(header)
+                self._append(header)
             except Fault as fault:
                 raise InputError(str(fault)) from fault
 
     def append(self, kind: int, *numbers: float, samples: bytes = b"") -> None:
         """Append a command, for a motion with the bytes of its `samples`."""
         payload_format = f"{len(numbers)}d" if kind == JOINT_TARGETS else _PAYLOAD_FORMATS[kind]
-        self._write(bytes([kind]) + struct.pack(f"<{payload_format}", *numbers) + samples)
+        self._append(bytes([kind]) + struct.pack(f"<{payload_format}", *numbers) + samples)
 
     def append_motion(self, motion: Trajectory) -> None:
         """Append the start of a motion with its states, so that a resumed run can brake along its path."""
@@ -88,12 +88,8 @@ class CommandLog:
         numbers = motion.duration, motion.guarded_start_time, len(states)
         self.append(MOTION, *numbers, samples=states.astype("<f8").tobytes())
 
-    def close(self) -> None:
-        """Close the file; further calls do nothing."""
-        self._file.close()
-
-    def _write(self, data: bytes) -> None:
-        self._file.write(data, self._length)
+    def _append(self, data: bytes) -> None:
+        self.write(data, self._length)
         self._length += len(data)
 
 

@@ -31,7 +31,7 @@ from executive.cells.sim.camera import (
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
 from executive.cells.sim.scene_world import apply_scene, paint_table
-from executive.cells.sim.silhouette import compute_bounding_box, compute_visible_fraction
+from executive.cells.sim.silhouette import compute_bounding_box, compute_silhouette_area
 from executive.cells.sim.spawn import spawn_objects
 from executive.cells.sim.table_top import WOOD_TEXTURE
 from executive.cells.sim.world import World
@@ -211,7 +211,7 @@ def _build_sample(
         mesh = load_mesh(scene_object.model)
         vertices = scene_object.X_WO.apply(mesh.vertices)
         pixels = project(rendered.matrix, rendered.X_WC, vertices)
-        fraction = compute_visible_fraction(mesh, pixels, mask)
+        fraction = min(1.0, float(mask.sum()) / max(compute_silhouette_area(mesh, pixels), 1.0))
         if fraction < MIN_VISIBLE_FRACTION:
             continue
         unclipped_box = np.array(compute_bounding_box(pixels)).reshape(2, 2)

@@ -1,10 +1,9 @@
-"""Silhouette of an object in an image, including occluded parts: box, area and visible fraction."""
+"""Silhouette of an object in an image, including occluded parts: box and area."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from executive.cell.frame import Box
 from executive.cells.sim.models import Mesh
@@ -33,8 +32,3 @@ def compute_silhouette_area(mesh: Mesh, pixels: Array) -> float:
     for triangle in triangles[ax * by - ay * bx > 0].round().astype(np.int32):
         cv2.fillConvexPoly(mask, triangle, 1)
     return float(mask.sum()) / SUBPIXEL_COUNT**2
-
-
-def compute_visible_fraction(mesh: Mesh, pixels: Array, visible_mask: NDArray[np.bool_]) -> float:
-    """Return the fraction (0 to 1) of the silhouette of a mesh that `visible_mask` `(H, W)` contains."""
-    return min(1.0, float(visible_mask.sum()) / max(compute_silhouette_area(mesh, pixels), 1.0))

@@ -35,12 +35,9 @@ MAX_DISPLACEMENT = 0.005
 """Maximum distance of an object in a stable stack from its goal position [m]."""
 
 
-def derive_seeds(seed: int) -> tuple[int, int, int, int]:
+def derive_seeds(seed: int) -> tuple[int, ...]:
     """Return the random seeds of objects, camera noise, detectors and load noise for the seed of a run."""
-    objects, camera, detectors, load = (
-        int(sequence.generate_state(1)[0]) for sequence in np.random.SeedSequence(seed).spawn(4)
-    )
-    return objects, camera, detectors, load
+    return tuple(int(child.generate_state(1)[0]) for child in np.random.SeedSequence(seed).spawn(4))
 
 
 def build_initial_world(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from executive.errors import InputError
 
 Region = tuple[int, int, int, int]
 """Left, top, right and bottom side [pixel] of a region of an image."""
+LocatedDetection = tuple[Detection, Region]
+"""Detection with the box in pixels of the image, and the region in which the object was detected."""
 
 TILE_OVERLAP = 0.25
 """Minimum overlap of neighbouring tiles, as a fraction of their side; larger than every object."""
@@ -26,19 +28,6 @@ MIN_TILE_IOU = 0.5
 """Minimum intersection over union of the boxes of one object in two tiles."""
 MIN_CONTAINED_FRACTION = 0.7
 """Minimum intersection of the boxes of one object in two tiles, as a fraction of the smaller box."""
-
-
-@dataclass(frozen=True)
-class RegionDetection:
-    """A detection and the region of the image in which it was found.
-
-    Attributes:
-        detection: Detection with the box in pixels of the image.
-        region: Region in which the object was detected.
-    """
-
-    detection: Detection
-    region: Region
 
 
 def list_regions(view: str, table_view: Region, size: tuple[int, int]) -> list[Region]:
@@ -76,31 +65,33 @@ def search_regions(
         detect: Function that returns the detections in a crop, with boxes in pixels of the crop.
         class_map: Class names of the cell by class names from `detect`, if the names differ.
     """
-    detections = []
+    detections: list[LocatedDetection] = []
     for region in regions:
         left, top, right, bottom = region
         for detection in detect(image[top:bottom, left:right]):
             box_left, box_top, box_right, box_bottom = detection.box
             box = left + box_left, top + box_top, left + box_right, top + box_bottom
             label = class_map.get(detection.label, detection.label)
-            detections.append(RegionDetection(replace(detection, label=label, box=box), region))
+            detections.append((replace(detection, label=label, box=box), region))
     return merge_detections(detections, (image.shape[1], image.shape[0]))
 
 
-def merge_detections(detections: Sequence[RegionDetection], size: tuple[int, int]) -> list[Detection]:
+def merge_detections(detections: Sequence[LocatedDetection], size: tuple[int, int]) -> list[Detection]:
     """Return one detection per object, most confident first.
 
     For an object with boxes in several regions, an untruncated box is preferred to a more confident box.
     `size` is the width and height of the image [pixel].
     """
-    candidates = sorted(detections, key=lambda item: (_is_truncated(item, size), -item.detection.confidence))
-    is_same_object = _compare_objects([candidate.detection.box for candidate in candidates])
+    candidates = sorted(
+        detections, key=lambda pair: (_is_truncated(pair[0], pair[1], size), -pair[0].confidence)
+    )
+    is_same_object = _compare_objects([detection.box for detection, _ in candidates])
     selection: list[int] = []
-    for index, candidate in enumerate(candidates):
-        selected_elsewhere = [each for each in selection if candidates[each].region != candidate.region]
+    for index, (_, region) in enumerate(candidates):
+        selected_elsewhere = [each for each in selection if candidates[each][1] != region]
         if not is_same_object[index, selected_elsewhere].any():
             selection.append(index)
-    merged = (candidates[index].detection for index in selection)
+    merged = (candidates[index][0] for index in selection)
     return sorted(merged, key=lambda detection: -detection.confidence)
 
 
@@ -127,9 +118,9 @@ def _compare_objects(boxes: Sequence[Box]) -> NDArray[np.bool_]:
     return np.asarray((box_iou_batch(corners, corners) > MIN_TILE_IOU) | is_contained)
 
 
-def _is_truncated(detection: RegionDetection, size: tuple[int, int]) -> bool:
+def _is_truncated(detection: Detection, region: Region, size: tuple[int, int]) -> bool:
     """Return True if a box reaches a border of its region that is not a border of the image."""
-    (left, top, right, bottom), region = detection.detection.box, detection.region
+    left, top, right, bottom = detection.box
     margin = MAX_TRUNCATION_DISTANCE * (region[2] - region[0])
     return (
         (region[0] > 0 and left - region[0] < margin)
