@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import functools
 import math
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
@@ -26,8 +25,6 @@ ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
 SUPPORT_TOLERANCE = 0.001
 """Maximum height [m] above the floor of a bin at which a contact of the load is a contact with the floor."""
-PARKING_POSITION = (0.0, 0.0, 50.0)
-"""Position of currently unused bodies, far from the arm [m]."""
 
 
 class ClosestApproach(NamedTuple):
@@ -68,10 +65,8 @@ class ClearanceChecker:
     def __init__(self, config: CellConfig) -> None:
         self.world = World(config, visuals=False)
         self._margin = config.motion.margin
-        self._get_load_body = functools.cache(self._add_cylinder)
-        """Returns the body that models a held object, by radius and height [m]."""
-        self._cylinders: dict[tuple[float, float], list[int]] = {}
-        """Bodies that model obstacles, by radius and height [m]."""
+        self._get_cylinder = functools.cache(self._add_cylinder)
+        """Returns the body of the load (number 0) or of an obstacle, by radius [m], height [m] and number."""
         self._obstacles: dict[str, tuple[int, ...]] = {}
         """Bodies of the current obstacles, by name."""
 
@@ -141,7 +136,7 @@ class ClearanceChecker:
         self, load: ObjectClass, bodies: Sequence[tuple[str, int]]
     ) -> Iterator[ClosestApproach]:
         """Yield the approaches within the margin of the load to the arm and to the named `bodies`."""
-        load_body = self._get_load_body(load.radius + load.contact_radius, load.height)
+        load_body = self._get_cylinder(load.radius + load.contact_radius, load.height, 0)
         get_points = self.world.client.getClosestPoints
         X_WH = self.world.get_tool_pose() @ Pose.of([0, 0, load.height / 2])
         self.world.client.resetBasePositionAndOrientation(load_body, X_WH.position, X_WH.quaternion)
@@ -156,32 +151,23 @@ class ClearanceChecker:
             if self.world.robot.first_collision_link <= point[LINK_B] < self.world.robot.wrist_link:
                 link_name = self.world.name_link(point[LINK_B])
                 yield ClosestApproach(part, link_name, point[DISTANCE], self._margin)
-        self.world.client.resetBasePositionAndOrientation(load_body, PARKING_POSITION, [0, 0, 0, 1])
 
     @contextmanager
     def _place_obstacles(self, obstacles: Sequence[Obstacle]) -> Iterator[None]:
         """Represent the obstacles by cylinders on the table until the context ends."""
-        client, placed_counts = self.world.client, Counter[tuple[float, float]]()
-        for obstacle in obstacles:
-            size = round(obstacle.radius, 4), round(obstacle.top, 4)
-            bodies = self._cylinders.setdefault(size, [])
-            if len(bodies) == placed_counts[size]:
-                bodies.append(self._add_cylinder(*size))
-            body = bodies[placed_counts[size]]
-            placed_counts[size] += 1
+        for number, obstacle in enumerate(obstacles, 1):
+            body = self._get_cylinder(round(obstacle.radius, 4), round(obstacle.top, 4), number)
             position = [obstacle.x, obstacle.y, obstacle.top / 2]
-            client.resetBasePositionAndOrientation(body, position, [0, 0, 0, 1])
+            self.world.client.resetBasePositionAndOrientation(body, position, [0, 0, 0, 1])
             self._obstacles[obstacle.name] = (*self._obstacles.get(obstacle.name, ()), body)
         try:
             yield
         finally:
-            for cylinders in self._obstacles.values():
-                for body in cylinders:
-                    client.resetBasePositionAndOrientation(body, PARKING_POSITION, [0, 0, 0, 1])
             self._obstacles = {}
 
-    def _add_cylinder(self, radius: float, height: float) -> int:
-        """Add a cylinder at `PARKING_POSITION`, and return the body."""
+    def _add_cylinder(self, radius: float, height: float, number: int) -> int:
+        """Add a cylinder and return the body; `number` distinguishes cylinders of equal size in the cache."""
+        del number
         client = self.world.client
         shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=radius, height=height)
-        return int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION))
+        return int(client.createMultiBody(0, shape))

@@ -6,8 +6,7 @@ accuracy: the box of an object contains the whole silhouette of the mesh, includ
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import cv2
@@ -118,6 +117,8 @@ class SceneRenderer:
         while True:
             rng = np.random.default_rng([seed, attempt])
             attempt += 1
+            for body in tuple(self._world.labels):
+                self._world.remove_object(body)
             try:
                 sample = self._render_initial(self._scene, rng) if self._scene else self._render_random(rng)
                 if sample is not None:
@@ -151,9 +152,8 @@ class SceneRenderer:
         if is_holding:
             objects.append(arrangements.draw_held_object(world.get_tool_pose(), self._config, rng))
         objects_by_body = {world.add_object(o.label, o.X_WO, o.colour, o.model): o for o in objects}
-        with _remove_at_end(world, objects_by_body):
-            world.table_top.paint(colour, texture)
-            rendered = render(world, matrix, X_WC, region, light)
+        world.table_top.paint(colour, texture)
+        rendered = render(world, matrix, X_WC, region, light)
         sample = _build_sample(rendered, MIN_CONTRAST * noise.read, objects_by_body)
         return sample and replace(sample, image=_resize(add_noise(rendered.image, noise, rng)))
 
@@ -162,17 +162,16 @@ class SceneRenderer:
         world, camera = self._world, self._camera
         pose = np.radians(self._config.arm.poses_deg[str(rng.choice(camera.scan_poses))])
         world.set_joint_positions(pose)
-        bodies = spawn_objects(world, int(rng.integers(2**32)), scene.unknown)
+        spawn_objects(world, int(rng.integers(2**32)), scene.unknown)
         world.set_joint_positions(pose)  # the arm may have sagged during the physics steps
-        with _remove_at_end(world, bodies):
-            X_WC = get_camera_pose(world, camera)
-            declared_X_WC = get_camera_pose(world, self._declared_camera)
-            objects = {
-                body: SceneObject(world.labels[body], world.models[body], world.get_object_pose(body))
-                for body in bodies
-            }
-            whole_image, light = (0, 0, camera.width, camera.height), scene.light
-            rendered = render(world, self._matrix, X_WC, whole_image, light)
+        X_WC = get_camera_pose(world, camera)
+        declared_X_WC = get_camera_pose(world, self._declared_camera)
+        objects = {
+            body: SceneObject(label, world.models[body], world.get_object_pose(body))
+            for body, label in world.labels.items()
+        }
+        whole_image = (0, 0, camera.width, camera.height)
+        rendered = render(world, self._matrix, X_WC, whole_image, scene.light)
         frame = add_noise(rendered.image, camera.noise, rng)
         depth = None if camera.depth is None else add_depth_noise(rendered.depth, camera.depth, rng)
         second_frame = add_noise(rendered.image, camera.noise, rng)
@@ -242,16 +241,6 @@ def _build_sample(
         matrix=rendered.matrix,
         X_WC=rendered.X_WC,
     )
-
-
-@contextmanager
-def _remove_at_end(world: World, bodies: Iterable[int]) -> Iterator[None]:
-    """Remove bodies from the world at the end of the context."""
-    try:
-        yield
-    finally:
-        for body in bodies:
-            world.remove_object(body)
 
 
 def _measure_contrast(image: Image, mask: NDArray[np.bool_]) -> float:
