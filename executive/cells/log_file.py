@@ -22,6 +22,7 @@ class LogFile:
 
     def __init__(self, path: Path | None, content_name: str, length: int | None = None) -> None:
         self._path, self._content_name = path, content_name
+        self._has_content = bool(length)
         self._file: int | None = None
         if path is None:
             return
@@ -34,7 +35,8 @@ class LogFile:
         """Write all data at an offset in the file [byte]; do nothing if the file is closed.
 
         Raises:
-            Fault: The disk does not accept the data. Later calls do nothing, so that the run can still
+            InputError: The disk does not accept the first data.
+            Fault: The disk does not accept later data. Later calls do nothing, so that the run can still
                 bring the arm to rest.
         """
         try:
@@ -43,10 +45,12 @@ class LogFile:
                 data, offset = data[byte_count:], offset + byte_count
         except OSError as error:
             self.close()
-            raise Fault(
+            error_class = Fault if self._has_content else InputError
+            raise error_class(
                 f'{self._content_name} "{self._path}" cannot be written: {describe_os_error(error)}; '
                 "the run stops, because without this file it could not be resumed after an interruption"
             ) from error
+        self._has_content = True
 
     def close(self) -> None:
         """Close the file; do nothing if it is closed."""

@@ -102,11 +102,10 @@ class Iiwa14:
         tcp = self._wrist_to_tool * axis
         tcp[2] += FOREARM
         tcp_and_axis = np.stack([tcp, axis], axis=1)  # (3, 2, N)
-        tcp_and_axis = _rotate_about_y(tcp_and_axis, cosines[3], -sines[3])
+        tcp_and_axis = _rotate(tcp_and_axis, cosines[3], -sines[3], _IS_Z_JOINT[3])
         tcp_and_axis[2, 0] += UPPER_ARM
         for joint in (2, 1, 0):
-            rotate = _rotate_about_y if joint == 1 else _rotate_about_z
-            tcp_and_axis = rotate(tcp_and_axis, cosines[joint], sines[joint])
+            tcp_and_axis = _rotate(tcp_and_axis, cosines[joint], sines[joint], _IS_Z_JOINT[joint])
         tcp_and_axis[2, 0] += SHOULDER_HEIGHT
         return tcp_and_axis[:, 0].T, tcp_and_axis[:, 1].T
 
@@ -193,26 +192,17 @@ class Iiwa14:
         angles = np.asarray(q, dtype=float) * (1, 1, 1, -1, 1, 1, 1)
         for joint, (c, s) in enumerate(zip(np.cos(angles), np.sin(angles), strict=True)):
             p = p + lengths.get(joint, 0.0) * R[:, 2]
-            R = R @ _make_rotation(c, s, _IS_Z_JOINT[joint])
+            R = R @ _rotate(np.eye(3), c, s, _IS_Z_JOINT[joint])
             frames.append(Pose(R, p))
         return [*frames, Pose(R, p + self._wrist_to_tool * R[:, 2])]
 
 
-def _rotate_about_z(v: Array, c: Array, s: Array) -> Array:
-    """Return vectors `(3, ...)` rotated about z by angles with cosines `c` and sines `s`."""
-    return np.array([c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]])
-
-
-def _rotate_about_y(v: Array, c: Array, s: Array) -> Array:
-    """Return vectors `(3, ...)` rotated about y by angles with cosines `c` and sines `s`."""
-    return np.array([c * v[0] + s * v[2], v[1], c * v[2] - s * v[0]])
-
-
-def _make_rotation(c: float, s: float, is_about_z: bool) -> Array:
-    """Return the rotation matrix about z, or about y, of the angle with cosine `c` and sine `s`."""
+def _rotate(vectors: Array, c: ArrayLike, s: ArrayLike, is_about_z: bool) -> Array:
+    """Return vectors `(3, ...)` rotated about z, or about y, by angles with cosines `c` and sines `s`."""
+    x, y, z = vectors
     if is_about_z:
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+        return np.array([c * x - s * y, s * x + c * y, z])
+    return np.array([c * x + s * z, y, c * z - s * x])
 
 
 def _find_zyz_angles(x: Array, y: Array, z: Array) -> Array:

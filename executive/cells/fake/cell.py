@@ -26,7 +26,7 @@ from executive.cells.fake.world import (
 from executive.cells.ground_truth import FinalObject, count_outcomes
 from executive.cells.min_times import CellMinTimes
 from executive.cells.without_hardware import CellWithoutHardware
-from executive.errors import Fault, InputError
+from executive.errors import InputError
 from executive.events import Emit, discard_event
 from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
@@ -150,10 +150,7 @@ class FakeCell(CellWithoutHardware):
     def log_to(self, path: Path) -> None:
         """Write the state of the world to a log file, now and after every control step."""
         self._log = FakeStateLog(path)
-        try:
-            self.log_state()
-        except Fault as fault:
-            raise InputError(str(fault)) from fault
+        self.log_state()
 
     def log_state(self) -> None:
         """Write the current state of the world to the log."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from executive.cells.log_file import LogFile
-from executive.errors import Fault, InputError, explain_os_errors
+from executive.errors import InputError, explain_os_errors
 from executive.motion.joints import JointState
 from executive.motion.trajectory import Trajectory
 
@@ -72,10 +72,7 @@ class CommandLog(LogFile):
             self._length = max((command.end for command in read_commands(path)), default=len(header))
         super().__init__(path, "the log of the world", self._length)
         if not resume:
-            try:
-                self._append(header)
-            except Fault as fault:
-                raise InputError(str(fault)) from fault
+            self._append(header)
 
     def append(self, kind: int, *numbers: float, samples: bytes = b"") -> None:
         """Append a command, for a motion with the bytes of its `samples`."""

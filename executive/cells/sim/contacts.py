@@ -55,12 +55,10 @@ class ContactMonitor:
     def _iterate_contacts(self) -> Iterator[tuple[str, int, Sequence[float], float]]:
         """Yield part of the robot, touched body, contact point [m] and normal force [N] of each contact."""
         world, held_body = self._world, self._get_held_body()
-        for point in world.client.getContactPoints(bodyA=world.arm) or ():
-            if point[BODY_B] != held_body:
-                part = world.name_link(point[LINK_A])
-                yield part, point[BODY_B], point[POSITION_A], point[NORMAL_FORCE]
-        if held_body is not None:
-            part = name_load(world.labels[held_body])
-            for point in world.client.getContactPoints(bodyA=held_body) or ():
-                if point[BODY_B] != world.arm:
+        robot = (world.arm,) if held_body is None else (world.arm, held_body)
+        for body in robot:
+            for point in world.client.getContactPoints(bodyA=body) or ():
+                if point[BODY_B] not in robot:
+                    is_arm = body == world.arm
+                    part = world.name_link(point[LINK_A]) if is_arm else name_load(world.labels[body])
                     yield part, point[BODY_B], point[POSITION_A], point[NORMAL_FORCE]

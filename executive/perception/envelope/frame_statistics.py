@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
 
 import cv2
 import numpy as np
@@ -23,27 +22,20 @@ RELATIVE_TOLERANCE = 0.08
 """Minimum tolerance below and above the measured range of a statistic, as a fraction of the range limit."""
 
 
-@dataclass(frozen=True)
-class FrameStatistics:
-    """Statistics of the workspace in one frame, all in grey levels from 0 to 255.
+FrameStatistics = Mapping[str, float]
+"""Statistics of the workspace in one frame by name (a field of `FrameRange`) [grey level, 0 to 255]."""
+
+
+class FrameRange(Section):
+    """Minimum and maximum of each statistic over the measured frames [grey level].
 
     Medians describe the colour of the table even if objects cover a part of the table.
 
     Attributes:
         brightness: Median over the pixels of the mean of the three colours.
-        contrast: Median absolute deviation from `brightness`.
+        contrast: Median absolute deviation from the brightness.
         red, green, blue: Median of each colour over the pixels.
     """
-
-    brightness: float
-    contrast: float
-    red: float
-    green: float
-    blue: float
-
-
-class FrameRange(Section):
-    """Minimum and maximum of each statistic over the measured frames [grey level]."""
 
     brightness: tuple[float, float]
     contrast: tuple[float, float]
@@ -56,14 +48,14 @@ class FrameRange(Section):
         """Return the ranges of the statistics of several frames; None if there are no frames."""
         if not samples:
             return None
-        values = {name: [asdict(sample)[name] for sample in samples] for name in FrameRange.model_fields}
+        values = {name: [sample[name] for sample in samples] for name in FrameRange.model_fields}
         ranges = {name: (round(min(column), 1), round(max(column), 1)) for name, column in values.items()}
         return FrameRange.model_validate(ranges)
 
     def describe_difference(self, statistics: FrameStatistics) -> str:
         """Return a text with name, value and range of each statistic outside its range; "" if none."""
         differences = []
-        for name, value in asdict(statistics).items():
+        for name, value in statistics.items():
             lower, upper = getattr(self, name)
             if not lower - _compute_tolerance(lower) <= value <= upper + _compute_tolerance(upper):
                 differences.append(f"{name} {value:.0f}, measured {lower:.0f} to {upper:.0f}")
@@ -87,8 +79,9 @@ def compute_frame_statistics(
     colours = cv2.blur(frame.image, (3, 3))[mask].astype(float)
     grey = colours.mean(axis=1)
     brightness = float(np.median(grey))
-    red, green, blue = np.median(colours, axis=0).tolist()
-    return FrameStatistics(brightness, float(np.median(np.abs(grey - brightness))), red, green, blue)
+    contrast = float(np.median(np.abs(grey - brightness)))
+    values = brightness, contrast, *np.median(colours, axis=0).tolist()
+    return dict(zip(FrameRange.model_fields, values, strict=True))
 
 
 def _compute_tolerance(range_limit: float) -> float:

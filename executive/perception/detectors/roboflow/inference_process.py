@@ -62,10 +62,9 @@ class InferenceProcess:
         self._lock = threading.Lock()
         self._is_stopped = False
         self._process: subprocess.Popen[bytes] | None = None
-        self._start_error = ""
         self._is_ready = False
         self._startup_deadline = 0.0
-        self._start()
+        self._try_to_start()
 
     def wait_until_ready(self) -> None:
         """Wait until the process has imported inference-sdk.
@@ -76,8 +75,6 @@ class InferenceProcess:
         """
         if self._process is None:
             self._start()
-        if self._process is None:
-            raise Unavailable(f"its helper process is not running: {self._start_error}")
         if self._is_ready:
             return
         try:
@@ -178,14 +175,22 @@ class InferenceProcess:
 
     def _restart(self) -> None:
         self._discard_process()
-        self._start()
+        self._try_to_start()
+
+    def _try_to_start(self) -> None:
+        """Start a process in the background, if possible."""
+        with contextlib.suppress(Unavailable):
+            self._start()
 
     def _start(self) -> None:
-        """Start a process in the background, unless the helper is stopped."""
+        """Start a process in the background.
+
+        Raises:
+            Unavailable: The helper is stopped, or the process could not be started.
+        """
         with self._lock:
             if self._is_stopped:
-                self._start_error = "the detector is closed"
-                return
+                raise Unavailable("its helper process is not running: the detector is closed")
             self._stderr.seek(0)
             self._stderr.truncate()
             try:
@@ -197,8 +202,8 @@ class InferenceProcess:
                     start_new_session=True,  # Ctrl-C does not interrupt the process.
                 )  # fmt: skip
             except OSError as error:
-                self._start_error = (error.strerror or str(error)).lower()
-                return
+                cause = (error.strerror or str(error)).lower()
+                raise Unavailable(f"its helper process is not running: {cause}") from error
             self._startup_deadline = time.monotonic() + STARTUP_TIMEOUT
             self._is_ready = False
 
