@@ -40,7 +40,7 @@ ReflectionCoefficient = Annotated[float, Field(ge=0, le=3)]
 
 
 class Light(Section):
-    """A directional light and the ambient light; the defaults apply to every simulated cell."""
+    """The directional light and the ambient light; the defaults apply to every simulated cell."""
 
     direction: tuple[float, float, Annotated[float, Field(gt=0)]] = (0.3, 0.2, 1.0)
     """Direction x, y, z in the world from the table to the light; z is above 0, the length is ignored."""
