@@ -19,14 +19,14 @@ class MissionUnderTest:
     Attributes:
         loaded: The mission, checked together with its cell file.
         skills: Installed skills, and behaviours of py_trees that the mission names, by name.
-        make_cell: Function that makes the work cell; None: the function for the kind in the cell file.
+        make_cell: Function that makes the work cell.
         cell_description: Kind of the cell, and source of the detections, for reports.
         seed: Random seed; in a series of runs, the seed of the first run.
     """
 
     loaded: LoadedMission
     skills: Mapping[str, type[Skill]]
-    make_cell: Callable[..., Workcell] | None
+    make_cell: Callable[..., Workcell]
     cell_description: str
     seed: int
 
@@ -54,7 +54,7 @@ def load_mission_under_test(
     skills |= loaded.behaviours
     kind = loaded.cell_config.kind
     if not has_oracle:
-        return MissionUnderTest(loaded, skills, None, kind, seed)
+        return MissionUnderTest(loaded, skills, load_cell_kind(kind), kind, seed)
     if kind != "sim":
         name = loaded.mission.name
         raise InputError(f"--oracle requires a simulated cell, but the cell of {name} is of kind {kind}")

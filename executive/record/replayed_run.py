@@ -20,7 +20,7 @@ from executive.run.resumed_run import ResumedRun
 from executive.skill import Skill
 
 
-@dataclass(frozen=True)
+@dataclass
 class ReplayResult:
     """Result of a replay.
 
@@ -33,11 +33,11 @@ class ReplayResult:
         is_complete: True if the replay repeated all recorded control steps.
     """
 
-    decisions: int
-    ticks: int
-    recorded: TimedEvent | None
-    replayed: TimedEvent | None
-    edited: bool
+    decisions: int = 0
+    ticks: int = 0
+    recorded: TimedEvent | None = None
+    replayed: TimedEvent | None = None
+    edited: bool = False
     unanswered: str = ""
     is_complete: bool = True
 
@@ -97,20 +97,15 @@ def replay_and_compare(
     comparison.run = run
     run.execute()
     comparison.compare_end()
-    return ReplayResult(
-        comparison.equal_count, run.tick, *comparison.difference, edited,
-        comparison.missing_input_message, comparison.is_complete,
-    )  # fmt: skip
+    comparison.result.ticks = run.tick
+    return comparison.result
 
 
 class _Comparison:
     """Observer that compares the decisions of a replay with the recorded decisions.
 
     Attributes:
-        equal_count: Number of equal decisions.
-        difference: First recorded and first replayed decision that differ; None for a missing decision.
-        missing_input_message: Message about the input whose missing value caused the difference, or "".
-        is_complete: True if the replay repeated all recorded control steps.
+        result: Result of the replay up to now, without the number of its control steps.
         run: Run of the replay; the comparison stops it at the first difference.
     """
 
@@ -118,31 +113,27 @@ class _Comparison:
 
     def __init__(self, log: InputLog, edited: bool) -> None:
         self._log = log
-        self._edited = edited
+        self.result = ReplayResult(edited=edited)
         # The iterator yields the recorded decisions that have not been compared.
         self._recorded_decisions = filter(None, (_to_decision(timed, edited) for timed in log.events))
         # If the journal lacks the end of the run, its last control step may be incomplete and is ignored.
         self._has_recorded_end = any(isinstance(timed.event, RunEnded) for timed in log.events)
         self._has_found_difference = False
-        self.equal_count = 0
-        self.difference: tuple[TimedEvent | None, TimedEvent | None] = (None, None)
-        self.missing_input_message = ""
-        self.is_complete = True
 
     def __call__(self, timed: TimedEvent) -> None:
-        decision = _to_decision(timed, self._edited)
+        decision = _to_decision(timed, self.result.edited)
         if self._has_found_difference or decision is None:
             return
         recorded = next(self._recorded_decisions, None)
         if recorded == decision:
-            self.equal_count += 1
+            self.result.decisions += 1
             return
         self._has_found_difference = True
-        self.missing_input_message = self.run.replayed_cell.missing_input_message
+        self.result.unanswered = self.run.replayed_cell.missing_input_message
         # After the last recorded step, the replay only halts its skills.
-        self.is_complete = decision.tick > self._log.last_tick
+        self.result.is_complete = decision.tick > self._log.last_tick
         if self._has_recorded_end or any(map(self._is_in_complete_step, filter(None, (recorded, decision)))):
-            self.difference = (recorded, decision)
+            self.result.recorded, self.result.replayed = recorded, decision
         self.run.control.stop()
 
     def compare_end(self) -> None:
@@ -150,10 +141,10 @@ class _Comparison:
         recorded = next(self._recorded_decisions, None)
         if self._has_found_difference or recorded is None:
             return
-        self.is_complete = False
+        self.result.is_complete = False
         if self._is_in_complete_step(recorded):
-            self.difference = (recorded, None)
-            self.missing_input_message = self.run.replayed_cell.missing_input_message
+            self.result.recorded = recorded
+            self.result.unanswered = self.run.replayed_cell.missing_input_message
 
     def _is_in_complete_step(self, decision: TimedEvent) -> bool:
         """Return True if the record contains all events of the control step of a decision."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import torch
+from lightning_utilities import apply_to_collection
 from rfdetr.training import RFDETRDataModule, RFDETRModelModule
 from torch.nn.attention import SDPBackend, sdpa_kernel
 
@@ -84,10 +85,6 @@ def transform_boxes(boxes: torch.Tensor, symmetry: int) -> torch.Tensor:
 
 def to_float32(value: Any) -> Any:
     """Return a tensor, or a nested list or mapping of tensors, with all floating-point tensors as float32."""
-    if isinstance(value, torch.Tensor):
-        return value.float() if value.is_floating_point() else value
-    if isinstance(value, dict):
-        return {key: to_float32(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return type(value)(to_float32(item) for item in value)
-    return value
+    return apply_to_collection(
+        value, torch.Tensor, lambda tensor: tensor.float() if tensor.is_floating_point() else tensor
+    )

@@ -32,7 +32,6 @@ from executive.geometry import Array
 from executive.ledger.outcomes import is_balanced
 from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
-from executive.plugins import load_cell_kind
 from executive.record.journal import Journal, read_journal
 from executive.record.trace import Trace
 from executive.run.assembly import RunOptions, assemble
@@ -175,12 +174,10 @@ class _RunWithHalts:
         self._halt: Figures = {}
         config = subject.loaded.cell_config
         self._limits = JointLimits.from_config(config.arm.limits)
-        kind = subject.make_cell or load_cell_kind(config.kind)
 
         def make_cell(*args: Any, **options: Any) -> CellWrapper:
-            return WatchedCell(
-                kind(*args, **options), before=self._fork_and_halt_if_due, after=self._keep_command
-            )
+            inner = subject.make_cell(*args, **options)
+            return WatchedCell(inner, before=self._fork_and_halt_if_due, after=self._keep_command)
 
         self._run = assemble(
             subject.loaded,

@@ -23,7 +23,6 @@ from executive.cli.options import runs_option
 from executive.errors import ExecutiveError
 from executive.events import ItemChanged, NodeEnded, NodeStarted, TimedEvent
 from executive.geometry import Array
-from executive.plugins import load_cell_kind
 from executive.record.journal import find_run_end, read_journal
 from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import RecordOptions
@@ -160,9 +159,7 @@ def change_world(subject: MissionUnderTest, seed: int, path: Path, past: InputLo
 
     assert past.start_event is not None
     loaded = read_mission_of_run(path, past.start_event, subject.skills)
-    meanwhile(
-        path / "world.log", loaded, seed, act, subject.make_cell or load_cell_kind(loaded.cell_config.kind)
-    )
+    meanwhile(path / "world.log", loaded, seed, act, subject.make_cell)
     return "".join(done)
 
 

@@ -17,7 +17,6 @@ from executive.campaign.faults.planned_fault import PlannedFault, SkillFault, ma
 from executive.campaign.faults.results import Trial
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.events import InputRead, RunEnded, TimedEvent
-from executive.plugins import load_cell_kind
 from executive.record.recorded_run import RecordedRun, make_run_directory
 from executive.record.recorder import Recorder
 from executive.record.timeline.timeline import Timeline
@@ -69,11 +68,10 @@ class _TrialRun:
         self._is_stopped = False
         cell_faults = [fault for fault in injected_faults if isinstance(fault, ScheduledFault)]
         skills_by_path = {node.path: mission.skills[node.skill] for node in list_skill_nodes(mission)}
-        make_cell = mission.make_cell or load_cell_kind(mission.loaded.cell_config.kind)
         self.options = RunOptions(
             mission.seed,
             mission.requests,
-            make_cell=with_faults(make_cell, cell_faults, timeout=nominal_run.timeout),
+            make_cell=with_faults(mission.make_cell, cell_faults, timeout=nominal_run.timeout),
             substitutes=make_substitutes(self._skill_faults, skills_by_path),
         )
         self.run = assemble(mission.loaded, mission.skills, self.options, [self._store_event, self.timeline])
