@@ -67,11 +67,12 @@ def command(
                 faults = campaign.select_faults(fault_numbers)
                 trial, path = record_trial(mission_under_test, campaign.nominal_run, faults, runs)
                 output = {**fault_results.trial_to_json(trial), "run": str(path)}
-                text, exit_code = f"{fault_results.format_trial(trial)}\n{path}", int(bool(trial.problems))
+                text = "\n".join((*fault_results.list_trial_lines(trial), str(path)))
+                exit_code = int(bool(trial.problems))
             else:
                 results = campaign.run_fault_pairs(pairs) if pairs else campaign.run_single_faults()
                 output = fault_results.results_to_json(results)
-                text = fault_results.format_results(results)
+                text = "\n".join(fault_results.list_result_lines(results))
                 exit_code = int(bool(results.failed_trials)) if results.is_complete else ExitCode.HALTED
     print_json(output) if as_json else click.echo(text)
     return exit_code

@@ -150,17 +150,7 @@ def trial_to_json(trial: Trial) -> dict[str, object]:
     }  # fmt: skip
 
 
-def format_results(results: FaultCampaignResults) -> str:
-    """Return the results of a campaign as a text."""
-    return "\n".join(_list_result_lines(results))
-
-
-def format_trial(trial: Trial) -> str:
-    """Return the faults, the end and the problems of one trial as a text."""
-    return "\n".join(_list_trial_lines(trial))
-
-
-def _list_result_lines(results: FaultCampaignResults) -> Iterator[str]:
+def list_result_lines(results: FaultCampaignResults) -> Iterator[str]:
     """Yield the lines of the text about a campaign."""
     trials = results.trials
     faults_text = "pairs of faults" if results.has_pairs else "faults"
@@ -175,7 +165,7 @@ def _list_result_lines(results: FaultCampaignResults) -> Iterator[str]:
     yield from _list_count_lines(trials)
     yield f"  runs with a problem: {len(results.failed_trials) or 'none'}"
     for trial in results.failed_trials:
-        yield from (f"    {line}" for line in _list_trial_lines(trial))
+        yield from (f"    {line}" for line in list_trial_lines(trial))
     yield from _list_remark_lines(trials)
     unentered_branches, branch_count = results.unentered_branches, len(results.branches)
     yield f"  branches after a failure: {branch_count - len(unentered_branches)} of {branch_count} entered"
@@ -245,8 +235,8 @@ def _list_remark_lines(trials: Sequence[Trial]) -> Iterator[str]:
         yield f"    {remark}: fault {', '.join(faults[:3])}{more_text}"
 
 
-def _list_trial_lines(trial: Trial) -> Iterator[str]:
-    """Yield the lines of the text about a trial."""
+def list_trial_lines(trial: Trial) -> Iterator[str]:
+    """Yield the lines of the text about a trial: its faults, its end and its problems."""
     yield f"fault {trial.fault_option}: {'; and '.join(map(str, trial.faults.values()))}"
     if not trial.have_occurred:
         subject = "one of the faults" if len(trial.faults) > 1 else "the fault"

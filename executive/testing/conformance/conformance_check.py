@@ -67,11 +67,6 @@ class Check:
         """Name of the rule."""
         return self.rule.__name__
 
-    @property
-    def doc(self) -> str:
-        """First line of the rule's docstring."""
-        return (inspect.getdoc(self.rule) or "").partition("\n")[0]
-
     def run(self) -> Verdict:
         """Apply the rule to the skill and return the result."""
         try:
@@ -79,7 +74,8 @@ class Check:
             status = "failed" if problems else "ok"
         except NotTestable as error:
             problems, status = (str(error),), "not run"
-        return Verdict(self.skill_runs.name, self.name, self.doc, status, problems)
+        doc = (inspect.getdoc(self.rule) or "").partition("\n")[0]
+        return Verdict(self.skill_runs.name, self.name, doc, status, problems)
 
     def __call__(self) -> None:
         """Run the check.
@@ -89,7 +85,7 @@ class Check:
         """
         verdict = self.run()
         if verdict.problems:
-            raise ConformanceError("\n".join((f"{self.doc} Violated:", *verdict.problems)))
+            raise ConformanceError("\n".join((f"{verdict.doc} Violated:", *verdict.problems)))
 
 
 def keep_scene(scene: SkillScene) -> Mapping[str, Any]:

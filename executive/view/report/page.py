@@ -59,8 +59,6 @@ def write_report(path: Path) -> Path:
 def render_report(data: ReportData) -> str:
     """Return the report of a run as HTML; texts of missions and skills are escaped."""
     result, params, item_names = data.result, data.start.params, [item.item for item in data.items]
-    diagnosis = None if result is None else result.diagnosis
-    last_picture_file = "" if diagnosis is None else diagnosis.picture
     # A reason that repeats the status, such as "fault", is omitted.
     reason = "" if data.end is None or data.end.reason.upper() == data.status else data.end.reason
     warning = "" if result is None else result.disagreement
@@ -70,12 +68,9 @@ def render_report(data: ReportData) -> str:
         result=result,
         reason=reason,
         verdict=". ".join(filter(None, (warning, _describe_end(data)))),
-        counts={} if result is None else asdict(result.items),
-        audit=asdict(result.audit) if result is not None and result.audit is not None else {},
-        unknown_text=describe_unknown_labels({} if result is None else result.unknown_labels),
-        diagnosis=diagnosis,
-        labelled_sentences=[] if diagnosis is None else list(list_labelled_sentences(diagnosis)),
-        last_picture=next((picture for picture in data.pictures if picture.file == last_picture_file), None),
+        to_dict=asdict,
+        describe_unknown_labels=describe_unknown_labels,
+        list_labelled_sentences=list_labelled_sentences,
         titles={node.path: node.title for node in data.nodes},
         describe_place_on_table=describe_place_on_table,
         colours=_choose_colours(data.activity_times.activities),

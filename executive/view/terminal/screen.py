@@ -57,15 +57,19 @@ class TerminalView:
     def __call__(self, timed: TimedEvent) -> None:
         """Update the view by an event; hide the view while the operator is asked for a request."""
         if isinstance(timed.event, OperatorAsked):
-            self._hide()
+            self.close()
         elif isinstance(timed.event, RequestGiven):
             self._show()
         with self._lock:
             self.timeline(timed)
 
     def close(self) -> None:
-        """Hide the view, so that the caller can print a summary."""
-        self._hide()
+        """Hide the view, for a question to the operator or for a summary, and stop reading keys."""
+        try:
+            self._live.stop()
+        finally:
+            if self._key_reader is not None:
+                self._key_reader.stop()
 
     def show_message(self, message: str) -> None:
         """Write a message about the record of the run on a separate line."""
@@ -93,14 +97,6 @@ class TerminalView:
         finally:
             if self._key_reader is not None:
                 self._key_reader.start()
-
-    def _hide(self) -> None:
-        """Hide the view, and stop reading keys."""
-        try:
-            self._live.stop()
-        finally:
-            if self._key_reader is not None:
-                self._key_reader.stop()
 
     def _render_tree(self) -> RenderableType:
         """Return a drawing of the running nodes and their children; all nodes may need too much space."""

@@ -9,8 +9,8 @@ from executive.campaign.faults.results import (
     Branch,
     FaultCampaignResults,
     Trial,
-    format_results,
-    format_trial,
+    list_result_lines,
+    list_trial_lines,
     results_to_json,
 )
 
@@ -44,7 +44,7 @@ FIGURES = FaultCampaignResults("sort", "fake", 3, 11.5, 6, TRIALS, BRANCHES, Tru
 
 
 def test_the_matrix_has_a_row_per_node_and_fault_and_a_column_per_occasion() -> None:
-    assert format_results(FIGURES).splitlines()[:8] == [
+    assert list(list_result_lines(FIGURES))[:8] == [
         "sort (fake), seed 3: 6 runs with faults; a run without faults takes 11.5 s",
         "",
         "  node     place        fault   first                  middle  late  lasting",
@@ -58,7 +58,7 @@ def test_the_matrix_has_a_row_per_node_and_fault_and_a_column_per_occasion() -> 
 
 def test_a_cell_of_several_runs_tells_how_many_were_ok_and_the_worst_of_the_others() -> None:
     def cell(*trials: Trial) -> str:
-        row = format_results(replace(FIGURES, trials=trials)).splitlines()[3]
+        row = list(list_result_lines(replace(FIGURES, trials=trials)))[3]
         return row.removeprefix("  Grasp  sort.yaml:7  missed  ")
 
     failed = replace(MISSED, status="FAILURE", reason="Grasp.missed")
@@ -69,7 +69,7 @@ def test_a_cell_of_several_runs_tells_how_many_were_ok_and_the_worst_of_the_othe
 
 
 def test_problems_and_recoveries_never_entered_are_printed_with_their_positions() -> None:
-    assert format_results(FIGURES).splitlines()[8:] == [
+    assert list(list_result_lines(FIGURES))[8:] == [
         "  as without faults: 2; fewer objects sorted: 1; failed: 1; ended as FAULT: 0; "
         "fault did not occur: 1; wrong: 1",
         "  failures: Release.stuck 1",
@@ -85,16 +85,16 @@ def test_problems_and_recoveries_never_entered_are_printed_with_their_positions(
 
 
 def test_pairs_have_no_matrix_a_campaign_cut_short_says_so_and_one_run_is_a_few_lines() -> None:
-    assert format_trial(NOWHERE).splitlines() == [
+    assert list(list_trial_lines(NOWHERE)) == [
         "fault 1+5: tree/Grasp missed, first: nothing seals; and tree/Wait raises, first: nothing seals",
         "  one of the faults did not occur",
         "  SUCCESS",
     ]
     alone = replace(NOWHERE, faults={1: MISS})
     lines = ["fault 1: tree/Grasp missed, first: nothing seals", "  the fault did not occur", "  SUCCESS"]
-    assert format_trial(alone).splitlines() == lines
-    text = format_results(replace(FIGURES, has_pairs=True, is_complete=False, trials=(NOWHERE,)))
-    assert text.splitlines()[:3] == [
+    assert list(list_trial_lines(alone)) == lines
+    pairs = replace(FIGURES, has_pairs=True, is_complete=False, trials=(NOWHERE,))
+    assert list(list_result_lines(pairs))[:3] == [
         "sort (fake), seed 3: 1 runs with pairs of faults; a run without faults takes 11.5 s",
         "  ended by the user before the last run",
         "  as without faults: 0; fewer objects sorted: 0; failed: 0; ended as FAULT: 0; "
