@@ -17,7 +17,6 @@ from executive.cell.visuals import Visuals
 from executive.cell.workcell import CellOptions
 from executive.events import Emit, TargetSelected
 from executive.ledger.tracker import Tracker
-from executive.perception.evidence import find_classes_distinct_by_touch
 
 
 class CellWithoutHardware:
@@ -49,10 +48,7 @@ class CellWithoutHardware:
         self.config, self.routes = config, dict(routes)
         self.steps = self.last_command_step = 0
         bins, classes = build_bins(config), build_object_classes(config)
-        distinct_classes = find_classes_distinct_by_touch(config)
-        self.accounts = Tracker(
-            config.ledger, config.table, bins, classes, self.routes, options.quotas, emit, distinct_classes
-        )
+        self.accounts = Tracker(config.ledger, config.table, bins, classes, self.routes, options.quotas, emit)
         no_device: Any = None
 
         def emit_selection(target: Target, bin: str) -> None:

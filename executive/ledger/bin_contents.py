@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,10 +74,14 @@ class BinContents:
         slots = [record.slot for record in self.records if record.bin == bin_name]
         return max([self.count_objects_in(bin_name), *(slot + 1 for slot in slots if slot is not None)])
 
-    def get_slot_position(self, record: ItemRecord) -> Array:
-        """Return the x and y of the slot of a placed item `(2,)` [m]; of the bin if the item fell into it."""
+    def measure_slot_distance(self, record: ItemRecord, observations: Sequence[Observation]) -> float:
+        """Return the distance of the nearest observation from the slot of a placed item [m]; default inf.
+
+        If the item fell into the bin, the centre of the bin takes the place of the slot.
+        """
         bin = self.bins[record.bin]
-        return bin.position[:2] if record.slot is None else bin.slots[record.slot % len(bin.slots)]
+        slot = bin.position[:2] if record.slot is None else bin.slots[record.slot % len(bin.slots)]
+        return min((math.dist(slot, entry.position[:2]) for entry in observations), default=math.inf)
 
     def find_bin_name(self, observation: Observation, bias_std: float) -> str | None:
         """Return the name of the bin in which an observed object lies, or None.

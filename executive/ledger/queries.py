@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
@@ -18,18 +19,20 @@ from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, ItemRecord, State
 from executive.ledger.records import ItemRecords
 from executive.ledger.staleness import Staleness
+from executive.perception.evidence import find_classes_distinct_by_touch
 
 MIN_LOG_RATIO_OF_WEIGHT = math.log(0.01)
 """Minimum log likelihood ratio of a weight that agrees with the class of an item: prior odds that the item is
 an object of no declared class."""
 
 
+@dataclass(eq=False)
 class LedgerQueries:
     """Items of a run, and answers to queries that change nothing; `Tracker` adds the changes.
 
     `executive.cell.ledger.Ledger` documents the methods in detail.
 
-    Args:
+    Attributes:
         config: Thresholds of the ledger, from the cell file.
         table: The workspace.
         bins: Bins by name.
@@ -37,19 +40,21 @@ class LedgerQueries:
         routes: Names of the permitted bins by class.
         quotas: Maximum numbers of objects in the bins.
         emit: Function that receives the events.
-        labels_with_unique_height: Classes whose height distinguishes them from all others.
     """
 
-    def __init__(
-        self, config: LedgerConfig, table: TableConfig, bins: Mapping[str, Bin],
-        classes: Mapping[str, ObjectClass], routes: Routes, quotas: Quotas, emit: Emit,
-        labels_with_unique_height: Collection[str],
-    ) -> None:  # fmt: skip
-        self._config, self._classes, self._routes, self._emit = config, classes, routes, emit
-        self._records = ItemRecords(emit)
-        self._certainty = Certainty(config, labels_with_unique_height)
-        self._bins = BinContents(config, bins, routes, self._records, quotas)
-        self._coverage, self._staleness = Coverage(table), Staleness()
+    config: LedgerConfig
+    table: TableConfig
+    bins: Mapping[str, Bin]
+    classes: Mapping[str, ObjectClass]
+    routes: Routes
+    quotas: Quotas
+    emit: Emit
+
+    def __post_init__(self) -> None:
+        self._records = ItemRecords(self.emit)
+        self._certainty = Certainty(self.config, find_classes_distinct_by_touch(self.classes))
+        self._bin_contents = BinContents(self.config, self.bins, self.routes, self._records, self.quotas)
+        self._coverage, self._staleness = Coverage(self.table), Staleness()
 
     @property
     def records(self) -> Sequence[ItemRecord]:
@@ -101,11 +106,11 @@ class LedgerQueries:
         `label` restricts the check to objects of one class; None: all classes with a route. The objects in
         `ignored_items` may be on the table.
         """
-        routed_labels = [routed_label for routed_label in self._routes if label in (None, routed_label)]
-        labels = {entry for entry in routed_labels if not self._bins.explain_exemption(entry)}
+        routed_labels = [routed_label for routed_label in self.routes if label in (None, routed_label)]
+        labels = {entry for entry in routed_labels if not self._bin_contents.explain_exemption(entry)}
         if routed_labels and not labels:
             return True
-        if self._coverage.max_object_probability > self._config.max_miss_probability:
+        if self._coverage.max_object_probability > self.config.max_miss_probability:
             return False
         records = (record for record in self.records if record.item not in ignored_items)
         possible_items = [record for record in records if self._certainty.may_be_on_table(record)]
@@ -126,7 +131,7 @@ class LedgerQueries:
         if self._is_weighed(record):
             return [record.label]
         similar_classes = (
-            other for other in self._classes.values() if other.detected_label == record.detected_label
+            other for other in self.classes.values() if other.detected_label == record.detected_label
         )
         return [record.label, *(other.label for other in similar_classes if other.label != record.label)]
 
@@ -142,7 +147,7 @@ class LedgerQueries:
 
     def count_objects_in(self, bin: str, label: str | None = None) -> int:
         """Return the number of objects in a bin; `label` restricts the count to one class."""
-        return self._bins.count_objects_in(bin, label)
+        return self._bin_contents.count_objects_in(bin, label)
 
     def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
         """Return the number of known items in a state, of one class (`label`) and in one bin, or of all."""
@@ -151,19 +156,21 @@ class LedgerQueries:
 
     def count_used_slots(self, bin: str) -> int:
         """Return the index of the next free slot of a bin."""
-        return self._bins.count_used_slots(bin)
+        return self._bin_contents.count_used_slots(bin)
 
     def explain_exemption(self, label: str) -> str:
         """Return the reason why the mission does not sort further objects of a class, or ""."""
-        return self._bins.explain_exemption(label)
+        return self._bin_contents.explain_exemption(label)
 
     def _explain_exemption(self, record: ItemRecord) -> str:
         """Return the reason why the mission does not sort an item, whatever a weighing would find, or ""."""
-        reasons = [self._bins.explain_exemption(label) for label in self.list_possible_labels(record.item)]
+        reasons = [
+            self._bin_contents.explain_exemption(label) for label in self.list_possible_labels(record.item)
+        ]
         return reasons[0] if all(reasons) else ""
 
     def _is_weighed(self, record: ItemRecord) -> bool:
         """Return True if the class of an item is certain according to its last weighing."""
         belief = record.belief
         fits = belief.weight_log_ratios.get(belief.label, -math.inf) >= MIN_LOG_RATIO_OF_WEIGHT
-        return fits and belief.class_error <= self._config.max_class_error
+        return fits and belief.class_error <= self.config.max_class_error

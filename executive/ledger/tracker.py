@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from executive.cell.bins import Bin
-from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.detection import Detections, Observation
 from executive.cell.frame import FrameCaptured
 from executive.cell.ledger import Presence
-from executive.cell.objects import Item, ObjectClass, Target
-from executive.cell.protocols import Routes
-from executive.cell.quotas import Quotas
+from executive.cell.objects import Item, Target
 from executive.errors import Fault
-from executive.events import Emit, ItemChanged
+from executive.events import ItemChanged
 from executive.geometry import Array
 from executive.ledger import outcomes
 from executive.ledger.bin_contents import find_probable_bin
@@ -40,12 +36,8 @@ class Tracker(LedgerQueries):
         assumption_reasons: Reasons why error rates of detectors were assumed, and not measured.
     """
 
-    def __init__(
-        self, config: LedgerConfig, table: TableConfig, bins: Mapping[str, Bin],
-        classes: Mapping[str, ObjectClass], routes: Routes, quotas: Quotas, emit: Emit,
-        labels_with_unique_height: Collection[str] = (),
-    ) -> None:  # fmt: skip
-        super().__init__(config, table, bins, classes, routes, quotas, emit, labels_with_unique_height)
+    def __post_init__(self) -> None:
+        super().__post_init__()
         self._bin_recovery: BinRecovery | None = None
         """Recovery of the contents of the bins from `lose_track` to `record_bin_contents`; otherwise None."""
         self._last_frame_id = self._deferral_count = 0
@@ -66,14 +58,14 @@ class Tracker(LedgerQueries):
         if frame.id != self._last_frame_id:
             self._last_frame_id, self._last_stamp = frame.id, frame.stamp
             self._update(detections, observations)
-        self._emit(FrameCaptured(frame))
-        self._emit(make_look_event(detections, observations))
+        self.emit(FrameCaptured(frame))
+        self.emit(make_look_event(detections, observations))
         return self.find_targets()
 
     def verify(self, item: Item, detections: Detections, observations: Sequence[Observation]) -> Presence:
         """Return whether an item is at its place; the position of an item that is gone becomes unknown."""
         record = self._records.find(item)
-        presence = verify(record, detections, observations, self._bins, self._config)
+        presence = verify(record, detections, observations, self._bin_contents)
         if presence is Presence.GONE and record.state in (State.PLACED, *ON_TABLE):
             record.mark_as_missing(self.change_count)
             self._records.emit(record)
@@ -93,14 +85,14 @@ class Tracker(LedgerQueries):
             if may_miss_top and self._certainty.register_low_touch(record):
                 return True
             record.last_contradiction = contradiction
-            self._invalidate_near(record.position, self._config.neighbourhood)
+            self._invalidate_near(record.position, self.config.neighbourhood)
             self._records.emit(record)
             return False
         return True
 
     def record_weight(self, item: Item, weight: float, std: float) -> str:
         """Update the class of an item by its weight, and return "" or a contradiction."""
-        record, classes = self._records.find(item), self._classes
+        record, classes = self._records.find(item), self.classes
         log_ratios = compute_weight_log_ratios(weight, std, classes)
         record.belief.add_weight(
             log_ratios, {label: other.detected_label for label, other in classes.items()}
@@ -136,14 +128,14 @@ class Tracker(LedgerQueries):
         record = self._records.find(item)
         self._records.change_state(record, State.HELD)
         record.belief.is_proved, record.is_missing = True, False
-        self._invalidate_near(record.position, self._config.neighbourhood)
+        self._invalidate_near(record.position, self.config.neighbourhood)
 
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
         """Record that the tool lost an item; `landing` is the predicted landing position `(3,)` [m]."""
         record = self._records.find(item)
         record.is_untracked = record.is_missing = False
         self._records.change_state(record, State.DROPPED)
-        self._bins.set_prior_log_odds(record, landing)
+        self._bin_contents.set_prior_log_odds(record, landing)
         record.attempt_count += 1
         record.change_count = self.change_count
         self.invalidate_positions()
@@ -152,7 +144,7 @@ class Tracker(LedgerQueries):
         """Record that an item was released in a bin."""
         record = self._records.find(item)
         if record.state is State.HELD:
-            record.reason, record.slot = "", self._bins.count_used_slots(bin)
+            record.reason, record.slot = "", self._bin_contents.count_used_slots(bin)
         # An object that a look showed before the placement is no item that left the bin later.
         record.stamp, record.belief.miss_probability = self._last_stamp, 1.0
         record.forget_viewpoints()
@@ -161,7 +153,7 @@ class Tracker(LedgerQueries):
     def record_put_down(self, item: Item, position: Array) -> None:
         """Record that an item was put down at `position` `(3,)` [m]; a look must confirm the position."""
         record = self._records.find(item)
-        record.update_position(position, self._config.gate, is_unmoved=False)
+        record.update_position(position, self.config.gate, is_unmoved=False)
         record.change_count = self.change_count
         self._records.change_state(record, State.REJECTED if record.reason else State.SEEN)
         self.invalidate_positions()
@@ -186,7 +178,7 @@ class Tracker(LedgerQueries):
 
     def lose_track(self) -> None:
         """Record a loss of track: the tool may have moved any item outside of the bins."""
-        self._bin_recovery = BinRecovery(self._bins)
+        self._bin_recovery = BinRecovery(self._bin_contents)
         self._mark_as_dropped(self._records.filter_by_state(State.HELD, State.DROPPED))
 
     def mark_unseen_as_dropped(self) -> None:
@@ -235,17 +227,17 @@ class Tracker(LedgerQueries):
     def _update(self, detections: Detections, observations: Sequence[Observation]) -> None:
         """Update the items on the table and the dropped items with the observations of a look."""
         bias_std = detections.error_rates.bias
-        bin_names = {entry: self._bins.find_bin_name(entry, bias_std) for entry in observations}
+        bin_names = {entry: self._bin_contents.find_bin_name(entry, bias_std) for entry in observations}
         observations_on_table = [entry for entry, bin_name in bin_names.items() if bin_name is None]
-        update = LookUpdate(self._config, self._records, self._coverage, self._staleness, detections)
+        update = LookUpdate(self.config, self._records, self._coverage, self._staleness, detections)
         for record in update.apply(observations_on_table):
             self._certainty.reject_if_uncertain(record, is_unmoved=self._staleness.is_unmoved(record))
             self._records.emit(record)
         if detections.view == "full" and self._bin_recovery is not None:
             self._bin_recovery.add_look(detections, bin_names)
         elif detections.view == "full":
-            confirm_placed_items(detections, observations, self._bins, self._config)
-            self._records.emit(*self._bins.place_dropped_items(detections, bin_names))
+            confirm_placed_items(detections, observations, self._bin_contents)
+            self._records.emit(*self._bin_contents.place_dropped_items(detections, bin_names))
 
     def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
         """Set items to DROPPED, so that later looks search for them on the table and in the bins."""

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from executive.cell.config import CellConfig
 from executive.cell.detection import Detection
 from executive.cell.frame import Box, Frame
 from executive.cell.objects import ObjectClass
@@ -94,9 +93,9 @@ def describe_weight(weight: float, label: str, classes: Mapping[str, ObjectClass
     return f"it weighs {weight:.2f} N, and {weights}"
 
 
-def find_classes_distinct_by_touch(config: CellConfig) -> frozenset[str]:
+def find_classes_distinct_by_touch(classes: Mapping[str, ObjectClass]) -> frozenset[str]:
     """Return the classes whose height differs from each other class by more than `MAX_TOUCH_HEIGHT_ERROR`."""
-    heights = {label: section.height for label, section in config.objects.items()}
+    heights = {label: object_class.height for label, object_class in classes.items()}
     return frozenset(
         label
         for label, height in heights.items()

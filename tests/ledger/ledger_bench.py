@@ -43,9 +43,7 @@ def area_of(view: str) -> tuple[float, float, float, float]:
 class Bench:
     """A ledger with a camera above it that sees exactly what a test says."""
 
-    def __init__(
-        self, labels_with_unique_height: Sequence[str] = (), classes: dict[str, ObjectClass] | None = None
-    ) -> None:
+    def __init__(self, classes: dict[str, ObjectClass] | None = None) -> None:
         self.config = LedgerConfig()
         self.events: list[Event] = []
         size = np.array([0.22, 0.24, 0.06])
@@ -63,7 +61,6 @@ class Bench:
             {"cube": ("red_bin", "pink_bin")},
             Quotas({}),
             self.events.append,
-            labels_with_unique_height,
         )
         self.frames = 0
 

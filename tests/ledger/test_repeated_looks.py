@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from ledger_bench import EYE, Bench
 
+from executive.cell.objects import ObjectClass
 from executive.ledger.belief import compute_repeat_probability
 from executive.ledger.certainty import Certainty
 
@@ -42,7 +43,7 @@ def test_after_three_looks_an_item_without_other_evidence_is_rejected_with_both_
 
 
 def test_an_item_whose_class_a_touch_can_prove_is_sure_enough_to_be_touched_after_three_looks():
-    bench = Bench(labels_with_unique_height=("cube",))
+    bench = Bench({"cube": ObjectClass("cube", height=0.05, radius=0.0354)})
     sure = []
     for _ in range(3):
         bench.look(CUBE, by=DOUBTFUL)
