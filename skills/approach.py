@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 from executive.cell.arm import Goal, Task
 from executive.cell.objects import ObjectClass, Target
@@ -43,10 +43,10 @@ class Approach(Skill):
     target: In[Target] = port(doc="the target to touch")
     overtravel: Metres = param(OVERTRAVEL, ge=0, le=0.03, doc="depth of the descent below the surface")
     offset: Metres = param(SPIRAL_SPACING, ge=0, le=0.02, doc="spacing of the points on the spiral")
-    reasons: ClassVar = ("stale", "unreachable", "blocked", "contradicted", "no_contact")
-    uses: ClassVar = ("arm", "tool")
-    moves: ClassVar = True
-    tool_state: ClassVar = (EMPTY, EMPTY)
+    reasons = ("stale", "unreachable", "blocked", "contradicted", "no_contact")
+    uses = ("arm", "tool")
+    moves = True
+    tool_state = (EMPTY, EMPTY)
 
     @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.protocols import Cell
 from executive.skill import Out, Skill, port
 
@@ -12,8 +10,8 @@ class AwaitRequest(Skill):
     """Ask the operator which class to pick next; the clock of the run stops until the operator answers."""
 
     wanted: Out[str] = port(refers_to="class", doc="the requested class")
-    reasons: ClassVar = ("rescan", "quit")
-    senses: ClassVar = True
+    reasons = ("rescan", "quit")
+    senses = True
 
     def run(self, cell: Cell) -> None:
         """Ask the operator once, and wait for the answer."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell
 from executive.skill import ANY, EMPTY, HOLDING, Out, Skill, port
@@ -18,11 +16,11 @@ class ConfirmGrasp(Skill):
     """
 
     held: Out[Item] = port(refers_to="item", doc="the item in the tool")
-    reasons: ClassVar = ("empty",)
-    uses: ClassVar = ("tool",)
-    senses: ClassVar = True
-    tool_state: ClassVar = (ANY, HOLDING)
-    tool_state_after_failure: ClassVar = {"empty": EMPTY}
+    reasons = ("empty",)
+    uses = ("tool",)
+    senses = True
+    tool_state = (ANY, HOLDING)
+    tool_state_after_failure = {"empty": EMPTY}
 
     def run(self, cell: Cell) -> None:
         """Compare the vacuum sensor with the ledger; unless both report an item, open the tool and fail."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell
 from executive.skill import In, Skill, param, port
@@ -19,7 +17,7 @@ class Defer(Skill):
 
     item: In[Item] = port(refers_to="item", doc="the item to put back")
     times: int = param(1, ge=1, doc="maximum number of times that the mission defers one item")
-    reasons: ClassVar = ("exhausted",)
+    reasons = ("exhausted",)
 
     def run(self, cell: Cell) -> None:
         """Defer the item in the ledger."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.detection import Detections
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.looks import LookingSkill
@@ -26,7 +24,7 @@ class Detect(LookingSkill):
     detections: Out[Detections] = port(doc="the detections and their frame")
     doubtful: str = param("fail", choices=("fail", "pass"), doc="result if all table detections are doubtful")
     hidden: str = param("fail", choices=("fail", "pass"), doc="result if the arm hides part of the workspace")
-    reasons: ClassVar = ("unsure", "hidden", *LookingSkill.reasons)
+    reasons = ("unsure", "hidden", *LookingSkill.reasons)
 
     def run(self, cell: Cell) -> Steps:
         """Capture a frame, send the frame to the detector, and wait for the answer."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
 from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
@@ -18,10 +16,10 @@ class Grasp(Skill):
     target: In[Target] = port(doc="the target that the tool touches")
     held: Out[Item] = port(refers_to="item", doc="the item in the tool")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time to wait before reading the sensor")
-    reasons: ClassVar = ("missed",)
-    uses: ClassVar = ("tool",)
-    tool_state: ClassVar = (EMPTY, HOLDING)
-    waits: ClassVar = "settle"
+    reasons = ("missed",)
+    uses = ("tool",)
+    tool_state = (EMPTY, HOLDING)
+    waits = "settle"
 
     def run(self, cell: Cell) -> Steps:
         """Close the tool, wait, and read the vacuum sensor."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.protocols import Cell
 from executive.skill import In, Skill, param, port
 
@@ -18,8 +16,8 @@ class HasCounted(Skill):
     inside: In[str | None] = port(default=None, refers_to="bin", doc="only items in this bin")
     counter: str = param("placed", choices=("placed", "rejected"), doc="the state of the counted items")
     at_least: int = param(ge=1, doc="minimum number of items")
-    is_condition: ClassVar = True
-    reasons: ClassVar = ("too_few",)
+    is_condition = True
+    reasons = ("too_few",)
 
     def run(self, cell: Cell) -> None:
         """Count the items once."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.protocols import Cell
 from executive.skill import Seconds, Skill, param
 
@@ -12,8 +10,8 @@ class HasElapsed(Skill):
     """Succeed if `seconds` have passed since the start of the run."""
 
     seconds: Seconds = param(ge=0.01, doc="time since the start of the run")
-    is_condition: ClassVar = True
-    reasons: ClassVar = ("too_early",)
+    is_condition = True
+    reasons = ("too_early",)
 
     def run(self, cell: Cell) -> None:
         """Compare the clock of the run with the time."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.protocols import Cell
 from executive.skill import In, Skill, port
 
@@ -18,8 +16,8 @@ class IsEqual(Skill):
         same_as="to", doc="the value to compare, for example `$target.label`"
     )
     to: In[str | int | float | bool] = port(same_as="value", doc="the expected value, for example `cube`")
-    reasons: ClassVar = ("different",)
-    is_condition: ClassVar = True
+    reasons = ("different",)
+    is_condition = True
 
     def run(self, cell: Cell) -> None:
         """Compare the values."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell
 from executive.skill import In, Skill, port
@@ -13,8 +11,8 @@ class IsFresh(Skill):
     """Succeed if the robot cannot have moved the target since its last detection."""
 
     target: In[Target] = port(doc="the target whose position is checked")
-    is_condition: ClassVar = True
-    reasons: ClassVar = ("stale",)
+    is_condition = True
+    reasons = ("stale",)
 
     def run(self, cell: Cell) -> None:
         """Ask the ledger for actions of the robot since the detection."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.protocols import Cell
 from executive.skill import ANY, HOLDING, Skill
 
@@ -15,11 +13,11 @@ class IsHolding(Skill):
     still hold an unknown object. `ConfirmGrasp` corrects both.
     """
 
-    is_condition: ClassVar = True
-    reasons: ClassVar = ("empty",)
-    senses: ClassVar = True
-    tool_state: ClassVar = (ANY, HOLDING)
-    tool_state_after_failure: ClassVar = {"empty": ANY}
+    is_condition = True
+    reasons = ("empty",)
+    senses = True
+    tool_state = (ANY, HOLDING)
+    tool_state_after_failure = {"empty": ANY}
 
     def run(self, cell: Cell) -> None:
         """Compare the vacuum sensor with the ledger."""

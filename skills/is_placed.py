@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell
 from executive.skill import In, Skill, port
@@ -13,8 +11,8 @@ class IsPlaced(Skill):
     """Succeed if the item is in a bin according to the ledger."""
 
     item: In[Item] = port(refers_to="item", doc="the item that is checked")
-    is_condition: ClassVar = True
-    reasons: ClassVar = ("not_placed",)
+    is_condition = True
+    reasons = ("not_placed",)
 
     def run(self, cell: Cell) -> None:
         """Ask the ledger for the state of the item."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell
 from executive.manipulation.tool_goals import make_object_goal
@@ -17,8 +15,8 @@ class IsReachable(Skill):
     """
 
     target: In[Target] = port(doc="the target to reach")
-    is_condition: ClassVar = True
-    reasons: ClassVar = ("unreachable",)
+    is_condition = True
+    reasons = ("unreachable",)
 
     def run(self, cell: Cell) -> None:
         """Solve the inverse kinematics of the arm, without planning a motion."""

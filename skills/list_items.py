@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell
 from executive.skill import Out, Skill, param, port
@@ -24,7 +22,6 @@ class ListItems(Skill):
     )
     class_: str = param("", refers_to="class", doc="only items of this class; empty: of all classes")
     bin: str = param("", refers_to="bin", doc="only items in this bin; empty: items anywhere")
-    reasons: ClassVar = ()
 
     def run(self, cell: Cell) -> None:
         """Read the items from the ledger."""

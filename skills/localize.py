@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.detection import Detections
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell
@@ -22,7 +20,7 @@ class Localize(Skill):
 
     detections: In[Detections] = port(doc="the detections and their frame")
     targets: Out[list[Target]] = port(doc="a target per unsorted item with a known position, from any frame")
-    reasons: ClassVar = ("stale", "no_depth")
+    reasons = ("stale", "no_depth")
 
     def run(self, cell: Cell) -> None:
         """Localize every detection, then update the ledger."""

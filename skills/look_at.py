@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from typing import ClassVar
 
 from executive.cell.ledger import Presence
 from executive.cell.objects import Item
@@ -28,8 +27,8 @@ class LookAt(LookingSkill):
     bin: In[str | None] = port(default=None, refers_to="bin", doc="the bin whose items are verified")
     view: str = param("full", choices=("table", "full"), doc="`table`: the workspace; `full`: entire image")
     looks: int = param(10, ge=1, le=100, doc="maximum number of images")
-    one_of: ClassVar = ("item", "bin")
-    reasons: ClassVar = ("gone", "hidden", *LookingSkill.reasons)
+    one_of = ("item", "bin")
+    reasons = ("gone", "hidden", *LookingSkill.reasons)
 
     def run(self, cell: Cell) -> Steps:
         """Take looks until all answers are certain, or until a place is not in view."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import follow, make_task, plan, wait_for_rest
 from executive.skill import Skill, param
@@ -23,9 +21,9 @@ class MoveToScan(Skill):
         choices=("auto", "next"),
         doc="an arm pose of the cell; `auto`: the first scan pose, if needed; `next`: the next scan pose",
     )
-    reasons: ClassVar = ("unreachable", "blocked")
-    uses: ClassVar = ("arm",)
-    moves: ClassVar = True
+    reasons = ("unreachable", "blocked")
+    uses = ("arm",)
+    moves = True
 
     def run(self, cell: Cell) -> Steps:
         """Select the pose and move to it."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 
 from executive.cell.objects import Item
@@ -26,12 +24,12 @@ class PutDown(Skill):
     held: In[Item] = port(refers_to="item", doc="the item in the tool")
     drop: Metres = param(0.005, ge=0, le=0.05, doc="height of the item's underside above the table")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time to wait before reading the sensor")
-    reasons: ClassVar = ("unreachable", "blocked", "dropped", "stuck")
-    uses: ClassVar = ("arm", "tool")
-    moves: ClassVar = True
-    tool_state: ClassVar = (HOLDING, EMPTY)
-    tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": ANY}
-    waits: ClassVar = "settle"
+    reasons = ("unreachable", "blocked", "dropped", "stuck")
+    uses = ("arm", "tool")
+    moves = True
+    tool_state = (HOLDING, EMPTY)
+    tool_state_after_failure = {"dropped": EMPTY, "halt": ANY}
+    waits = "settle"
 
     def run(self, cell: Cell) -> Steps:
         """Transport the item to a free position, and release the item."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell
 from executive.skill import In, Skill, param, port
@@ -18,7 +16,6 @@ class RejectTarget(Skill):
     item: In[Item] = port(refers_to="item", doc="the item to reject")
     why: str = param("could not be picked", doc="reason in the report")
     after: int = param(0, ge=0, doc="minimum number of failed attempts before the rejection")
-    reasons: ClassVar = ()
 
     def run(self, cell: Cell) -> None:
         """Reject the item in the ledger."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import release
@@ -20,11 +18,11 @@ class Release(Skill):
     bin: In[str] = port(refers_to="bin", doc="the bin under the tool")
     placed: Out[Item] = port(refers_to="item", doc="the item in the bin")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time to wait before reading the sensor")
-    reasons: ClassVar = ("stuck", "dropped")
-    uses: ClassVar = ("tool",)
-    tool_state: ClassVar = (HOLDING, EMPTY)
-    tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": ANY}
-    waits: ClassVar = "settle"
+    reasons = ("stuck", "dropped")
+    uses = ("tool",)
+    tool_state = (HOLDING, EMPTY)
+    tool_state_after_failure = {"dropped": EMPTY, "halt": ANY}
+    waits = "settle"
 
     def run(self, cell: Cell) -> Steps:
         """Open the tool, wait, and read the vacuum sensor."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar
 
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
@@ -41,7 +40,7 @@ class SelectTarget(Skill):
         choices=("nearest", "surest", "least_tried"),
         doc="the `nearest`, the `surest` or the `least_tried` target",
     )
-    reasons: ClassVar = ("no_candidate", "unseen", "doubtful")
+    reasons = ("no_candidate", "unseen", "doubtful")
 
     def run(self, cell: Cell) -> None:
         """Select the first candidate in the preferred order."""

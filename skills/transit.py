@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, MinTimes, Steps
@@ -25,11 +25,11 @@ class Transit(Skill):
     held: In[Item] = port(refers_to="item", doc="the item in the tool")
     bin: In[str] = port(refers_to="bin", doc="the bin for the item")
     drop: Metres = param(DROP_HEIGHT, ge=0.005, le=0.1, doc="height of the item's underside above the slot")
-    reasons: ClassVar = ("unreachable", "blocked", "dropped")
-    uses: ClassVar = ("arm", "tool")
-    moves: ClassVar = True
-    tool_state: ClassVar = (HOLDING, HOLDING)
-    tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": ANY}
+    reasons = ("unreachable", "blocked", "dropped")
+    uses = ("arm", "tool")
+    moves = True
+    tool_state = (HOLDING, HOLDING)
+    tool_state_after_failure = {"dropped": EMPTY, "halt": ANY}
 
     @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:

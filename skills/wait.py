@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.protocols import Cell, Steps
 from executive.skill import Seconds, Skill, param
 
@@ -12,8 +10,7 @@ class Wait(Skill):
     """Wait until `seconds` have passed on the clock of the run."""
 
     seconds: Seconds = param(ge=0, le=3600, doc="duration")
-    reasons: ClassVar = ()
-    waits: ClassVar = "seconds"
+    waits = "seconds"
 
     def run(self, cell: Cell) -> Steps:
         """Wait on the clock of the run."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.arm import Goal
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
@@ -21,13 +19,13 @@ class Weigh(Skill):
     height: Metres = param(0.05, ge=0.01, le=0.3, doc="height by which the item is lifted")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time between motion and measurement")
     period: Seconds = param(0.25, ge=0.05, le=10, doc="time over which the load is averaged")
-    reasons: ClassVar = ("unreachable", "blocked", "dropped", "contradicted", "no_bin")
-    uses: ClassVar = ("arm", "tool")
-    senses: ClassVar = True
-    moves: ClassVar = True
-    tool_state: ClassVar = (HOLDING, HOLDING)
-    tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": ANY}
-    waits: ClassVar = "period"
+    reasons = ("unreachable", "blocked", "dropped", "contradicted", "no_bin")
+    uses = ("arm", "tool")
+    senses = True
+    moves = True
+    tool_state = (HOLDING, HOLDING)
+    tool_state_after_failure = {"dropped": EMPTY, "halt": ANY}
+    waits = "period"
 
     def run(self, cell: Cell) -> Steps:
         """Lift the item, average the load of the tool at rest, and record the weight."""

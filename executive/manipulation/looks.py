@@ -17,8 +17,8 @@ class LookingSkill(Skill):
     detector: str = param("", refers_to="detector", doc="a detector of the cell; empty: the first detector")
     view: str = param("table", choices=("table", "full"), doc="`table`: the workspace; `full`: entire image")
     reasons: ClassVar[tuple[str, ...]] = ("unavailable", "crowded", "camera_moved")
-    uses: ClassVar = ("camera",)
-    senses: ClassVar = True
+    uses = ("camera",)
+    senses = True
 
     @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
