@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
-from executive.cell.arm import Goal, Task
+from executive.cell.arm import Goal
 from executive.cell.objects import ObjectClass, Target
 from executive.cell.protocols import Cell, MinTimes, Steps, Tool
 from executive.manipulation.motions import follow, plan
@@ -60,10 +61,7 @@ class Approach(Skill):
         if not cell.ledger.is_fresh(self.target):
             message = f"the robot may have moved {item} since its detection at {self.target.stamp:.2f} s"
             raise self.failure("stale", f"{message}; look again")
-
-        def find_goal_and_task() -> tuple[Goal, Task]:
-            return make_approach(cell, self.target, self.overtravel, self.offset)
-
+        find_goal_and_task = partial(make_approach, cell, self.target, self.overtravel, self.offset)
         motion = yield from plan(self, cell.arm, find_goal_and_task)
         goal, _ = find_goal_and_task()
         yield from follow(self, cell, motion, until=_build_contact_check(tool))

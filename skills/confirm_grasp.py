@@ -12,7 +12,7 @@ class ConfirmGrasp(Skill):
 
     Unless sensor and ledger both report an item, the skill opens the tool and fails; it also records a drop
     if only the ledger reports an item. After an interrupted transit, a mission can thus decide how to
-    continue. To ask the sensor without an effect, use the condition `IsHolding`.
+    continue. To check without side effects, use the condition `IsHolding`.
     """
 
     held: Out[Item] = port(refers_to="item", doc="the item in the tool")

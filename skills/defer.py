@@ -1,4 +1,4 @@
-"""Skill that puts an item back behind all others."""
+"""Skill that moves an item to the end of the order of selection."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from executive.skill import In, Skill, param, port
 
 
 class Defer(Skill):
-    """Put an item back: `SelectTarget` selects the item only after every other candidate.
+    """Defer an item: `SelectTarget` selects the item only after every other candidate.
 
     The item stays open, so no item is lost. Deferred items are selected in the order of their deferral. The
     skill fails with `exhausted` if the item was deferred `times` times already. An item in the tool or in a
     bin keeps its state; the deferral has an effect if the item returns to the table.
     """
 
-    item: In[Item] = port(refers_to="item", doc="the item to put back")
+    item: In[Item] = port(refers_to="item", doc="the item to defer")
     times: int = param(1, ge=1, doc="maximum number of times that the mission defers one item")
     reasons = ("exhausted",)
 

@@ -31,7 +31,7 @@ class Detect(LookingSkill):
         camera = cell.camera
         if self.hidden == "fail" and not camera.sees_table():
             raise self.failure("hidden", f"the arm hides part of the workspace from camera {camera.name}")
-        look = yield from self.take_look(cell)
+        look = yield from self.capture_and_detect(cell)
         on_table = (entry for entry in look.doubtful if not is_detection_in_bin(cell, entry, look.frame))
         if not look.confident and self.doubtful == "fail" and (best := next(on_table, None)):
             raise self.failure("unsure", look.describe_doubt(best))

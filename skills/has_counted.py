@@ -9,7 +9,8 @@ from executive.skill import In, Skill, param, port
 class HasCounted(Skill):
     """Check that at least a number of items are placed or rejected.
 
-    `of_class` restricts the count to one class, `inside` to one bin. No rejected item is in a bin.
+    `of_class` restricts the count to one class, `inside` to one bin. With `inside`, the count of rejected
+    items is always 0.
     """
 
     of_class: In[str | None] = port(default=None, refers_to="class", doc="only items of this class")

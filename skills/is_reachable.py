@@ -11,7 +11,7 @@ from executive.skill import In, Skill, port
 class IsReachable(Skill):
     """Succeed if a joint configuration within the limits reaches the target.
 
-    The condition ignores obstacles, so that `Approach` may still be blocked.
+    The condition ignores obstacles, so `Approach` may still fail with `blocked`.
     """
 
     target: In[Target] = port(doc="the target to reach")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from contextlib import suppress
 
 from executive.cell.ledger import Presence
 from executive.cell.objects import Item
@@ -15,7 +16,7 @@ from executive.skill import In, param, port
 class LookAt(LookingSkill):
     """Verify with the camera that an item, or each item in a bin, is where the ledger believes it to be.
 
-    The skill does not move the arm: move to a pose from which the camera sees the place first. The skill
+    The skill does not move the arm; first move to a pose from which the camera sees the place. The skill
     succeeds if an image shows every item at its place. It fails with `gone` if enough images show the place
     without the item; the position of the item is then unknown, and the item may be sorted again if a later
     look finds an object of its class on the table. The skill fails with `hidden` if the item is in the tool,
@@ -34,9 +35,8 @@ class LookAt(LookingSkill):
         """Take looks until all answers are certain, or until a place is not in view."""
         known_items = cell.ledger.list_known_items()
         items = [self.item] if self.item else [known.item for known in known_items if known.bin == self.bin]
-        unsure_items: list[Item] = []
         for _ in range(self.looks):
-            answers = yield from self._look(cell, items)
+            answers = yield from self._observe_and_verify(cell, items)
             found = {answer: [item for item in items if answers[item] is answer] for answer in Presence}
             if gone_items := ", ".join(found[Presence.GONE]):
                 raise self.failure("gone", f"not at its place any more: {gone_items}")
@@ -44,20 +44,20 @@ class LookAt(LookingSkill):
                 if (held := cell.ledger.find_held_item()) in found[Presence.HIDDEN]:
                     raise self.failure("hidden", f"{held} is in the tool")
                 raise self.failure("hidden", f"the camera does not see the place of {hidden_items}")
-            if not (unsure_items := found[Presence.UNSURE]):
+            if not found[Presence.UNSURE]:
                 return
         message = f"{self.looks} images are not enough to tell whether these items are at their places: "
-        raise self.failure("hidden", message + ", ".join(unsure_items))
+        raise self.failure("hidden", message + ", ".join(found[Presence.UNSURE]))
 
-    def _look(self, cell: Cell, items: list[Item]) -> Generator[None, None, dict[Item, Presence]]:
+    def _observe_and_verify(
+        self, cell: Cell, items: list[Item]
+    ) -> Generator[None, None, dict[Item, Presence]]:
         """Take a look, update the ledger, and return the answer for each item."""
-        look = yield from self.take_look(cell)
-        try:
-            # Objects may have moved since the capture while another branch of a `parallel` used the tool.
-            observations = cell.localizer.localize(look) if cell.ledger.is_current(look.frame) else None
-        except NoDepth:
-            observations = None
-        if observations is None:
-            return dict.fromkeys(items, Presence.UNSURE)
-        cell.ledger.observe(look, observations)
-        return {item: cell.ledger.verify(item, look, observations) for item in items}
+        look = yield from self.capture_and_detect(cell)
+        # Objects may have moved since the capture while another branch of a `parallel` used the tool.
+        if cell.ledger.is_current(look.frame):
+            with suppress(NoDepth):
+                observations = cell.localizer.localize(look)
+                cell.ledger.observe(look, observations)
+                return {item: cell.ledger.verify(item, look, observations) for item in items}
+        return dict.fromkeys(items, Presence.UNSURE)

@@ -17,14 +17,17 @@ NOT_OPEN = ("held", "placed", "rejected", "skipped")
 class SelectTarget(Skill):
     """Select the next target to pick, and its bin.
 
-    The skill selects only open items with a valid position and a class with a bin below its quota. Of the
-    bins of the class, it chooses the first one below its quota; without quotas, the one with the fewest
-    objects. Enough looks must agree on the class of an item, given the error rates of the detector. `nearest`
-    refers to the tool or, while the arm moves, to the destination of the arm; `surest` refers to the
-    confidence of the last detection; `least_tried` selects the item with the fewest failed attempts, and of
-    several the nearest. A deferred item comes after all others (see `Defer`). With `among`, the skill fails
-    with `no_candidate` as soon as none of these items is open or lost; with `same`, if the item is placed,
-    rejected, skipped or in the tool.
+    The skill selects only open items with a valid position, a certain class, and a class with a bin below its
+    quota. The class of an item is certain if the probability of a wrong class, given the error rates of the
+    detector, is at most the limit of the cell. Of the bins of the class, the skill chooses the first one
+    below its quota; without quotas, the one with the fewest objects. A deferred item comes after all others
+    (see `Defer`).
+
+    * `nearest` prefers the target nearest to the tool or, while the arm moves, to the destination of the arm.
+    * `surest` prefers the target with the highest confidence of the last detection.
+    * `least_tried` prefers the fewest failed attempts and, of several such targets, the nearest.
+    * With `among`, the skill fails with `no_candidate` as soon as none of these items is open or lost.
+    * With `same`, it fails with `no_candidate` if the item is placed, rejected, skipped or in the tool.
     """
 
     targets: In[list[Target]] = port(doc="the known targets")
@@ -47,20 +50,16 @@ class SelectTarget(Skill):
         pickable_targets = sort_pickable_targets(cell, self.targets)
         candidates = [target for target in pickable_targets if self._is_requested(cell, target.item)]
         if not candidates:
-            raise self._explain_missing_candidate(cell)
+            raise self._make_failure_without_candidate(cell)
         # The candidates are sorted by distance, and `min` returns the first of equal ones.
-        best = min(candidates, key=lambda target: self._rank(cell, target))
-        turn = cell.ledger.describe(best.item).turn
-        if turn and (names := self._list_uncertain(cell, turn)):
+        best = min(candidates, key=lambda target: self._make_sort_key(cell, target))
+        if names := self._format_uncertain_items(cell, cell.ledger.describe(best.item).turn):
             message = f"{best.item} is deferred, and not enough looks agree on {names} yet; look again"
             raise self.failure("doubtful", message)
-        self.target, self.item = best, best.item
-        bin = choose_bin(cell, best.item)
-        assert bin is not None, "every candidate has a free bin"
-        self.bin = bin
-        cell.report_selection(best, bin)
+        self.target, self.item, self.bin = best, best.item, choose_bin(cell, best.item)
+        cell.report_selection(best, self.bin)
 
-    def _rank(self, cell: Cell, target: Target) -> tuple[float | str, ...]:
+    def _make_sort_key(self, cell: Cell, target: Target) -> tuple[float | str, ...]:
         """Return the sort key of a candidate; the smallest key comes first."""
         known = cell.ledger.describe(target.item)
         if self.prefer == "surest":
@@ -70,13 +69,13 @@ class SelectTarget(Skill):
     def _is_permitted(self, cell: Cell, item: Item) -> bool:
         """Return True if the mission permits an item of any class, and a bin for the item is free."""
         is_excluded = item in (self.not_ or ()) or (self.among is not None and item not in self.among)
-        return not is_excluded and self.same in (None, item) and choose_bin(cell, item) is not None
+        return not is_excluded and self.same in (None, item) and choose_bin(cell, item) != ""
 
     def _is_requested(self, cell: Cell, item: Item) -> bool:
         return self.wanted in (None, cell.ledger.get_label(item)) and self._is_permitted(cell, item)
 
-    def _list_uncertain(self, cell: Cell, max_turn: float = math.inf) -> str:
-        """Return the requested items before `max_turn` on which not enough looks agree, with commas."""
+    def _format_uncertain_items(self, cell: Cell, max_turn: float = math.inf) -> str:
+        """Return the names of the requested items with an uncertain class and a turn below `max_turn`."""
         items = (item for item in cell.ledger.find_uncertain_items() if self._is_requested(cell, item))
         return ", ".join(item for item in items if cell.ledger.describe(item).turn < max_turn)
 
@@ -95,13 +94,13 @@ class SelectTarget(Skill):
             for known in ledger.list_known_items()
         )
 
-    def _explain_missing_candidate(self, cell: Cell) -> SkillFailed:
+    def _make_failure_without_candidate(self, cell: Cell) -> SkillFailed:
         """Return the failure with the reason why there is no candidate."""
         if self.same and (state := cell.ledger.describe(self.same).state) in NOT_OPEN:
             exemption = cell.ledger.explain_exemption(cell.ledger.get_label(self.same))
             cause = f": {exemption}" if state == "skipped" else ""
             return self.failure("no_candidate", f"{self.same} is {state}{cause}")
-        if names := self._list_uncertain(cell):
+        if names := self._format_uncertain_items(cell):
             return self.failure("doubtful", f"not enough looks agree on {names} yet; look again")
         name = self.same or self.wanted or "object to sort"
         if self._is_nothing_left(cell):

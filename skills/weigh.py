@@ -38,11 +38,10 @@ class Weigh(Skill):
             yield
         fail_if_dropped(self, cell, self.held, "during the weighing")
         self.weight = sum(loads) / len(loads)
-        ledger = cell.ledger
-        if contradiction := ledger.record_weight(self.held, self.weight, cell.tool.load_std):
+        if contradiction := cell.ledger.record_weight(self.held, self.weight, cell.tool.load_std):
             raise self.failure("contradicted", f"{self.held} is of no certain class: {contradiction}")
-        if (bin := choose_bin(cell, self.held)) is None:
-            label = ledger.get_label(self.held)
-            explanation = ledger.explain_exemption(label) or "no bin is free"
+        self.bin = choose_bin(cell, self.held)
+        if not self.bin:
+            label = cell.ledger.get_label(self.held)
+            explanation = cell.ledger.explain_exemption(label) or "no bin is free"
             raise self.failure("no_bin", f"{self.held} is a {label}: {explanation}")
-        self.bin = bin

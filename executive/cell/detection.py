@@ -80,16 +80,10 @@ class Detections(Answer):
     view: str
     area: Box
 
-    def compute_area_mask(self, points: Array, margin: float = 0.0) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the world points `(N, 3)` [m] in the searched region of the image.
-
-        `margin` is the minimum distance of a projected point from the border of the region [pixel].
-        """
-        return self.frame.compute_area_mask(points, self.area, margin)
-
     def compute_searched_mask(self, points: Array) -> NDArray[np.bool_]:
         """Return a mask `(N,)` of the world points `(N, 3)` [m] that are searched and unoccluded."""
-        return self.compute_area_mask(points) & self.frame.compute_unoccluded_mask(points)
+        in_area_mask = self.frame.compute_area_mask(points, self.area)
+        return in_area_mask & self.frame.compute_unoccluded_mask(points)
 
 
 @dataclass(frozen=True, eq=False)

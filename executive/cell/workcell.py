@@ -118,7 +118,7 @@ class CellOptions:
     gui: bool = False
     resume: ResumePoint | None = None
     scene: Path | None = None
-    quotas: Quotas = field(default_factory=lambda: Quotas({}))
+    quotas: Quotas = field(default_factory=dict)
 
 
 KeyPath = tuple[str | int, ...]

@@ -84,7 +84,7 @@ def find_moved_item(
     """
     if (
         new_item.state is not State.SEEN
-        or new_item.attempt_count
+        or new_item.failed_pick_count
         or new_item.belief.existence_probability < MIN_EXISTENCE_PROBABILITY
         or new_item.belief.class_error > config.max_class_error
     ):
@@ -110,7 +110,7 @@ def _may_be_same_object(
     """
     if old_item is new_item or old_item.detected_label != new_item.detected_label:
         return False
-    if old_item.state is State.DROPPED and old_item.is_missing:
+    if old_item.state is State.DROPPED and old_item.was_taken_away:
         return new_item.was_place_searched and new_item.first_stamp > old_item.stamp
     if old_item.state is State.DROPPED:
         return new_item.first_change_count > old_item.change_count
@@ -122,7 +122,9 @@ def _may_be_same_object(
         and old_item.belief.miss_probability <= config.max_miss_probability
     )
     is_pushed_phantom = (
-        old_item.state is State.PHANTOM and old_item.reason == REASON_NOT_FOUND and old_item.attempt_count > 0
+        old_item.state is State.PHANTOM
+        and old_item.reason == REASON_NOT_FOUND
+        and old_item.failed_pick_count > 0
     )
     is_missing = (
         (old_item.state in ON_TABLE or is_pushed_phantom)

@@ -19,11 +19,12 @@ from executive.cell.error_rates import ErrorRates
 VIEWPOINT_GRID_SPACING = 0.02
 """Spacing of the grid to which camera positions are rounded [m]; equal grid points are one viewpoint."""
 ITEM_AREA_FRACTION = 0.02
-"""Fraction of an image that an item covers: probability that a false detection is assigned to the item."""
+"""Image fraction covered by an item, used as the probability that a false detection is assigned to it."""
 MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM = math.log(0.1)
 """Maximum log odds of existence of a new item that may be a known item at a wrongly measured position."""
-MIN_LOG_ODDS_OF_PROOF = math.log(1e4)
-"""Minimum log odds of existence of a proved item (`Belief.is_proved`); two equal detections may suffice."""
+CONFIRMATION_LOG_ODDS = math.log(1e4)
+"""Minimum log odds of existence of a confirmed item (`Belief.is_confirmed`); two detections of the same class
+may reach the minimum."""
 
 
 def make_viewpoint_key(look: Detections) -> str:
@@ -32,14 +33,14 @@ def make_viewpoint_key(look: Detections) -> str:
     return f"{look.detector} {x} {y} {z}"
 
 
-def compute_repeat_probability(independent_probability: float, copy_probability: float) -> float:
+def compute_repeat_probability(independent_probability: float, error_correlation: float) -> float:
     """Return the probability that a detector repeats its answer to an earlier look from the same viewpoint.
 
     Args:
         independent_probability: Probability of the answer (a class, or no detection) in an independent look.
-        copy_probability: Probability that the detector copies its earlier answer.
+        error_correlation: Probability that the detector repeats its earlier answer.
     """
-    return copy_probability + (1.0 - copy_probability) * independent_probability
+    return error_correlation + (1.0 - error_correlation) * independent_probability
 
 
 @dataclass
@@ -49,25 +50,25 @@ class Belief:
     Attributes:
         first_label: Class in the first detection.
         log_odds: Posterior log odds that the item exists.
-        is_proved: True if the item certainly exists, by the log odds or by a touch of the tool.
+        is_confirmed: True if the item certainly exists, by the log odds or by a touch of the tool.
         miss_probability: Probability that all looks since the last detection missed the item by chance.
-        uncertain_look_count: Number of looks with a doubtful detection since the last confident look.
+        low_confidence_count: Number of looks with a doubtful detection since the last confident look.
         last_label_by_viewpoint: Last detected class by viewpoint key, "" after a miss during a verification;
             cleared if the item may have moved.
         repeat_count: Number of looks that repeated the class of an earlier look from the same viewpoint.
         log_likelihoods: Log likelihood of each detected class, relative to a class that was never detected.
         label_counts: Number of looks by detected class.
         max_confusion_rate: Largest confusion rate of the detectors that detected the item, 0 to 1.
-        detected_labels: After a weighing: for each class of the cell, the class that it looks like. Before,
-            empty: every class stands for all classes that look like it.
+        detected_labels: Detected class by class of the cell; empty until the item is weighed. Until then,
+            each key of `log_likelihoods` represents all classes with the same appearance.
         weight_log_ratios: Log likelihood ratio of the last weighing by class, part of `log_likelihoods`.
     """
 
     first_label: str
     log_odds: float
-    is_proved: bool = False
+    is_confirmed: bool = False
     miss_probability: float = 1.0
-    uncertain_look_count: int = 0
+    low_confidence_count: int = 0
     last_label_by_viewpoint: dict[str, str] = field(default_factory=dict)
     repeat_count: int = 0
     log_likelihoods: dict[str, float] = field(default_factory=lambda: defaultdict(float))
@@ -107,7 +108,7 @@ class Belief:
         return odds_of_other_class / (1.0 + odds_of_other_class)
 
     @property
-    def p_value(self) -> float:
+    def confusion_p_value(self) -> float:
         """p-value of a binomial test of the number of looks with another class than `label`, 0 to 1.
 
         A small value shows that the detector confuses classes more often than its error rates state.
@@ -119,7 +120,7 @@ class Belief:
     @property
     def existence_probability(self) -> float:
         """Probability that the item exists, 0 to 1."""
-        return 1.0 if self.is_proved else float(expit(self.log_odds))
+        return 1.0 if self.is_confirmed else float(expit(self.log_odds))
 
     @property
     def is_probable(self) -> bool:
@@ -129,12 +130,14 @@ class Belief:
     @property
     def probability_at_last_detection(self) -> float:
         """Probability that the item exists, 0 to 1, without the evidence since the last detection."""
-        return 1.0 if self.is_proved else float(expit(self.log_odds - math.log(self.miss_probability)))
+        return 1.0 if self.is_confirmed else float(expit(self.log_odds - math.log(self.miss_probability)))
 
     def add_detection(
         self, label: str, rates: ErrorRates, viewpoint: str = "", *, is_ambiguous: bool = False
     ) -> None:
-        """Update class and existence with a detection, which is weak evidence if it repeats an earlier class.
+        """Update class and existence with a detection.
+
+        A class that was detected before from the same viewpoint is weaker evidence.
 
         Args:
             label: Detected class.
@@ -142,22 +145,22 @@ class Belief:
             viewpoint: Key of detector and camera position (`make_viewpoint_key`).
             is_ambiguous: True if the detection may show another item, and is no evidence of existence.
         """
-        copy_probability = rates.repeated if self.last_label_by_viewpoint.get(viewpoint) == label else 0.0
-        self.repeat_count += copy_probability > 0.0
+        error_correlation = rates.repeated if self.last_label_by_viewpoint.get(viewpoint) == label else 0.0
+        self.repeat_count += error_correlation > 0.0
         self.last_label_by_viewpoint[viewpoint] = label
         confusion_rate = rates.confusion_rate
-        class_evidence = _compute_log_ratio(1.0 - confusion_rate, confusion_rate, copy_probability)
+        class_evidence = _compute_log_ratio(1.0 - confusion_rate, confusion_rate, error_correlation)
         self._add_class_evidence(label, class_evidence)
         self.max_confusion_rate = max(self.max_confusion_rate, confusion_rate)
         if is_ambiguous and not self.look_count:
             self.log_odds = min(self.log_odds, MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM)
         # The prior odds of a new item contain the evidence of its first confident detection.
-        elif not is_ambiguous and (self.look_count or self.uncertain_look_count):
+        elif not is_ambiguous and (self.look_count or self.low_confidence_count):
             false_positive_rate = min(rates.false_detections * ITEM_AREA_FRACTION, 1.0)
-            self.log_odds += _compute_log_ratio(1.0 - rates.miss_rate, false_positive_rate, copy_probability)
+            self.log_odds += _compute_log_ratio(1.0 - rates.miss_rate, false_positive_rate, error_correlation)
         self.label_counts[label] += 1
-        self.uncertain_look_count = 0
-        self.is_proved = self.is_proved or self.log_odds >= MIN_LOG_ODDS_OF_PROOF
+        self.low_confidence_count = 0
+        self.is_confirmed = self.is_confirmed or self.log_odds >= CONFIRMATION_LOG_ODDS
 
     def add_miss(self, rates: ErrorRates, viewpoint: str | None = None) -> None:
         """Update the existence with a look that shows the item's position, but does not detect the item.
@@ -171,15 +174,14 @@ class Belief:
         self.miss_probability *= miss_rate
         self.log_odds += math.log(miss_rate)
 
-    def add_weight(self, log_ratios: Mapping[str, float], detected_labels: Mapping[str, str]) -> None:
+    def add_weighing(self, log_ratios: Mapping[str, float], detected_labels: Mapping[str, str]) -> None:
         """Update the class with a weighing, which distinguishes classes that look alike.
 
-        A weighing replaces the last one, because a weight off by a constant error is off in both.
+        A weighing replaces the previous one, because both share the same systematic error.
 
         Args:
-            log_ratios: For each class of the cell, log likelihood of the measured weight, relative to an
-                object of another class.
-            detected_labels: For each class of the cell, the class that it looks like; by default, itself.
+            log_ratios: Log likelihood ratio of the measured weight, by class: this class against another one.
+            detected_labels: Detected class by class of the cell; a class without a look-alike maps to itself.
         """
         if not self.detected_labels:
             old, pairs = self.log_likelihoods, detected_labels.items()
@@ -203,10 +205,10 @@ class Belief:
             self.log_likelihoods[label] += log_ratio
 
 
-def _compute_log_ratio(probability: float, alternative: float, copy_probability: float) -> float:
-    """Return the log likelihood ratio of an answer, which may be a copy of an earlier answer.
+def _compute_log_ratio(probability: float, alternative: float, error_correlation: float) -> float:
+    """Return the log likelihood ratio of an answer, which may repeat the error of an earlier answer.
 
     `probability` and `alternative` are the probabilities of an independent answer under both hypotheses.
     """
-    numerator = compute_repeat_probability(probability, copy_probability)
-    return math.log(numerator / compute_repeat_probability(alternative, copy_probability))
+    numerator = compute_repeat_probability(probability, error_correlation)
+    return math.log(numerator / compute_repeat_probability(alternative, error_correlation))

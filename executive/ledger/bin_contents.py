@@ -14,7 +14,7 @@ from executive.cell.config import LedgerConfig
 from executive.cell.detection import Detections, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.cell.protocols import Routes
-from executive.cell.quotas import Quotas
+from executive.cell.quotas import Quotas, is_quota_reached
 from executive.geometry import Array
 from executive.ledger.association import MAX_STANDARD_DEVIATIONS
 from executive.ledger.item import ItemRecord, State
@@ -29,7 +29,7 @@ BIN_AREA_FRACTION = 0.04
 FLOOR_POINTS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)])
 """Points of a bin's floor that must be visible, in units of half its length and half its width `(5, 3)`."""
 
-BinNames = Mapping[Observation, str | None]
+BinNameByObservation = Mapping[Observation, str | None]
 """Name of the bin in which each observed object lies, or None."""
 
 
@@ -62,7 +62,7 @@ class BinContents:
     def explain_exemption(self, label: str) -> str:
         """Return the reason why the mission does not sort objects of a class, or ""."""
         bin_names = self.routes.get(label, ())
-        if not all(self.quotas.is_reached(name, label, self.count_objects_in) for name in bin_names):
+        if not all(is_quota_reached(self.quotas, name, label, self.count_objects_in) for name in bin_names):
             return ""
         if not bin_names:
             return "the mission has no route for it"
@@ -105,10 +105,10 @@ class BinContents:
             if landing is not None and self.bins[bin_name].contains(landing, -WALL_MARGIN):
                 record.bin_log_odds[bin_name] = LOG_ODDS_FELL_IN_BIN
 
-    def place_dropped_items(self, look: Detections, bin_names: BinNames) -> list[ItemRecord]:
-        """Set dropped items that almost certainly lie in a permitted bin to PLACED; return these items.
+    def mark_dropped_items_as_placed(self, detections: Detections, bin_names: BinNameByObservation) -> None:
+        """Set dropped items that almost certainly lie in a permitted bin to PLACED.
 
-        If a look at the whole image shows more objects of a class in a bin than known items, one of the
+        If the detections in a full image contain more objects of a class in a bin than the ledger, one of the
         objects may be a dropped item.
         """
         # The centre of an object that leans on a wall from the inside may lie over the wall.
@@ -117,26 +117,23 @@ class BinContents:
             for observed, name in bin_names.items()
             if observed.is_confident and name and self.bins[name].contains(observed.position, BIN_THICKNESS)
         )
-        placed_records = []
         for record in self.records.filter_by_state(State.DROPPED):
             for bin_name in self.routes.get(record.label, ()):
                 key = (record.detected_label, bin_name)
                 known_count = sum((item.detected_label, item.bin) == key for item in self.records)
                 is_visible = visible_counts[key] > known_count
-                if is_visible or self.is_floor_visible(bin_name, look):
-                    update_bin_log_odds(record, bin_name, look.error_rates, is_visible=is_visible)
+                if is_visible or self.is_floor_visible(bin_name, detections):
+                    update_bin_log_odds(record, bin_name, detections.error_rates, is_visible=is_visible)
                 if record.bin_log_odds[bin_name] >= -math.log(self.config.max_miss_probability):
-                    record.bin, record.stamp, record.is_missing = bin_name, look.frame.stamp, False
-                    record.set_state(State.PLACED, "")
-                    placed_records.append(record)
+                    record.reason, record.stamp = "", detections.frame.stamp
+                    self.records.set_placed(record, bin_name)
                     break
-        return placed_records
 
-    def is_floor_visible(self, bin_name: str, look: Detections) -> bool:
-        """Return True if a look shows the whole floor of a bin without occlusion by the arm."""
+    def is_floor_visible(self, bin_name: str, detections: Detections) -> bool:
+        """Return True if an image shows the whole floor of a bin without occlusion by the arm."""
         bin = self.bins[bin_name]
         half_size = np.append(bin.size[:2] / 2 - WALL_MARGIN, 0.0)
-        return bool(look.compute_searched_mask(bin.position + half_size * FLOOR_POINTS).all())
+        return bool(detections.compute_searched_mask(bin.position + half_size * FLOOR_POINTS).all())
 
 
 def find_probable_bin(record: ItemRecord) -> str | None:

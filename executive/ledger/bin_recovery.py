@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from statistics import median_low
 
 from executive.cell.detection import Detections
-from executive.ledger.belief import MIN_LOG_ODDS_OF_PROOF, Belief
-from executive.ledger.bin_contents import BinContents, BinNames
+from executive.ledger.belief import CONFIRMATION_LOG_ODDS, Belief
+from executive.ledger.bin_contents import BinContents, BinNameByObservation
 from executive.ledger.item import ItemRecord, State
 
 
@@ -27,7 +27,7 @@ class BinRecovery:
         self._object_counts: dict[str, list[Counter[str]]] = defaultdict(list)
         """For each bin name: one counter per look, with the number of detected objects of each class."""
 
-    def add_look(self, look: Detections, bin_names: BinNames) -> None:
+    def add_look(self, look: Detections, bin_names: BinNameByObservation) -> None:
         """Count the confident detections in each bin (`bin_names`) whose floor the look shows completely."""
         for name in self._bins.bins:
             if self._bins.is_floor_visible(name, look):
@@ -43,17 +43,16 @@ class BinRecovery:
         """
         found_items: list[ItemRecord] = []
         for label, bin_name in self._find_unknown_objects():
-            dropped_items = [
-                item for item in self._records.filter_by_state(State.DROPPED) if item.is_untracked
-            ]
-            same_class = (
-                item for item in dropped_items if item.detected_label == label and item not in found_items
+            candidates = (
+                item
+                for item in self._records.filter_by_state(State.DROPPED)
+                if item.is_untracked and item.detected_label == label and item not in found_items
             )
-            record = next(same_class, None)
+            record = next(candidates, None)
             if record is None:
-                belief = Belief(label, MIN_LOG_ODDS_OF_PROOF, is_proved=True)
+                belief = Belief(label, CONFIRMATION_LOG_ODDS, is_confirmed=True)
                 position = self._bins.bins[bin_name].position
-                record = self._records.add(belief, position, change_count, 0.0, has_appeared=True)
+                record = self._records.add(belief, position, change_count, 0.0, was_place_empty=True)
             found_items.append(record)
             if bin_name in self._bins.routes.get(record.label, ()):
                 record.reason = "found in the bin when the run was resumed"

@@ -14,7 +14,7 @@ from executive.ledger.association import MIN_EXISTENCE_PROBABILITY
 from executive.ledger.item import REASON_UNCERTAIN, ItemRecord, State
 
 MIN_P_VALUE = 0.01
-"""Minimum p-value of the class-consistency test (`Belief.p_value`) of an item that is sorted."""
+"""Minimum p-value of the class-consistency test (`Belief.confusion_p_value`) of an item that is sorted."""
 MAX_P_VALUE_TO_REJECT = 0.001
 """Upper limit of the p-value of an item that is rejected because the looks disagree about its class."""
 RETRY_STANDARD_ERROR_FACTOR = 2 / 3
@@ -55,13 +55,13 @@ class Certainty:
         is_saturated = belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
         if is_saturated and record.label in self.labels_with_unique_height:
             max_class_error = MAX_CLASS_ERROR_FOR_TOUCH
-        error_factor = RETRY_STANDARD_ERROR_FACTOR if record.attempt_count else 1.0
+        error_factor = RETRY_STANDARD_ERROR_FACTOR if record.failed_pick_count else 1.0
         return (
             belief.existence_probability >= MIN_EXISTENCE_PROBABILITY
             and record.contradiction_count <= belief.look_count
             and belief.miss_probability >= MIN_MISS_PROBABILITY_OF_PICK
             and belief.class_error <= max_class_error
-            and belief.p_value >= MIN_P_VALUE
+            and belief.confusion_p_value >= MIN_P_VALUE
             and math.hypot(record.standard_error, record.bias_std)
             <= error_factor * self.config.max_position_std
         )
@@ -83,10 +83,10 @@ class Certainty:
         belief = record.belief
         is_certain = is_unmoved and self.is_certain(record)
         if is_certain:
-            belief.uncertain_look_count = 0
+            belief.low_confidence_count = 0
         if record.state is not State.SEEN:
             return
-        if belief.look_count >= MIN_LOOKS_TO_REJECT and belief.p_value < MAX_P_VALUE_TO_REJECT:
+        if belief.look_count >= MIN_LOOKS_TO_REJECT and belief.confusion_p_value < MAX_P_VALUE_TO_REJECT:
             counts = ", ".join(f"{count} {label}" for label, count in belief.label_counts.most_common())
             record.set_state(State.REJECTED, f"looks disagree about its class: {counts}")
         elif self._needs_other_viewpoint(record):
@@ -96,7 +96,7 @@ class Certainty:
                 f"that it is no {record.label}; at most {self.config.max_class_error:.1%} is allowed",
             )
         elif not is_certain and (
-            belief.uncertain_look_count >= MIN_UNCERTAIN_LOOKS_TO_REJECT
+            belief.low_confidence_count >= MIN_UNCERTAIN_LOOKS_TO_REJECT
             or record.contradiction_count >= max(MIN_CONTRADICTIONS_TO_REJECT, belief.look_count + 1)
         ):
             details = f": {record.last_contradiction}" if record.last_contradiction else ""

@@ -93,7 +93,8 @@ class Coverage:
         if look.view == "full":
             self._full_look_count += 1
             # Points at the border of the image do not count as visible, because no later look may show them.
-            shown_mask = visible_mask & look.compute_area_mask(self._points, BORDER_WIDTH)
+            in_area_mask = look.frame.compute_area_mask(self._points, look.area, BORDER_WIDTH)
+            shown_mask = visible_mask & in_area_mask
             self._last_full_look_numbers[shown_mask] = self._full_look_count
 
     def reset_near(self, centre: Array, radius: float, change_number: int) -> None:

@@ -33,8 +33,8 @@ class State(Enum):
     HELD = "held"
     """The tool holds the item."""
     DROPPED = "dropped"
-    """The tool lost the item, or looks showed that the item left its place, and no look has detected the item
-    since. The next detection on the table sets the state to SEEN, or to REJECTED if the item has a reason."""
+    """The position is unknown: the tool lost the item, or images showed its place empty. The next detection
+    on the table sets the state to SEEN; if the item was rejected before (`reason` is set), to REJECTED."""
     PLACED = "placed"
     """The item was released in a bin."""
     REJECTED = "rejected"
@@ -48,7 +48,7 @@ class State(Enum):
 
 
 ON_TABLE = (State.SEEN, State.REJECTED)
-"""States of an item that lies on the table at the position of its last detection."""
+"""States, during the run, of an item on the table at the position of its last detection."""
 
 
 @dataclass(eq=False)
@@ -64,31 +64,33 @@ class ItemRecord:
         first_position: Position before the first possible move of the item `(3,)` [m].
         first_change_count: Number of changes of the table before the first detection.
         first_stamp: Capture time of the first detection [s].
-        has_appeared: True if the position of the first detection was empty in earlier looks.
-        was_place_searched: True if a look had searched the position before the first detection.
+        was_place_empty: True if earlier looks showed the position of the first detection empty.
+        was_place_searched: True if an earlier look searched the position of the first detection.
         position: Mean of the positions measured since the last possible move of the item `(3,)` [m].
         standard_error: Standard error of `position` along each axis [m].
         bias_std: Standard deviation of the systematic error of `position` along each axis [m].
-        was_moved: True if the item was detected after a possible move.
+        was_detected_after_move: True if the item was detected after a possible move.
         change_count: Number of changes of the table before the last detection.
         frame_id: Number of the frame of the last detection.
-        stamp: Capture time of the last detection or, after a placement, of the last look before it [s].
+        stamp: Capture time of the last image that showed the item, or of the last image before its placement
+            [s].
         confidence: Confidence of the last detection, 0 to 1.
         state: State of the item.
         bin: Name of the bin that contains the item, or "".
         reason: Reason of the state, or "".
-        attempt_count: Number of failed attempts to pick the item.
+        failed_pick_count: Number of failed attempts to pick the item.
         empty_probe_count: Number of descents that found only the table, since the item was moved or touched.
         had_contact: True if the tool has touched the item at any height.
         touched_label: Class whose height the last touch confirmed, or "".
         low_touch_count: Number of touches below the height of the class, since the last confirmed height.
-        contradiction_count: Number of looks against the class since the last possible move of the item.
+        contradiction_count: Number of images that contradict the class since the last possible move.
         last_contradiction: Sentence with the last evidence of size or height against the class, or "".
         bin_log_odds: Log odds, by bin, that the dropped item lies in the bin.
-        is_untracked: True if the tool may have moved the item while the journal was incomplete.
+        is_untracked: True if the run was interrupted before the journal recorded whether the tool moved the
+            item.
         deferral_count: Number of times that the item was deferred.
         turn: Rank among the deferred items; 0 if the item is not deferred.
-        is_missing: True for a dropped item that someone, and not the tool, took from its place.
+        was_taken_away: True for a dropped item that someone, and not the tool, took from its place.
         slot: Index of the slot of the bin over which the item was released, or None.
     """
 
@@ -97,12 +99,12 @@ class ItemRecord:
     first_position: Array
     first_change_count: int
     first_stamp: float
-    has_appeared: bool
+    was_place_empty: bool
     was_place_searched: bool = False
     position: Array = field(init=False)
     standard_error: float = math.inf
     bias_std: float = 0.0
-    was_moved: bool = False
+    was_detected_after_move: bool = False
     change_count: int = 0
     frame_id: int = 0
     stamp: float = 0.0
@@ -110,7 +112,7 @@ class ItemRecord:
     state: State = State.SEEN
     bin: str = ""
     reason: str = ""
-    attempt_count: int = 0
+    failed_pick_count: int = 0
     empty_probe_count: int = 0
     had_contact: bool = False
     touched_label: str = ""
@@ -121,7 +123,7 @@ class ItemRecord:
     is_untracked: bool = False
     deferral_count: int = 0
     turn: int = 0
-    is_missing: bool = False
+    was_taken_away: bool = False
     slot: int | None = None
 
     def __post_init__(self) -> None:
@@ -150,10 +152,10 @@ class ItemRecord:
         """Event with the current state of the item, and with the position rounded to 0.1 mm."""
         return ItemChanged(
             self.item, self.label, self.state.value, round_values(self.position, 4),
-            self.belief.look_count, self.attempt_count, self.bin, self.reason,
+            self.belief.look_count, self.failed_pick_count, self.bin, self.reason,
         )  # fmt: skip
 
-    def describe(self, *, is_exempt: bool) -> KnownItem:
+    def make_known_item(self, *, is_exempt: bool) -> KnownItem:
         """Return the item for skills; `is_exempt` is True if the mission does not sort the class any more."""
         state = self.state.value
         if self.state is State.DROPPED:
@@ -161,8 +163,8 @@ class ItemRecord:
         elif self.state is State.SEEN:
             state = State.SKIPPED.value if is_exempt else "deferred" if self.turn else "open"
         return KnownItem(
-            self.item, self.label, state, self.bin, self.position, self.attempt_count, self.deferral_count,
-            self.turn,
+            self.item, self.label, state, self.bin, self.position, self.failed_pick_count,
+            self.deferral_count, self.turn,
         )  # fmt: skip
 
     def distance_to(self, position: Array) -> float:
@@ -173,11 +175,11 @@ class ItemRecord:
         """Set the state and its reason."""
         self.state, self.reason = state, reason
 
-    def mark_as_missing(self, change_count: int) -> None:
+    def mark_as_taken_away(self, change_count: int) -> None:
         """Set the item to DROPPED, because looks showed that it left its place on the table or in a bin."""
         if self.state is State.PLACED:
             self.bin, self.reason, self.slot = "", "", None
-        self.state, self.is_missing, self.change_count = State.DROPPED, True, change_count
+        self.state, self.was_taken_away, self.change_count = State.DROPPED, True, change_count
         self.bin_log_odds.clear()
         self.belief.miss_probability = 1.0
         self.forget_viewpoints()
@@ -203,9 +205,9 @@ class ItemRecord:
             self.position = np.asarray((self.position * old_weight + position * new_weight) / weight)
             self.standard_error = weight**-0.5
         else:
-            self.was_moved = math.isfinite(self.standard_error)
+            self.was_detected_after_move = math.isfinite(self.standard_error)
             self.position, self.standard_error = position, std
-        if not self.was_moved:
+        if not self.was_detected_after_move:
             self.first_position = self.position
         self.belief.miss_probability = 1.0
 
@@ -222,9 +224,10 @@ class ItemRecord:
     def merge(self, new_item: ItemRecord) -> None:
         """Add the evidence and the position of `new_item`, which is the same object after a move."""
         self.belief.merge(new_item.belief)
-        self.empty_probe_count, self.is_missing = 0, False
+        self.empty_probe_count, self.was_taken_away = 0, False
         # `first_position` stays the position before the move.
-        self.position, self.standard_error, self.was_moved = new_item.position, new_item.standard_error, True
+        self.position, self.standard_error = new_item.position, new_item.standard_error
+        self.was_detected_after_move = True
         self.change_count, self.frame_id = new_item.change_count, new_item.frame_id
         self.stamp, self.confidence = new_item.stamp, new_item.confidence
         if self.state is State.PHANTOM:

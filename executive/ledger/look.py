@@ -97,7 +97,7 @@ class LookUpdate:
             # Prior odds: expected number of missed objects divided by expected number of false detections.
             prior_odds = self._compute_expected_count(observation) / rates.false_detections
             record = matches.get(observation) or self._add_item(observation, prior_odds)
-            if record.reason.startswith(REASON_UNCERTAIN) and not record.attempt_count:
+            if record.reason.startswith(REASON_UNCERTAIN) and not record.failed_pick_count:
                 record.set_state(State.SEEN, "")
             is_unmoved = staleness.is_unmoved(record)
             if not is_unmoved:
@@ -133,7 +133,7 @@ class LookUpdate:
                 record = self._add_item(observation, prior_odds)
                 record.store(observation, self.look.frame, 0.0, is_unmoved=True)
             if record not in updated_items:
-                record.belief.uncertain_look_count += 1
+                record.belief.low_confidence_count += 1
                 # A contradiction of the detected class is no evidence about an item of another class.
                 if observation.contradiction and observation.detection.label == record.detected_label:
                     record.contradiction_count += 1
@@ -183,15 +183,15 @@ class LookUpdate:
 
     def _make_certainty_key(self, record: ItemRecord) -> tuple[bool, bool, int]:
         """Return a key that sorts items from uncertain to certain."""
-        return record.belief.is_proved, self.staleness.is_unmoved(record), record.belief.look_count
+        return record.belief.is_confirmed, self.staleness.is_unmoved(record), record.belief.look_count
 
     def _add_item(self, observation: Observation, prior_odds: float) -> ItemRecord:
         """Add a new item; `prior_odds` are the prior odds that the item exists."""
         belief, frame = Belief(observation.detection.label, math.log(prior_odds)), self.look.frame
         position = observation.position
-        has_appeared = self.coverage.find_miss_probability(position) <= self.config.max_miss_probability
+        was_place_empty = self.coverage.find_miss_probability(position) <= self.config.max_miss_probability
         record = self.records.add(
-            belief, position, frame.change_count, frame.stamp, has_appeared=has_appeared
+            belief, position, frame.change_count, frame.stamp, was_place_empty=was_place_empty
         )
         record.was_place_searched = self.coverage.was_searched(position)
         return record

@@ -63,7 +63,7 @@ def find_final_state(
         return None
     if exemption:
         return State.SKIPPED, exemption
-    had_problem = record.attempt_count or record.last_contradiction
+    had_problem = record.failed_pick_count or record.last_contradiction
     if is_completed and certainty.is_certain(record) and not had_problem:
         return State.SKIPPED, "the mission was completed without it"
     return State.REJECTED, "the run ended before its turn"
@@ -77,18 +77,17 @@ def discard_moved_items(records: Collection[ItemRecord], dropped: Collection[Ite
     left its place. The new item must be proved to exist, and replaces only one lost item.
     Lost items in `dropped` do not count, because the tool held them after their last detection.
     """
-    new_items = [record for record in records if record.belief.is_proved and record.state in FINAL_STATES]
+    new_items = [record for record in records if record.belief.is_confirmed and record.state in FINAL_STATES]
     phantoms = []
     for lost_item in (record for record in records if record.state is State.LOST and record not in dropped):
-        later_items = (
+        candidates = (
             item
             for item in new_items
-            if item.first_stamp > lost_item.stamp
-            and (item.has_appeared or (lost_item.is_missing and item.was_place_searched))
+            if item.detected_label == lost_item.detected_label
+            and item.first_stamp > lost_item.stamp
+            and (item.was_place_empty or (lost_item.was_taken_away and item.was_place_searched))
         )
-        if new_item := next(
-            (item for item in later_items if item.detected_label == lost_item.detected_label), None
-        ):
+        if new_item := next(candidates, None):
             lost_item.set_state(State.PHANTOM, f"it is {new_item.item}")
             new_items.remove(new_item)
             phantoms.append(lost_item)

@@ -138,7 +138,7 @@ class LedgerQueries:
     def describe(self, item: Item) -> KnownItem:
         """Return the present knowledge about an item."""
         record = self._records.find(item)
-        return record.describe(is_exempt=bool(self._explain_exemption(record)))
+        return record.make_known_item(is_exempt=bool(self._explain_exemption(record)))
 
     def list_known_items(self) -> Sequence[KnownItem]:
         """Return all items that exist with a probability of at least 0.5, in the order of detection."""

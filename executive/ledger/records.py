@@ -45,7 +45,7 @@ class ItemRecords:
         return [record for record in self if record.state in states]
 
     def add(
-        self, belief: Belief, position: Array, change_count: int, stamp: float, *, has_appeared: bool
+        self, belief: Belief, position: Array, change_count: int, stamp: float, *, was_place_empty: bool
     ) -> ItemRecord:
         """Add an item with the name `<class>-<number>` and return its record.
 
@@ -54,7 +54,7 @@ class ItemRecords:
         label = belief.first_label
         self._name_counts[label] += 1
         name = f"{label}-{self._name_counts[label]}"
-        self._records[name] = ItemRecord(name, belief, position, change_count, stamp, has_appeared)
+        self._records[name] = ItemRecord(name, belief, position, change_count, stamp, was_place_empty)
         return self._records[name]
 
     def remove(self, record: ItemRecord) -> None:
@@ -73,7 +73,7 @@ class ItemRecords:
 
     def set_placed(self, record: ItemRecord, bin_name: str) -> None:
         """Set the state of an item to PLACED in a bin, and emit the item."""
-        record.bin, record.is_missing = bin_name, False
+        record.bin, record.was_taken_away = bin_name, False
         self.change_state(record, State.PLACED)
 
     def reject(self, record: ItemRecord, reason: str) -> None:

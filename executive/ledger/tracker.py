@@ -67,7 +67,7 @@ class Tracker(LedgerQueries):
         record = self._records.find(item)
         presence = verify(record, detections, observations, self._bin_contents)
         if presence is Presence.GONE and record.state in (State.PLACED, *ON_TABLE):
-            record.mark_as_missing(self.change_count)
+            record.mark_as_taken_away(self.change_count)
             self._records.emit(record)
         return presence
 
@@ -78,7 +78,7 @@ class Tracker(LedgerQueries):
         contradiction: the item may have fallen. `may_miss_top`: the cup may have touched below the top.
         """
         record = self._records.find(item)
-        record.belief.is_proved, record.had_contact, record.empty_probe_count = True, True, 0
+        record.belief.is_confirmed, record.had_contact, record.empty_probe_count = True, True, 0
         if not contradiction:
             record.touched_label, record.low_touch_count = record.label, 0
         elif record.touched_label != record.label:
@@ -94,7 +94,7 @@ class Tracker(LedgerQueries):
         """Update the class of an item by its weight, and return "" or a contradiction."""
         record, classes = self._records.find(item), self.classes
         log_ratios = compute_weight_log_ratios(weight, std, classes)
-        record.belief.add_weight(
+        record.belief.add_weighing(
             log_ratios, {label: other.detected_label for label, other in classes.items()}
         )
         contradiction = ""
@@ -109,7 +109,7 @@ class Tracker(LedgerQueries):
         `found_table` is True if the descent to the item touched nothing above the table.
         """
         record = self._records.find(item)
-        record.attempt_count += 1
+        record.failed_pick_count += 1
         record.empty_probe_count += found_table
         self.invalidate_positions()
         self._records.emit(record)
@@ -127,16 +127,16 @@ class Tracker(LedgerQueries):
             )
         record = self._records.find(item)
         self._records.change_state(record, State.HELD)
-        record.belief.is_proved, record.is_missing = True, False
+        record.belief.is_confirmed, record.was_taken_away = True, False
         self._invalidate_near(record.position, self.config.neighbourhood)
 
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
         """Record that the tool lost an item; `landing` is the predicted landing position `(3,)` [m]."""
         record = self._records.find(item)
-        record.is_untracked = record.is_missing = False
+        record.is_untracked = record.was_taken_away = False
         self._records.change_state(record, State.DROPPED)
         self._bin_contents.set_prior_log_odds(record, landing)
-        record.attempt_count += 1
+        record.failed_pick_count += 1
         record.change_count = self.change_count
         self.invalidate_positions()
 
@@ -196,7 +196,7 @@ class Tracker(LedgerQueries):
         """Set the final state of each item; `completed` is True if the behaviour tree succeeded."""
         has_touched_item = any(record.touched_label for record in self.records)
         dropped_items = [
-            record for record in self._records.filter_by_state(State.DROPPED) if not record.is_missing
+            record for record in self._records.filter_by_state(State.DROPPED) if not record.was_taken_away
         ]
         for record in self.records:
             final_state = outcomes.find_final_state(
@@ -237,13 +237,13 @@ class Tracker(LedgerQueries):
             self._bin_recovery.add_look(detections, bin_names)
         elif detections.view == "full":
             confirm_placed_items(detections, observations, self._bin_contents)
-            self._records.emit(*self._bin_contents.place_dropped_items(detections, bin_names))
+            self._bin_contents.mark_dropped_items_as_placed(detections, bin_names)
 
     def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
         """Set items to DROPPED, so that later looks search for them on the table and in the bins."""
         assert self._bin_recovery is not None, "items are marked as dropped after `lose_track`"
         for record in records:
-            record.change_count, record.is_untracked, record.is_missing = self.change_count, True, False
+            record.change_count, record.is_untracked, record.was_taken_away = self.change_count, True, False
             record.bin_log_odds.clear()
             self._records.change_state(record, State.DROPPED)
         self.invalidate_positions()

@@ -25,7 +25,7 @@ class LookingSkill(Skill):
         """Return the minimum time from the frame to the answer of the detector [s]."""
         return min_times.get_answer_time(values["detector"])
 
-    def take_look(self, cell: Cell) -> Generator[None, None, Detections]:
+    def capture_and_detect(self, cell: Cell) -> Generator[None, None, Detections]:
         """Capture a frame, yield until the detector has answered, and return its detections.
 
         Raises:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -12,6 +13,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.objects import Item, ObjectClass, Target
 from executive.cell.protocols import Cell
+from executive.cell.quotas import is_quota_reached
 from executive.geometry import Array
 from executive.manipulation.obstacles import (
     compute_layer_height,
@@ -105,8 +107,8 @@ def compute_min_contact_height(object_class: ObjectClass, centre_height: float, 
 def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]:
     """Return the targets that can be picked, sorted by their distance from the destination of the arm.
 
-    A target can be picked if its item is open and certain, a bin below its quota is permitted for the item,
-    and its position is still valid.
+    A target can be picked if its item is open, class and position of the item are certain, a bin below its
+    quota is permitted for the item, and the robot cannot have moved the item since its detection.
     """
     ledger, destination = cell.ledger, cell.arm.destination[:2]
     pickable_targets = [
@@ -121,32 +123,29 @@ def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]
     return sorted(pickable_targets, key=lambda target: (np.linalg.norm(offsets[target.item]), target.item))
 
 
-def choose_bin(cell: Cell, item: Item) -> str | None:
-    """Return the first free bin with a quota, else the free bin with the fewest objects, or None.
+def choose_bin(cell: Cell, item: Item) -> str:
+    """Return the first free bin with a quota, else the free bin with the fewest objects, else "".
 
     A bin is free if it is permitted for the class of the item, and its quota is not reached. An item that the
     arm is moving into a bin counts as an object in the bin. If the class of an unweighed item has no free
     bin, the bin is one of a class that looks alike.
     """
-
-    def count_objects(bin_name: str, label: str | None) -> int:
-        return predict_object_count(cell, bin_name, label)
-
+    count_objects = partial(predict_object_count, cell)
     for label in cell.ledger.list_possible_labels(item):
         bins = cell.routes.get(label, ())
-        if free_bins := [bin for bin in bins if not cell.quotas.is_reached(bin, label, count_objects)]:
-            limited_bins = (
-                bin for bin in free_bins if {(bin, None), (bin, label)} & cell.quotas.limits.keys()
-            )
-            return next(limited_bins, min(free_bins, key=lambda bin: predict_object_count(cell, bin)))
-    return None
+        free_bins = [bin for bin in bins if not is_quota_reached(cell.quotas, bin, label, count_objects)]
+        limited_bins = [bin for bin in free_bins if {(bin, None), (bin, label)} & cell.quotas.keys()]
+        if free_bins:
+            return limited_bins[0] if limited_bins else min(free_bins, key=count_objects)
+    return ""
 
 
 def explain_uncertain_bin(cell: Cell, bin_name: str, item: Item) -> str:
     """Return why a bin may be wrong for `item`, or "".
 
-    Several classes look like the item, the bin is permitted for a part of them, and no weighing made the
-    class certain. A bin that is permitted for none of these classes is a decision of the mission.
+    The bin may be wrong if it is permitted for only some of the classes that look like the item, and no
+    weighing made the class certain. If the bin is permitted for none of these classes, the mission chose
+    it on purpose, and the result is "".
     """
     possible_labels = cell.ledger.list_possible_labels(item)
     labels = [label for label in cell.classes if label in possible_labels]
@@ -160,7 +159,7 @@ def explain_uncertain_bin(cell: Cell, bin_name: str, item: Item) -> str:
 
 
 def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
-    """Return the goal of a transit: `item` in the tool, at `drop_height` [m] above the next slot of a bin."""
+    """Return the goal of the tool that holds `item` `drop_height` [m] above the next slot of a bin."""
     bin, used_slots = cell.bins[bin_name], predict_used_slots(cell, bin_name, item)
     height = cell.classes[cell.ledger.get_label(item)].height
     return make_slot_goal(bin, used_slots, height, find_max_object_height(cell), drop_height)
@@ -212,7 +211,8 @@ def _compute_offset(failed_attempts: int, contact_radius: float, spacing: float)
     """Return the offset `(x, y)` [m] of the contact point from the centre of the object.
 
     After n failed attempts, the contact point on a solid object lies on a Vogel spiral, at the distance
-    spacing * sqrt(n) and the angle n * GOLDEN_ANGLE. If `contact_radius` is above 0, it is the distance.
+    spacing * sqrt(n) and the angle n * GOLDEN_ANGLE. On an object with a hole, whose `contact_radius` is
+    above 0, the contact point lies at the distance `contact_radius` instead.
     """
     angle = failed_attempts * GOLDEN_ANGLE
     distance = contact_radius or spacing * math.sqrt(failed_attempts)

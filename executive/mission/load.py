@@ -80,7 +80,7 @@ class LoadedMission:
         quotas = self.mission.quotas
         keys = [(quota.bin.name, quota.label.name if quota.label else None) for quota in quotas]
         limits = [cast("int", cast("Literal", quota.limit).value) for quota in quotas]
-        return Quotas(dict(zip(keys, limits, strict=True)))
+        return dict(zip(keys, limits, strict=True))
 
 
 def load_mission(

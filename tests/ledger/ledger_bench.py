@@ -13,7 +13,6 @@ from executive.cell.detection import Detection, Detections, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.cell.objects import ObjectClass, Target
-from executive.cell.quotas import Quotas
 from executive.events import Event
 from executive.ledger.tracker import Tracker
 from tests.camera_poses import looking_down
@@ -59,7 +58,7 @@ class Bench:
             bins,
             classes or {},
             {"cube": ("red_bin", "pink_bin")},
-            Quotas({}),
+            {},
             self.events.append,
         )
         self.frames = 0

@@ -47,7 +47,7 @@ def test_votes_against_each_other_leave_nothing_certain() -> None:
         mixed.add_detection(label, BAD)
     assert mixed.label == "cube", "the first in the alphabet"
     assert mixed.class_error == pytest.approx((1 + 1 / 9) / (2 + 1 / 9))
-    assert mixed.p_value == pytest.approx(0.19), "1 of 2 wrong at 10 %"
+    assert mixed.confusion_p_value == pytest.approx(0.19), "1 of 2 wrong at 10 %"
 
 
 def test_what_looks_say_of_existence_adds_up() -> None:
@@ -56,9 +56,9 @@ def test_what_looks_say_of_existence_adds_up() -> None:
     assert seen.log_odds == -1.0, "the first look is in the prior"
     seen.add_detection("cube", GOOD)
     assert seen.log_odds == pytest.approx(-1.0 + math.log(0.98 / (0.02 * 0.02)))
-    assert (seen.is_proved, seen.look_count) == (False, 2)
+    assert (seen.is_confirmed, seen.look_count) == (False, 2)
     seen.add_detection("cube", GOOD)
-    assert (seen.is_proved, seen.existence_probability) == (True, 1.0)
+    assert (seen.is_confirmed, seen.existence_probability) == (True, 1.0)
     beside = belief(3.0)
     beside.add_detection("cube", GOOD, is_ambiguous=True)
     beside.add_detection("cube", GOOD, is_ambiguous=True)
@@ -95,7 +95,7 @@ def test_an_item_that_is_searched_in_vain_becomes_ever_less_likely(existence: fl
 
 def test_what_the_tool_has_met_exists_however_often_it_is_overlooked() -> None:
     item = belief()
-    item.is_proved = True
+    item.is_confirmed = True
     for _ in range(50):
         item.add_miss(BAD)
     assert item.existence_probability == 1.0

@@ -81,13 +81,13 @@ def test_a_sure_look_makes_an_item_of_an_uncertain_detection_as_good_as_any(benc
 
 def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) -> None:
     bench.look(THERE, unsure=[("duck", 0.51, 0.01)])
-    assert (len(bench.ledger.list_items()), bench.ledger.records[0].belief.uncertain_look_count) == (1, 0), (
+    assert (len(bench.ledger.list_items()), bench.ledger.records[0].belief.low_confidence_count) == (1, 0), (
         "a second, weaker box"
     )
     for _ in range(5):
         bench.look(unsure=[("duck", 0.51, 0.0)])
     record = bench.ledger.records[0]
-    assert (record.belief.miss_probability, record.label, record.belief.uncertain_look_count) == (
+    assert (record.belief.miss_probability, record.label, record.belief.low_confidence_count) == (
         1.0,
         "cube",
         0,

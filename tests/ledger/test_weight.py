@@ -30,7 +30,7 @@ def seen_belief() -> Belief:
 
 def weigh(belief: Belief, weight: float) -> None:
     detected_labels = {label: each.detected_label for label, each in CLASSES.items()}
-    belief.add_weight(compute_weight_log_ratios(weight, STD, CLASSES), detected_labels)
+    belief.add_weighing(compute_weight_log_ratios(weight, STD, CLASSES), detected_labels)
 
 
 def seen_bench(classes: dict[str, ObjectClass] = CLASSES) -> Bench:
@@ -62,7 +62,7 @@ def test_the_heavy_one_of_two_that_look_alike_is_found_out_and_the_class_stays_a
     weigh(belief, 0.20 * GRAVITY)
     assert (belief.label, belief.detected_label) == ("full_cube", "cube")
     assert belief.class_error < before
-    assert belief.p_value == 1.0
+    assert belief.confusion_p_value == 1.0
 
 
 def test_a_class_that_looks_different_is_no_hypothesis() -> None:

@@ -8,7 +8,6 @@ import pytest
 from at_hand import look
 
 from executive.cell.arm import Goal
-from executive.cell.quotas import Quotas
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import FakeCell, SilentOperator
 from executive.testing.run_skill import SkillResult, run_skill
@@ -19,7 +18,7 @@ ALL_BINS = ("red_bin", "blue_bin", "yellow_bin")
 
 def make_cell(limits: dict[tuple[str, str | None], int], *labels: str) -> FakeCell:
     """Return a cell with a row of objects, whose cubes may go into all bins."""
-    options = CellOptions(SilentOperator(), cell_folder=Path(), quotas=Quotas(limits))
+    options = CellOptions(SilentOperator(), cell_folder=Path(), quotas=limits)
     fake = FakeCell(routes={"cube": ALL_BINS, "sphere": ("red_bin",)}, options=options)
     for index, label in enumerate(labels):
         fake.world.put(label, 0.44 + 0.1 * (index % 3), 0.12 * (index // 3))

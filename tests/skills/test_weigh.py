@@ -7,7 +7,6 @@ from pathlib import Path
 import at_hand
 import pytest
 
-from executive.cell.quotas import Quotas
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import FakeCell, SilentOperator, load_empty_cell
 from executive.geometry import GRAVITY
@@ -29,7 +28,7 @@ def make_fake(
     full = bottle.model_copy(update={"mass": 0.20, "looks_like": "bottle"})
     jar = bottle.model_copy(update={"mass": 0.20})
     objects = {"bottle": bottle, "full_bottle": full, "jar": jar, "duck": config.objects["duck"]}
-    options = CellOptions(SilentOperator(), cell_folder=Path(), quotas=Quotas(limits or {}))
+    options = CellOptions(SilentOperator(), cell_folder=Path(), quotas=limits or {})
     return FakeCell(config.model_copy(update={"objects": objects}), routes=routes, options=options)
 
 
