@@ -22,6 +22,11 @@ class Reason:
         return f"{self.source}.{self.reason}"
 
 
+def format_reasons(reasons: Iterable[object]) -> str:
+    """Return a text with all reasons, and with limits of counters: `Grasp.missed, look.unsure, placed: 4`."""
+    return ", ".join(map(str, reasons))
+
+
 @dataclass(frozen=True)
 class Failure:
     """A failure with a declared reason, which nodes pass on to their parents.

@@ -36,15 +36,15 @@ class NodeFinding:
 
 
 class NodeAnalysis(Protocol):
-    """Static analysis of a control node in a mission and of the children of the node."""
+    """Static analysis of a control node in a mission and of the children of the node.
 
-    @property
-    def is_halted_by_sibling(self) -> bool:
-        """True if the node is halted when a concurrent node ends."""
+    Attributes:
+        is_halted_by_sibling: True if the node is halted when a concurrent node ends.
+        is_concurrent: True if another node may run at the same time.
+    """
 
-    @property
-    def is_concurrent(self) -> bool:
-        """True if another node may run at the same time."""
+    is_halted_by_sibling: bool
+    is_concurrent: bool
 
     def get_flow(self, child: Child) -> Flow | None:
         """Return the possible outcomes of a child; None if the child never runs."""
@@ -131,8 +131,3 @@ class Counterpart:
 
     name: str
     ports: Mapping[str, str | int] = field(default_factory=dict)
-
-
-def format_reasons(reasons: Sequence[object]) -> str:
-    """Return a text with all reasons, and with limits of counters: `Grasp.missed, look.unsure, placed: 4`."""
-    return ", ".join(map(str, reasons))

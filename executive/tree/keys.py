@@ -191,8 +191,9 @@ def _complete_declaration(declaration: Key, attribute: str, annotation: object) 
         Children: KeyKind.NODES,
         Reasons: KeyKind.REASONS,
         VariableName: KeyKind.VARIABLE,
+        Elements: KeyKind.ELEMENTS,
     }
-    kind = KeyKind.ELEMENTS if value_type == Elements else kinds.get(value_type, KeyKind.CONSTANT)
+    kind = kinds.get(value_type, KeyKind.CONSTANT)
     if isinstance(value_type, type) and issubclass(value_type, KeySection):
         kind = KeyKind.SECTION
     elif isinstance(element_type, type) and issubclass(element_type, KeySection):

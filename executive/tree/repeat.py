@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 from executive.skill import ANY, EMPTY, HOLDING
-from executive.tree.failure import Reason
+from executive.tree.failure import Reason, format_reasons
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.generator_node import NodeRun
 from executive.tree.inspection import (
@@ -15,7 +15,6 @@ from executive.tree.inspection import (
     NodeAnalysis,
     NodeFinding,
     PropagatedFailure,
-    format_reasons,
 )
 from executive.tree.keys import Child, KeySection, key
 from executive.tree.loop import Loop
@@ -35,8 +34,7 @@ class CounterLimits(KeySection):
 
     def list_limits(self) -> list[tuple[str, float]]:
         """Return the counters that have a limit, with their limits."""
-        limits = [(name, getattr(self, name)) for name in self.keys]
-        return [(name, limit) for name, limit in limits if limit is not None]
+        return [(name, limit) for name in self.keys if (limit := getattr(self, name)) is not None]
 
 
 class Repeat(Loop):

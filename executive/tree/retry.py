@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from math import inf, isfinite
 
 from executive.skill import Seconds
+from executive.tree.failure import format_reasons
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, find_fixed_point, join_states
 from executive.tree.generator_node import NodeRun
 from executive.tree.inspection import (
@@ -16,7 +17,6 @@ from executive.tree.inspection import (
     NodeAnalysis,
     NodeFinding,
     PropagatedFailure,
-    format_reasons,
 )
 from executive.tree.keys import Child, KeySection, Reasons, key
 from executive.tree.loop import Loop

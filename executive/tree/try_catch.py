@@ -5,17 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar
 
-from executive.tree.failure import Failure, Reason
+from executive.tree.failure import Failure, Reason, format_reasons
 from executive.tree.flow import Flow, FlowFunction, FlowState, join_states
 from executive.tree.generator_node import GeneratorNode, NodeRun
-from executive.tree.inspection import (
-    Advice,
-    MinTimeFunction,
-    NodeAnalysis,
-    NodeFinding,
-    PropagatedFailure,
-    format_reasons,
-)
+from executive.tree.inspection import Advice, MinTimeFunction, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeySection, Reasons, key
 
 
