@@ -1,4 +1,4 @@
-"""Contents of the bins: numbers of objects, and dropped items that probably fell into a bin."""
+"""Contents of the bins: numbers of objects, items that an image shows, and items that fell into a bin."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import LedgerConfig
 from executive.cell.detection import Detections, Observation
 from executive.cell.error_rates import ErrorRates
+from executive.cell.ledger import Presence
 from executive.cell.protocols import Routes
 from executive.cell.quotas import Quotas, is_quota_reached
 from executive.geometry import Array
@@ -134,6 +135,46 @@ class BinContents:
         bin = self.bins[bin_name]
         half_size = np.append(bin.size[:2] / 2 - WALL_MARGIN, 0.0)
         return bool(detections.compute_searched_mask(bin.position + half_size * FLOOR_POINTS).all())
+
+    def confirm_placed_items(self, detections: Detections, observations: Sequence[Observation]) -> None:
+        """Set the time of the last detection of each placed item that an image shows in its bin."""
+        for record in self.records.filter_by_state(State.PLACED):
+            if self.find_presence(record, detections, observations) is Presence.THERE:
+                record.stamp = detections.frame.stamp
+
+    def find_presence(
+        self, record: ItemRecord, detections: Detections, observations: Sequence[Observation]
+    ) -> Presence:
+        """Return whether one image shows a placed item in its bin.
+
+        `GONE` means only that the image does not show the item; the detector may have missed the item. A
+        doubtful detection shows an item if the detection has the class of the item and lies at the slot of
+        the item. If the image shows fewer objects of the class than the bin contains, the missing items are
+        those whose slots are farthest from the shown objects. The result is `UNSURE` if another detection in
+        the bin may be the item, or if the bin has more than one layer of objects, because a layer hides the
+        layer below.
+        """
+        if not self.is_floor_visible(record.bin, detections):
+            return Presence.HIDDEN
+        bias_std = detections.error_rates.bias
+        shown = [entry for entry in observations if self.find_bin_name(entry, bias_std) == record.bin]
+        alike = [entry for entry in shown if entry.detection.label == record.detected_label]
+        confident = [entry for entry in alike if entry.is_confident]
+        items = [item for item in self.records if item.bin == record.bin]
+        distances = {
+            item: self.measure_slot_distance(item, confident)
+            for item in items
+            if item.detected_label == record.detected_label
+        }
+        missing_count = len(distances) - len(confident)
+        for item, distance in distances.items():
+            if distance > self.config.gate >= self.measure_slot_distance(item, alike):
+                distances[item], missing_count = 0.0, missing_count - 1
+        rank = sorted(distances, key=distances.__getitem__, reverse=True).index(record)
+        if rank >= missing_count:
+            return Presence.THERE
+        has_layers = self.count_used_slots(record.bin) > len(self.bins[record.bin].slots)
+        return Presence.UNSURE if has_layers or rank >= len(items) - len(shown) else Presence.GONE
 
 
 def find_probable_bin(record: ItemRecord) -> str | None:

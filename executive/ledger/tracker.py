@@ -16,12 +16,12 @@ from executive.errors import Fault
 from executive.events import ItemChanged
 from executive.geometry import Array
 from executive.ledger import outcomes
+from executive.ledger.belief import make_viewpoint_key
 from executive.ledger.bin_contents import find_probable_bin
 from executive.ledger.bin_recovery import BinRecovery
 from executive.ledger.item import ON_TABLE, ItemRecord, State
 from executive.ledger.look import LookUpdate, make_look_event
 from executive.ledger.queries import LedgerQueries
-from executive.ledger.verification import confirm_placed_items, verify
 from executive.perception.evidence import compute_weight_log_ratios, describe_weight
 
 
@@ -63,13 +63,33 @@ class Tracker(LedgerQueries):
         return self.find_targets()
 
     def verify(self, item: Item, detections: Detections, observations: Sequence[Observation]) -> Presence:
-        """Return whether an item is at its place; the position of an item that is gone becomes unknown."""
-        record = self._records.find(item)
-        presence = verify(record, detections, observations, self._bin_contents)
-        if presence is Presence.GONE and record.state in (State.PLACED, *ON_TABLE):
-            record.mark_as_taken_away(self.change_count)
-            self._records.emit(record)
-        return presence
+        """Return whether an item is at its place, according to this image and to earlier images.
+
+        The item is gone if the probability that all images missed the item by chance is at most
+        `max_miss_probability`; its position then becomes unknown.
+        """
+        record, frame = self._records.find(item), detections.frame
+        if record.state is State.PLACED:
+            presence = self._bin_contents.find_presence(record, detections, observations)
+            if presence is Presence.GONE:
+                record.belief.add_miss(detections.error_rates, make_viewpoint_key(detections))
+            elif presence is Presence.THERE:
+                record.stamp, record.belief.miss_probability = frame.stamp, 1.0
+                record.forget_viewpoints()
+        elif record.state not in ON_TABLE:
+            return Presence.HIDDEN if record.state is State.HELD else Presence.GONE
+        elif record.frame_id == frame.id:
+            return Presence.THERE
+        else:
+            is_searched = detections.compute_searched_mask(record.position[None])[0]
+            presence = Presence.GONE if is_searched else Presence.HIDDEN
+        if presence is not Presence.GONE:
+            return presence
+        if not self._certainty.is_position_empty(record):
+            return Presence.UNSURE
+        record.mark_as_taken_away(self.change_count)
+        self._records.emit(record)
+        return Presence.GONE
 
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
         """Record a touch, and return False if the touch contradicts the class of the item.
@@ -236,7 +256,7 @@ class Tracker(LedgerQueries):
         if detections.view == "full" and self._bin_recovery is not None:
             self._bin_recovery.add_look(detections, bin_names)
         elif detections.view == "full":
-            confirm_placed_items(detections, observations, self._bin_contents)
+            self._bin_contents.confirm_placed_items(detections, observations)
             self._bin_contents.mark_dropped_items_as_placed(detections, bin_names)
 
     def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
