@@ -8,10 +8,10 @@ from typing import Any
 
 from executive.cell.objects import Item
 from executive.mission.check.context import CheckContext
-from executive.mission.check.skill_settings import find_param_problem, find_unknown_names
+from executive.mission.check.skill_settings import find_unknown_names
 from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, make_error, suggest_choice
-from executive.mission.model.conversion import find_input_problem
+from executive.mission.model.conversion import find_problem
 from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode
 from executive.mission.model.port_types import describe_type, find_element_type, find_fields, is_assignable
@@ -172,7 +172,7 @@ def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iter
         port_type = " or ".join(map(str, choices))
     for value, span in writer.values or ():
         names = context.names_in_cell_by_kind.get(port.refers_to)
-        if find_param_problem(port, value)[0] if isinstance(port, Param) else find_input_problem(value, port):
+        if find_problem(value, port):
             message = f"{wire} takes {port_type}, but ${wire.variable} gets {describe_value(value)} here"
             hint = f"{wire} reads ${wire.variable} in {wire.span.describe_place(span.source)}."
             yield make_error(span, "port-type", message, hint)
@@ -198,7 +198,7 @@ def _check_compared_constants(
     for name, value in find_literals(node) if isinstance(node, SkillNode) and writer.values is None else ():
         port = context.skills[wire.skill].ports.get(name)
         # `check_settings` reports a constant that fits no variable.
-        if port is None or port.same_as != wire.port.name or find_input_problem(value.value, port):
+        if port is None or port.same_as != wire.port.name or find_problem(value.value, port):
             continue
         # A field that names a bin may be empty.
         expected = replace(port, type=writer.type, refers_to=writer.refers_to, default="")

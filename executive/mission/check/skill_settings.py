@@ -6,9 +6,8 @@ from collections.abc import Iterator
 
 from executive.mission.check.context import CheckContext
 from executive.mission.check.variables import list_skills_with_output
-from executive.mission.descriptions import describe_value
-from executive.mission.findings import Finding, make_error, make_warning, suggest_choice, suggest_word
-from executive.mission.model.conversion import WrongType, convert_value, find_input_problem
+from executive.mission.findings import Finding, make_error, make_warning, suggest_choice
+from executive.mission.model.conversion import find_problem
 from executive.mission.model.nodes import SkillNode
 from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import find_literals
@@ -82,19 +81,15 @@ def _check_value(
     context: CheckContext, node: SkillNode, declaration: Param | Port, value: Literal
 ) -> Iterator[Finding]:
     """Yield an error if the constant `value` does not fit the param or port of `declaration`."""
-    name, code, hint = f"{node.skill}.{declaration.name}", "wrong-type", ""
-    if isinstance(declaration, Param):
-        code, problem = find_param_problem(declaration, value.value)
-    elif declaration.direction is Direction.IN:
-        problem, hint = find_input_problem(value.value, declaration), context.make_variable_hint(value.value)
-    else:
+    name = f"{node.skill}.{declaration.name}"
+    if isinstance(declaration, Port) and declaration.direction is Direction.OUT:
         message = f"{name} is an output: give it a variable, for example ${declaration.name}"
         if value.origin:
             message = f"{name} is an output and cannot write to the constant {value.origin.split()[0]}"
-        yield make_error(value.reference_span or value.span, code, message)
-        return
-    if problem:
-        yield make_error(value.span, code, f"{name} {problem}{value.origin_note}", hint)
+        yield make_error(value.reference_span or value.span, "wrong-type", message)
+    elif problem := find_problem(value.value, declaration):
+        hint = context.make_variable_hint(value.value) if isinstance(declaration, Port) else ""
+        yield make_error(value.span, problem.code, f"{name} {problem}{value.origin_note}", hint)
 
 
 def find_unknown_names(
@@ -110,28 +105,6 @@ def find_unknown_names(
             message = f'the cell has no {declaration.refers_to} "{name}" for {skill}.{declaration.name}'
             hint = context.make_variable_hint(name) or suggest_choice(name, allowed_names, "Allowed names")
             yield make_error(value.get_element_span(index), f"unknown-{declaration.refers_to}", message, hint)
-
-
-def find_param_problem(param: Param, value: object) -> tuple[str, str]:
-    """Return the code of an error and its message without the subject; ("", "") without an error."""
-    try:
-        converted = convert_value(value, param.type)
-    except WrongType as problem:
-        return "wrong-type", str(problem)
-    unit = f" {param.unit}" if param.unit else ""
-    number = converted if isinstance(converted, int | float) else None
-    if number is not None and param.ge is not None and number < param.ge:
-        return "out-of-range", f"must be at least {param.ge:g}{unit}, not {describe_value(value)}"
-    if number is not None and param.le is not None and number > param.le:
-        return "out-of-range", f"must be at most {param.le:g}{unit}, not {describe_value(value)}"
-    # If a param refers to names of the cell, `choices` allows more values; `find_unknown_names` checks both.
-    if param.choices is not None and not param.refers_to and converted not in param.choices:
-        allowed = " or ".join(
-            f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in param.choices
-        )
-        suggestion = suggest_word(value, map(str, param.choices))
-        return "wrong-value", f"must be {allowed}, not {describe_value(value)}{suggestion}"
-    return "", ""
 
 
 def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:

@@ -12,8 +12,9 @@ from typing import Any, Union, cast, get_args, get_origin
 from pydantic import TypeAdapter, ValidationError
 
 from executive.mission.descriptions import describe_validation_error, describe_value
+from executive.mission.findings import suggest_word
 from executive.mission.model.port_types import is_assignable
-from executive.skill import Port
+from executive.skill import Param, Port
 from executive.tree.keys import Key
 
 _SIMPLE_TYPES = (str, int, float, bool, type(None), Any, Ellipsis)
@@ -43,18 +44,43 @@ def is_plain_type(declared_type: object) -> bool:
     return is_compound and all(is_plain_type(part) for part in get_args(declared_type))
 
 
-def find_input_problem(value: object, port: Port) -> str:
-    """Return an error message (predicate of a sentence) if an input does not accept a constant, else ""."""
-    if value is None and is_assignable(type(None), port.type):
-        return ""
-    # Items are created during a run, so a file cannot contain an item.
-    if not is_plain_type(port.type) or port.refers_to == "item":
-        return f"must be a variable, for example ${port.name}, not {describe_value(value)}"
+def find_problem(value: object, declaration: Param | Port) -> WrongType | None:
+    """Return the error if a param or an input does not accept a constant, else None."""
     try:
-        convert_value(value, port.type)
-    except WrongType as error:
-        return str(error)
-    return ""
+        convert_setting(value, declaration)
+    except WrongType as problem:
+        return problem
+    return None
+
+
+def convert_setting(value: object, declaration: Param | Port) -> object:
+    """Return a constant converted to the type of a param or an input.
+
+    Raises:
+        WrongType: The value has another type, is out of bounds, or is none of the choices.
+    """
+    if isinstance(declaration, Port):
+        if value is None and is_assignable(type(None), declaration.type):
+            return None
+        # Items are created during a run, so a file cannot contain an item.
+        if not is_plain_type(declaration.type) or declaration.refers_to == "item":
+            example = f"for example ${declaration.name}"
+            raise WrongType(f"must be a variable, {example}, not {describe_value(value)}")
+        return convert_value(value, declaration.type)
+    converted = convert_value(value, declaration.type)
+    minimum, maximum, choices = declaration.ge, declaration.le, declaration.choices
+    unit = f" {declaration.unit}" if declaration.unit else ""
+    number = converted if isinstance(converted, int | float) else None
+    if number is not None and minimum is not None and number < minimum:
+        raise WrongType(f"must be at least {minimum:g}{unit}, not {describe_value(value)}", "out-of-range")
+    if number is not None and maximum is not None and number > maximum:
+        raise WrongType(f"must be at most {maximum:g}{unit}, not {describe_value(value)}", "out-of-range")
+    # If a param refers to names of the cell, `choices` allows more values; `find_unknown_names` checks both.
+    if choices is not None and not declaration.refers_to and converted not in choices:
+        allowed = " or ".join(f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in choices)
+        suggestion = suggest_word(value, map(str, choices))
+        raise WrongType(f"must be {allowed}, not {describe_value(value)}{suggestion}", "wrong-value")
+    return converted
 
 
 def convert_value(value: object, declared_type: object) -> object:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from pydantic import JsonValue
-
 from executive.mission.model.nodes import Node
 from executive.mission.model.values import Literal, LocatedName, Value
 from executive.mission.source import Span
+from executive.skill import Param
 
 
 @dataclass(frozen=True)
@@ -49,19 +48,12 @@ class MissionParam:
     Attributes:
         span: Position of the name.
         value: Value in this run: the value of `--set`, otherwise the default.
-        type: `text`, `integer`, `number`, `boolean` or `list`; "" if unknown.
-        minimum, maximum: Inclusive bounds, or None.
-        choices: Allowed values, or None if all values are allowed.
-        doc: Meaning of the param, or "".
+        declaration: Type, bounds and choices; the type is `Any` if it is unknown.
     """
 
     span: Span
     value: Literal
-    type: str = ""
-    minimum: float | None = None
-    maximum: float | None = None
-    choices: tuple[JsonValue, ...] | None = None
-    doc: str = ""
+    declaration: Param
 
 
 @dataclass(frozen=True)

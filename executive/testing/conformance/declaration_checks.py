@@ -10,7 +10,7 @@ import inspect
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from executive.mission.check.skill_settings import find_param_problem
+from executive.mission.model.conversion import find_problem
 from executive.skill import Param, Port
 from executive.testing.conformance import source_code
 from executive.testing.conformance.skill_runs import SkillRuns
@@ -108,7 +108,7 @@ def _describe_default_problem(param: Param) -> str:
     # The default None is allowed even if it is not among the choices.
     declaration = replace(param, choices=None) if param.default is None else param
     try:
-        return find_param_problem(declaration, param.default)[1]
+        return str(find_problem(param.default, declaration) or "")
     except TypeError as problem:
         return str(problem)
 
