@@ -118,5 +118,6 @@ def test_every_kind_of_finding_has_a_broken_mission() -> None:
 if __name__ == "__main__":
     os.chdir(FOLDER)
     with keep_stdout_clean():
-        texts = [rendered(path, findings_of(path, load_skills())) for path in BROKEN]
+        skills, kind = load_skills(), functools.cache(load_cell_kind)
+        texts = [rendered(path, findings_of(path, skills, kind)) for path in BROKEN]
     WORDS.write_text("".join(texts), encoding="utf-8")

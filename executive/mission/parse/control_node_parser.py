@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from executive.mission.model.nodes import InnerNode, InvalidNode, KeyValue, Node, NodeSection, list_nodes
@@ -58,11 +59,11 @@ def read_control_node(
     """
     key_reader = _KeyReader(parser)
     keyword, span, sibling_keys = entry.key.text, entry.key.span, find_sibling_keys(node_class)
-    values = key_reader.read_inner_keys(keyword, span, entry.value, node_class)
-    siblings = MappingReader(keyword, span, mapping, mapping.keys, parser.findings)
-    for name, key in sibling_keys.items():
-        if (value := siblings.get(name)) is not None:
-            key_reader.add_key_value(siblings, key, value, value.span, values)
+    siblings = tuple(sibling for sibling in mapping.entries if sibling.key.text in sibling_keys)
+    values = {
+        **key_reader.read_inner_keys(keyword, span, entry.value, node_class),
+        **key_reader.read_keys(keyword, span, replace(mapping, entries=siblings), sibling_keys),
+    }
     any_of = node_class.any_of
     given_keys = {*mapping.keys, *(entry.value.keys if isinstance(entry.value, YamlMapping) else ())}
     if key_reader.is_mapping_valid and any_of and given_keys.isdisjoint(any_of):
@@ -91,7 +92,6 @@ class _KeyReader:
 
     def read_inner_keys(self, name: str, span: Span, value: YamlNode, owner: KeyClass) -> dict[str, KeyValue]:
         """Return the values of the keys of `owner`; `value` is the YAML node below the keyword `name`."""
-        values: dict[str, KeyValue] = {}
         shorthand_key, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
         is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
         # A mapping could also be a node in the shorthand form, but is always read as inner keys.
@@ -99,30 +99,28 @@ class _KeyReader:
         reads_inner_keys = isinstance(value, YamlMapping) or is_scalar_for_list  # an error names the keys
         if shorthand_key is not None and not (reads_inner_keys and inner_keys):
             key_node = YamlScalar(span, name, shorthand_key.name)
-            explicit_mapping = YamlMapping(span, (YamlEntry(key_node, value),))
-            reader = MappingReader(name, span, explicit_mapping, [shorthand_key.name], self.parser.findings)
-            self.add_key_value(reader, shorthand_key, value, span, values)
-            return values
-        reader = MappingReader(name, span, value, inner_keys, self.parser.findings)
+            value = YamlMapping(span, (YamlEntry(key_node, value),))
+            inner_keys = {shorthand_key.name: shorthand_key}
+        return self.read_keys(name, span, value, inner_keys)
+
+    def read_keys(
+        self, name: str, span: Span, mapping: YamlNode, keys: Mapping[str, Key]
+    ) -> dict[str, KeyValue]:
+        """Return the valid values of `keys` in a mapping; a missing required node is an invalid node."""
+        reader = MappingReader(name, span, mapping, keys, self.parser.findings)
         self.is_mapping_valid = self.is_mapping_valid and reader.is_mapping
-        for key in inner_keys.values():
-            key_value = reader.require(key.name) if key.is_required else reader.get(key.name)
-            if key_value is not None:
-                self.add_key_value(reader, key, key_value, reader.get_key_span(key.name), values)
+        values: dict[str, KeyValue] = {}
+        for key in keys.values():
+            if (node := reader.get(key.name)) is not None:
+                value = self._read_value(reader, key, node)
+                values |= {} if value is None else {key.name: value}
             elif key.kind is KeyKind.NODE and key.is_required:
                 values[key.name] = InvalidNode(span, "")
         return values
 
-    def add_key_value(
-        self, reader: MappingReader, key: Key, node: YamlNode, span: Span, values: dict[str, KeyValue]
-    ) -> None:
-        """Add a valid value of a key to `values`; `span` is the position of an error about a missing node."""
-        value = self._read_value(reader, key, node, span)
-        if value is not None:
-            values[key.name] = value
-
-    def _read_value(self, reader: MappingReader, key: Key, node: YamlNode, span: Span) -> KeyValue | None:
+    def _read_value(self, reader: MappingReader, key: Key, node: YamlNode) -> KeyValue | None:
         """Return the value of a key, or None after an error and for an omitted optional child."""
+        span = reader.get_key_span(key.name)
         match key.kind:
             case KeyKind.NODE:
                 is_omitted = is_empty(node) and key.shorthand and not key.is_required

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from pydantic import JsonValue
 
 from executive.mission.findings import Finding, make_error, suggest_choice
+from executive.mission.model.grammar import GrammarKey
 from executive.mission.model.values import FailureName, InvalidValue, Literal, Reference, Setting, Value
 from executive.mission.source import Span
 from executive.mission.text.yaml_text import (
@@ -20,6 +21,7 @@ from executive.mission.text.yaml_text import (
     iterate_scalars,
     to_python_value,
 )
+from executive.tree.keys import Key
 
 NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 """Matches the names of params, arguments, variables and subtrees."""
@@ -32,7 +34,7 @@ _FAILURE_PATTERN = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\.([A-Za-z_][A-Za-z0-9_]
 
 
 class MappingReader:
-    """Reader of one mapping; reports unknown keys at construction.
+    """Reader of one mapping; reports unknown keys and missing keys at construction.
 
     Attributes:
         owner: Name, in messages, of the node, key or file to which the mapping belongs.
@@ -42,19 +44,26 @@ class MappingReader:
     """
 
     def __init__(
-        self, owner: str, span: Span, node: YamlNode, allowed_keys: Iterable[str], findings: list[Finding]
+        self,
+        owner: str,
+        span: Span,
+        node: YamlNode,
+        keys: Mapping[str, Key | GrammarKey],
+        findings: list[Finding],
     ) -> None:
         self.owner, self.span, self.findings = owner, span, findings
         self.is_mapping = isinstance(node, YamlMapping)
         self._mapping = node if isinstance(node, YamlMapping) else YamlMapping(node.span, ())
-        allowed_keys = list(allowed_keys)
         if not self.is_mapping:
             message = f"{owner} must be a mapping, not {describe_node(node)}"
-            self.add_error(node.span, "wrong-type", message, f"Its keys: {', '.join(allowed_keys)}.")
+            self.add_error(node.span, "wrong-type", message, f"Its keys: {', '.join(keys)}.")
         for entry in self._mapping.entries:
-            if entry.key.text not in allowed_keys:
-                hint = suggest_choice(entry.key.text, allowed_keys, "Allowed keys")
+            if entry.key.text not in keys:
+                hint = suggest_choice(entry.key.text, keys, "Allowed keys")
                 self.add_error(entry.key.span, "unknown-key", f'{owner} has no key "{entry.key.text}"', hint)
+        for name, key in keys.items():
+            if self.is_mapping and key.is_required and self.get(name) is None:
+                self.add_error(span, "missing-key", f'{owner} needs the key "{name}"')
 
     def get(self, key: str) -> YamlNode | None:
         """Return the value of `key`, or None."""
@@ -68,13 +77,6 @@ class MappingReader:
     def get_value_span(self, key: str) -> Span:
         """Return the position of the value of `key`, or of the owner if the key is missing."""
         return (self.get(key) or self).span
-
-    def require(self, key: str) -> YamlNode | None:
-        """Return the value of `key`; if the key is missing, add an error and return None."""
-        node = self.get(key)
-        if node is None and self.is_mapping:
-            self.add_error(self.span, "missing-key", f'{self.owner} needs the key "{key}"')
-        return node
 
     def read_text(self, key: str) -> str:
         """Return the text below `key`, or ""; add an error for a list, a mapping or null."""

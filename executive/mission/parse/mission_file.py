@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from executive.mission.model import grammar
-from executive.mission.model.grammar import GrammarKeys
 from executive.mission.model.mission import Argument, Mission, Quota, Route, Subtree
 from executive.mission.model.values import LocatedName
 from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
@@ -22,7 +21,8 @@ _MISSION_NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodeParser) -> Mission:
     """Return the valid content of a mission file; add errors to the findings of `parser`."""
-    reader = _make_file_reader("the mission", root, grammar.MISSION_KEYS, parser)
+    span = replace(root.span, length=1)
+    reader = MappingReader("the mission", span, root, grammar.MISSION_KEYS, parser.findings)
     tree = reader.get("tree")
     return Mission(
         name=_read_name(reader),
@@ -37,15 +37,6 @@ def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodePars
         tree=None if tree is None else parser.read_node(tree, reader.get_key_span("tree")),
         subtrees=_read_subtrees(reader, parser),
     )
-
-
-def _make_file_reader(owner: str, root: YamlNode, keys: GrammarKeys, parser: NodeParser) -> MappingReader:
-    """Return the reader of a file with the mapping `root`; add errors about missing keys."""
-    reader = MappingReader(owner, replace(root.span, length=1), root, keys, parser.findings)
-    for name, key in keys.items():
-        if key.is_required:
-            reader.require(name)
-    return reader
 
 
 def _read_name(reader: MappingReader) -> str:
@@ -101,7 +92,8 @@ def _read_names(reader: MappingReader, items: Iterable[YamlNode], rule: str) -> 
 
 def parse_library(root: YamlNode, parser: NodeParser) -> dict[str, Subtree]:
     """Return the valid subtrees of a library file by name; add errors to the findings of `parser`."""
-    reader = _make_file_reader("the library", root, grammar.LIBRARY_KEYS, parser)
+    span = replace(root.span, length=1)
+    reader = MappingReader("the library", span, root, grammar.LIBRARY_KEYS, parser.findings)
     return _read_subtrees(reader, parser, reader.read_text("library") or "library")
 
 
