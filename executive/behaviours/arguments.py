@@ -7,16 +7,17 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import repeat
 from types import NoneType, UnionType
-from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeGuard, Union, cast, get_args, get_origin, get_type_hints
 
 from py_trees.behaviour import Behaviour
 from py_trees.ports import PortsMixin
 
 _PLAIN_TYPES = (str, int, float, bool, NoneType, list, tuple, dict, Any)
-"""Types without type arguments whose values a mission may contain."""
+"""Types without type arguments that are allowed for values in a mission."""
 _CONTAINERS = {list: list, tuple: tuple, dict: dict, Sequence: list, Mapping: dict}
-"""Type of the values in a mission, for types with type arguments."""
+"""Type of the values in a mission, by the origin of a declared type with type arguments."""
 
 
 @dataclass(frozen=True)
@@ -24,18 +25,18 @@ class ConstructorArgument:
     """An argument of the constructor of a behaviour.
 
     Attributes:
-        hint: Declared type.
+        type: Declared type.
         default: Default value; `...` for a required argument.
         doc: Description in the docstring of the behaviour, or "".
     """
 
-    hint: object
+    type: object
     default: object
     doc: str
 
 
 def list_arguments(behaviour: type[Behaviour]) -> dict[str, ConstructorArgument]:
-    """Return the arguments of the constructor by name, also those that it passes on as `**kwargs`."""
+    """Return the constructor arguments by name, with those of base classes that it accepts as `**kwargs`."""
     arguments: dict[str, ConstructorArgument] = {}
     for owner in behaviour.__mro__:
         if "__init__" not in vars(owner) or owner is PortsMixin:
@@ -49,41 +50,51 @@ def list_arguments(behaviour: type[Behaviour]) -> dict[str, ConstructorArgument]
         for parameter in parameters:
             if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY):
                 default = ... if parameter.default is parameter.empty else parameter.default
-                hint = hints.get(parameter.name, Any)
-                argument = ConstructorArgument(hint, default, _find_description(owner, parameter.name))
+                description = _find_description(owner, parameter.name)
+                argument = ConstructorArgument(hints.get(parameter.name, Any), default, description)
                 arguments.setdefault(parameter.name, argument)
         if all(parameter.kind is not parameter.VAR_KEYWORD for parameter in parameters):
             break
     return arguments
 
 
-def find_mission_type(hint: object) -> object:
-    """Return the type of the values that a mission gives for a declared type; None if there is none.
+def find_mission_type(declared_type: object) -> object:
+    """Return the type that a mission uses for a declared type, or None if no mission can contain a value.
 
-    Missions name the members of an enumeration. A union keeps the types that a mission can contain.
+    An enumeration becomes a Literal of the names of its members. A union keeps the types that a mission can
+    contain.
     """
-    origin, parts = get_origin(hint), get_args(hint)
-    if isinstance(hint, type) and issubclass(hint, Enum):
-        return cast("Any", Literal)[tuple(hint.__members__)]
+    origin, parts = get_origin(declared_type), get_args(declared_type)
+    if _is_enumeration(declared_type):
+        return cast("Any", Literal)[tuple(declared_type.__members__)]
     if origin in (Union, UnionType):
         parts = tuple(part for part in map(find_mission_type, parts) if part is not None)
         return Union[parts] if parts else None  # noqa: UP007 - the number of types varies
     if origin in _CONTAINERS:
         parts = tuple(part if part is ... else find_mission_type(part) for part in parts)
         return None if None in parts else cast("Any", _CONTAINERS[origin])[parts]
-    return hint if hint in _PLAIN_TYPES or origin is Literal else None
+    return declared_type if declared_type in _PLAIN_TYPES or origin is Literal else None
 
 
-def to_argument(value: object, hint: object) -> object:
-    """Return a value of a mission as a value of the declared type: the members of enumerations by name."""
-    if isinstance(hint, type) and issubclass(hint, Enum):
-        return hint.__members__.get(value, value) if isinstance(value, str) else value
-    for part in get_args(hint):
-        if isinstance(value, list | tuple) and get_origin(hint) in _CONTAINERS:
-            return type(value)(to_argument(item, part) for item in value)
-        if get_origin(hint) in (Union, UnionType) and (converted := to_argument(value, part)) is not value:
-            return converted
+def to_argument(value: object, declared_type: object) -> object:
+    """Convert a value from a mission to the declared type: names of members become members."""
+    origin, parts = get_origin(declared_type), get_args(declared_type)
+    if _is_enumeration(declared_type) and isinstance(value, str):
+        return declared_type.__members__.get(value, value)
+    if origin in (Union, UnionType):
+        candidates = (to_argument(value, part) for part in parts)
+        return next((candidate for candidate in candidates if candidate is not value), value)
+    if origin in _CONTAINERS and isinstance(value, list | tuple):
+        has_one_type = len(parts) == 1 or ... in parts
+        item_types = repeat(parts[0]) if has_one_type else parts
+        return type(value)(map(to_argument, value, item_types))
+    if origin in _CONTAINERS and isinstance(value, dict):
+        return {key: to_argument(item, parts[1]) for key, item in value.items()}
     return value
+
+
+def _is_enumeration(declared_type: object) -> TypeGuard[type[Enum]]:
+    return isinstance(declared_type, type) and issubclass(declared_type, Enum)
 
 
 def _find_description(owner: type, name: str) -> str:

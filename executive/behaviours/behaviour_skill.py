@@ -21,16 +21,16 @@ from executive.errors import Fault, InputError
 from executive.skill import Direction, Param, Port, Skill, get_attribute_name, param
 
 NAME_ARGUMENT = "name"
-"""Argument of constructors for the name of the behaviour, which missions do not set."""
+"""Constructor argument for the name of the behaviour; missions cannot set this argument."""
 _REPLAYABLE_MODULE = "py_trees.behaviours"
-"""Module whose behaviours read nothing but their arguments and the blackboard, except random numbers."""
+"""Module of behaviours that depend only on their arguments, the blackboard, and random numbers."""
 
 
 class BehaviourSkill(Skill):
     """Base class of skills that run a behaviour; `make_behaviour_skill` returns a subclass.
 
     Each start creates the behaviour, connects its ports, and calls its `setup`. Each control step ticks the
-    behaviour once. A halt calls `stop(INVALID)`. After every end, `shutdown` is called.
+    behaviour once. A halt calls `stop(INVALID)`. When the run ends, with any result, `shutdown` is called.
 
     Attributes:
         behaviour_type: Class of the behaviour.
@@ -65,21 +65,23 @@ class BehaviourSkill(Skill):
             status = behaviour.status
         finally:
             with blackboard:
-                _end(behaviour)
+                _stop_and_shut_down(behaviour)
             values = {port: blackboard.storage.pop(key, None) for port, key in keys.items()}
         if status is Status.FAILURE:
             raise self.failure("failed", _explain_failure(behaviour))
         if status is not Status.SUCCESS:
-            raise Fault("its status is INVALID after a tick; update() must return a status")
+            raise Fault(
+                "its status is INVALID after a tick; update() must return RUNNING, SUCCESS or FAILURE"
+            )
         for name, port in self.ports.items():
-            # A required output without a value stays unset, which is a fault of the skill.
+            # A required output without a value remains unset: the caller then reports a fault of the skill.
             if port.direction is Direction.OUT and (values[name] is not None or port.default is None):
                 setattr(self, get_attribute_name(name), values[name])
 
     def _make_arguments(self) -> dict[str, Any]:
         values = {name: self._values[name] for name in self.params if name in self._values}
         name = {NAME_ARGUMENT: type(self).__name__} if NAME_ARGUMENT in self.arguments else {}
-        return name | {name: to_argument(value, self.arguments[name].hint) for name, value in values.items()}
+        return name | {name: to_argument(value, self.arguments[name].type) for name, value in values.items()}
 
     def _list_inputs(self, keys: Mapping[str, str]) -> Iterator[tuple[str, object]]:
         """Yield the key on the blackboard and the value of each input that has a value other than None."""
@@ -92,10 +94,14 @@ class BehaviourSkill(Skill):
 
 @cache
 def make_behaviour_skill(name: str, behaviour_type: type[Behaviour]) -> type[BehaviourSkill]:
-    """Return the skill `name` that runs a behaviour: its arguments are params, its ports are ports.
+    """Return a skill class called `name` that runs a behaviour.
+
+    The arguments of the constructor become params of the skill, and the ports of the behaviour become ports
+    of the skill.
 
     Raises:
-        InputError: A mission cannot use the behaviour; the message is the predicate of a sentence.
+        InputError: A mission cannot use the behaviour. The message has no subject; the caller puts the name
+            of the behaviour before the message.
     """
     port_tables = ("INPUT_PORTS", "OUTPUT_PORTS") if issubclass(behaviour_type, PortsMixin) else ()
     if inspect.isabstract(behaviour_type) or not all(hasattr(behaviour_type, table) for table in port_tables):
@@ -118,6 +124,7 @@ def make_behaviour_skill(name: str, behaviour_type: type[Behaviour]) -> type[Beh
         "__doc__": inspect.getdoc(behaviour_type), "__module__": behaviour_type.__module__,
         "behaviour_type": behaviour_type, "arguments": arguments, "params": params, "ports": ports,
         "is_condition": getattr(behaviour_type, "is_condition", False),
+        # Other behaviours may read sensors.
         "is_replayable": is_replayable, "senses": not is_replayable,
     }  # fmt: skip
     return cast("type[BehaviourSkill]", type(name, (BehaviourSkill,), members))
@@ -126,9 +133,9 @@ def make_behaviour_skill(name: str, behaviour_type: type[Behaviour]) -> type[Beh
 def _make_params(arguments: Mapping[str, ConstructorArgument]) -> Iterator[tuple[str, Param]]:
     """Yield name and declaration of the param for each argument that a mission can set."""
     for name, argument in arguments.items():
-        mission_type, default = find_mission_type(argument.hint), argument.default
+        mission_type, default = find_mission_type(argument.type), argument.default
         if name != NAME_ARGUMENT and mission_type is not None:
-            # A default is only shown to authors, as a plain value: the constructor knows its defaults.
+            # The default is documentation: the constructor applies the real default.
             default = default.name if isinstance(default, Enum) else default
             default = default if default is ... or isinstance(default, str | int | float) else None
             yield name, replace(param(default, doc=argument.doc), name=name, type=mission_type)
@@ -140,7 +147,7 @@ def _make_params(arguments: Mapping[str, ConstructorArgument]) -> Iterator[tuple
 
 
 def _make_port(name: str, direction: Direction, declared: PortInformation) -> Port:
-    """Return the port for a declaration of py_trees; a port without a value has the value None."""
+    """Convert a port declaration of py_trees; an optional port without a default has the default None."""
     default: object = ... if declared.required else None
     if direction is Direction.IN and declared.has_default:
         default = declared.default_value
@@ -149,14 +156,14 @@ def _make_port(name: str, direction: Direction, declared: PortInformation) -> Po
 
 
 def _explain_failure(behaviour: Behaviour) -> str:
-    """Return the feedback message of a failed behaviour, or of the node below that failed, with its name."""
+    """Return the feedback message of a failed behaviour; if it is empty, that of the failed descendant."""
     failed_node = behaviour.tip()
     if behaviour.feedback_message or failed_node in (None, behaviour):
         return behaviour.feedback_message or "it has no feedback message"
     return f"{failed_node.name}: {failed_node.feedback_message or 'no feedback message'}"
 
 
-def _end(behaviour: Behaviour) -> None:
+def _stop_and_shut_down(behaviour: Behaviour) -> None:
     """Stop the running nodes of a behaviour, also after an exception of a node; then shut all nodes down."""
     errors = []
     for node in (behaviour, *behaviour.iterate()):

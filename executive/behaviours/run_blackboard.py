@@ -22,8 +22,8 @@ _STORAGE_BY_CLOCK: WeakKeyDictionary[Clock, dict[str, object]] = WeakKeyDictiona
 class RunBlackboard:
     """Context manager; in the `with` block, the blackboard of py_trees contains the data of one run.
 
-    The values belong to the run. The clients and their keys belong to this object, so that no client of a
-    discarded behaviour remains.
+    The values belong to the run. The clients and the metadata of keys belong to this object and are discarded
+    with it, so that no client of a discarded behaviour remains.
 
     Args:
         clock: Clock of the run.
@@ -38,13 +38,13 @@ class RunBlackboard:
 
     def __enter__(self) -> None:
         _LOCK.acquire()
-        self._exchange()
+        self._swap_attributes()
 
     def __exit__(self, *_: object) -> None:
-        self._exchange()
+        self._swap_attributes()
         _LOCK.release()
 
-    def _exchange(self) -> None:
+    def _swap_attributes(self) -> None:
         """Exchange the class attributes of `Blackboard` with the attributes of this object."""
         for name, value in self._attributes.items():
             self._attributes[name] = getattr(Blackboard, name)

@@ -19,8 +19,8 @@ Statuses = Literal["SUCCESS", "FAILURE", "RUNNING", "INVALID"]
 def test_arguments_have_types_defaults_and_descriptions() -> None:
     arguments = list_arguments(Painter)
     assert list(arguments) == ["name", "colour", "then", "stroke"]
-    assert (arguments["colour"].hint, arguments["colour"].default) == (Colour, ...)
-    assert (arguments["stroke"].hint, arguments["stroke"].default) == (float, 0.1)
+    assert (arguments["colour"].type, arguments["colour"].default) == (Colour, ...)
+    assert (arguments["stroke"].type, arguments["stroke"].default) == (float, 0.1)
     assert arguments["colour"].doc == "colour of the paint, which dries"
     assert arguments["then"].doc == "statuses, in order"
 
@@ -33,7 +33,7 @@ def test_arguments_that_a_constructor_passes_on_are_found() -> None:
 
 def test_types_that_cannot_be_resolved_accept_everything() -> None:
     arguments = list_arguments(Untyped)
-    assert {name: argument.hint for name, argument in arguments.items()} == {"thing": Any, "other": Any}
+    assert {name: argument.type for name, argument in arguments.items()} == {"thing": Any, "other": Any}
 
 
 @pytest.mark.parametrize(
@@ -68,6 +68,10 @@ def test_a_mission_names_members_and_contains_plain_values(hint: object, expecte
         (None, Status | None, None),
         ("a", str | Status, "a"),
         ([1, 2], list[int], [1, 2]),
+        (["BLUE", "FAILURE"], tuple[Colour, Status], [Colour.BLUE, Status.FAILURE]),
+        (["BLUE", "RED"], tuple[Colour, ...], [Colour.BLUE, Colour.RED]),
+        ({"edge": "RED"}, dict[str, Colour], {"edge": Colour.RED}),
+        ({"edge": ["RED"]}, Mapping[str, Sequence[Colour]], {"edge": [Colour.RED]}),
         (3, Any, 3),
     ],
 )
@@ -77,5 +81,5 @@ def test_names_become_members(value: object, hint: object, expected: object) -> 
 
 def test_the_status_queue_gets_statuses() -> None:
     arguments = list_arguments(StatusQueue)
-    assert to_argument(["RUNNING"], arguments["queue"].hint) == [Status.RUNNING]
-    assert to_argument("SUCCESS", arguments["eventually"].hint) is Status.SUCCESS
+    assert to_argument(["RUNNING"], arguments["queue"].type) == [Status.RUNNING]
+    assert to_argument("SUCCESS", arguments["eventually"].type) is Status.SUCCESS

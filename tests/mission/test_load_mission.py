@@ -137,7 +137,7 @@ BUSH = "".join(f"  t{i}: [{', '.join([f'{{use: t{i + 1}}}'] * 10)}]\n" for i in 
         (f"tree: {{use: t0}}\ntrees:\n{BUSH}  t8: Look\n", r"error\[too-large\].*the tree has more than 5000 nodes"),
         ("tree: " + "{invert: " * 45 + "Look" + "}" * 45 + "\n", "the tree is more than 40 levels deep"),
         (f"tree: {{repeat: {{times: {'9' * 40}, do: Look}}}}\n", r"repeat\.times must be a whole number"),
-        (f"params: {{a: {{default: 1, min: 0x{'f' * 298}}}}}\ntree: {{repeat: {{times: $a, do: Look}}}}\n", r'min of the param "a" must be a number'),
+        (f"params: {{a: {{default: 1, min: 0x{'f' * 298}}}}}\ntree: {{repeat: {{times: $a, do: Look}}}}\n", r'min of the param "a" must be a finite number'),
     ],
     ids=["a bush", "a deep tree", "40 digits", "298 digits"],
 )  # fmt: skip

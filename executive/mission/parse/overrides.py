@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from executive.cell.config import CellConfig
 from executive.mission.findings import Finding, make_error, suggest_choice
-from executive.mission.source import Source, Span
+from executive.mission.source import Source
 from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, parse_yaml
 
 CELL_PREFIX = "cell."
@@ -22,13 +22,11 @@ def make_override_source(key: str, value: str) -> Source:
 def parse_override(key: str, value: str, is_text: bool = False) -> tuple[YamlNode | None, list[Finding]]:
     """Return YAML node (None after an error) and findings; if `is_text` is True, the value is not parsed."""
     source = make_override_source(key, value)
-    span = source.make_span(1, len(key) + 2, max(1, len(value)))
     if is_text or not value.strip():
+        span = source.make_span(1, len(key) + 2, max(1, len(value)))
         return YamlScalar(span, value if is_text else None, value), []
-    # Blanks replace `key=`, so that the columns of findings are correct.
-    root, yaml_findings = parse_yaml(Source("--set", " " * (len(key) + 1) + value))
-    findings = [replace(finding, excerpt=source.text) for finding in yaml_findings]
-    return (_replace_spans(root, span) if root else None), findings
+    # Blanks replace `key=`, so that the positions in the source are correct.
+    return parse_yaml(source, " " * (len(key) + 1) + value)
 
 
 def override_cell(root: YamlNode, overrides: Mapping[str, str]) -> tuple[YamlNode, list[Finding]]:
@@ -73,14 +71,3 @@ def _replace_value(root: YamlNode, path: list[str], value: YamlNode, findings: l
         new_entry = YamlEntry(replace(entry.key, span=value.span), value)
     entries = [new_entry if candidate is entry else candidate for candidate in root.entries]
     return replace(root, entries=tuple(entries))
-
-
-def _replace_spans(node: YamlNode, span: Span) -> YamlNode:
-    """Return the node with `span` as the position of the node and of all nodes below."""
-    if isinstance(node, YamlScalar):
-        return replace(node, span=span)
-    if isinstance(node, YamlMapping):
-        keys = [replace(entry.key, span=span) for entry in node.entries]
-        values = [_replace_spans(entry.value, span) for entry in node.entries]
-        return replace(node, span=span, entries=tuple(map(YamlEntry, keys, values)))
-    return replace(node, span=span, items=tuple(_replace_spans(item, span) for item in node.items))

@@ -119,9 +119,12 @@ def list_children(node: YamlNode) -> tuple[YamlNode, ...]:
     return node.items if isinstance(node, YamlSequence) else ()
 
 
-def parse_yaml(source: Source) -> tuple[YamlNode | None, list[Finding]]:
-    """Return the root node, or None if an error prevents a complete tree, and the findings."""
-    composer = _Composer(source)
+def parse_yaml(source: Source, text: str | None = None) -> tuple[YamlNode | None, list[Finding]]:
+    """Return the root node, or None if an error prevents a complete tree, and the findings.
+
+    `text` is the YAML text at the same positions as in the source; by default the text of the source.
+    """
+    composer = _Composer(source, source.text if text is None else text)
     try:
         root = composer.read_document()
     except yaml.MarkedYAMLError as error:
@@ -140,11 +143,11 @@ class _IncompleteTree(Exception):
 class _Composer:
     """Composer of the tree of nodes from PyYAML's events, which collects findings."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, text: str) -> None:
         self.source = source
         self.findings: list[Finding] = []
         # Unlike the parser of libyaml, the Python parser has the same messages in every installation.
-        self._events: Iterator[yaml.Event] = yaml.parse(source.text, Loader=yaml.SafeLoader)
+        self._events: Iterator[yaml.Event] = yaml.parse(text, Loader=yaml.SafeLoader)
         # Node of each anchor, and number of keys and values in the node.
         self._anchors: dict[str, tuple[YamlNode, int]] = {}
         self._node_count = 0
