@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from enum import Enum
 from itertools import repeat
 from types import NoneType, UnionType
@@ -14,30 +14,22 @@ from typing import Any, Literal, TypeGuard, Union, cast, get_args, get_origin, g
 from py_trees.behaviour import Behaviour
 from py_trees.ports import PortsMixin
 
-_PLAIN_TYPES = (str, int, float, bool, NoneType, list, tuple, dict, Any)
+from executive.skill import Param, param
+
+_PLAIN_TYPES = (str, int, float, bool, NoneType, list, tuple, dict, set, frozenset, Any)
 """Types without type arguments that are allowed for values in a mission."""
-_CONTAINERS = {list: list, tuple: tuple, dict: dict, Sequence: list, Mapping: dict}
+_CONTAINERS = {
+    list: list, tuple: tuple, dict: dict, set: set, frozenset: frozenset, Sequence: list, Mapping: dict,
+}  # fmt: skip
 """Type of the values in a mission, by the origin of a declared type with type arguments."""
 
 
-@dataclass(frozen=True)
-class ConstructorArgument:
-    """An argument of the constructor of a behaviour.
+def list_arguments(behaviour: type[Behaviour]) -> dict[str, Param]:
+    """Return the arguments of a constructor by name, with the types and defaults of their declarations.
 
-    Attributes:
-        type: Declared type.
-        default: Default value; `...` for a required argument.
-        doc: Description in the docstring of the behaviour, or "".
+    The arguments include those of base classes that the constructor accepts as `**kwargs`.
     """
-
-    type: object
-    default: object
-    doc: str
-
-
-def list_arguments(behaviour: type[Behaviour]) -> dict[str, ConstructorArgument]:
-    """Return the constructor arguments by name, with those of base classes that it accepts as `**kwargs`."""
-    arguments: dict[str, ConstructorArgument] = {}
+    arguments: dict[str, Param] = {}
     for owner in behaviour.__mro__:
         if "__init__" not in vars(owner) or owner is PortsMixin:
             continue
@@ -50,8 +42,8 @@ def list_arguments(behaviour: type[Behaviour]) -> dict[str, ConstructorArgument]
         for parameter in parameters:
             if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY):
                 default = ... if parameter.default is parameter.empty else parameter.default
-                description = _find_description(owner, parameter.name)
-                argument = ConstructorArgument(hints.get(parameter.name, Any), default, description)
+                argument = param(default, doc=_find_description(owner, parameter.name))
+                argument = replace(argument, name=parameter.name, type=hints.get(parameter.name, Any))
                 arguments.setdefault(parameter.name, argument)
         if all(parameter.kind is not parameter.VAR_KEYWORD for parameter in parameters):
             break
@@ -84,7 +76,7 @@ def to_argument(value: object, declared_type: object) -> object:
     if origin in (Union, UnionType):
         candidates = (to_argument(value, part) for part in parts)
         return next((candidate for candidate in candidates if candidate is not value), value)
-    if origin in _CONTAINERS and isinstance(value, list | tuple):
+    if origin in _CONTAINERS and isinstance(value, list | tuple | set | frozenset):
         has_one_type = len(parts) == 1 or ... in parts
         item_types = repeat(parts[0]) if has_one_type else parts
         return type(value)(map(to_argument, value, item_types))

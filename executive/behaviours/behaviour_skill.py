@@ -14,11 +14,11 @@ from py_trees.behaviours import ProbabilisticBehaviour
 from py_trees.common import Status
 from py_trees.ports import PortInformation, PortsMixin
 
-from executive.behaviours.arguments import ConstructorArgument, find_mission_type, list_arguments, to_argument
+from executive.behaviours.arguments import find_mission_type, list_arguments, to_argument
 from executive.behaviours.run_blackboard import RunBlackboard
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Fault, InputError
-from executive.skill import Direction, Param, Port, Skill, get_attribute_name, param
+from executive.skill import Direction, Param, Port, Skill, get_attribute_name
 
 NAME_ARGUMENT = "name"
 """Constructor argument for the name of the behaviour; missions cannot set this argument."""
@@ -38,7 +38,7 @@ class BehaviourSkill(Skill):
     """
 
     behaviour_type: ClassVar[type[Behaviour]]
-    arguments: ClassVar[Mapping[str, ConstructorArgument]]
+    arguments: ClassVar[Mapping[str, Param]]
     reasons: ClassVar = ("failed",)
 
     def __init__(self, **values: Any) -> None:
@@ -130,7 +130,7 @@ def make_behaviour_skill(name: str, behaviour_type: type[Behaviour]) -> type[Beh
     return cast("type[BehaviourSkill]", type(name, (BehaviourSkill,), members))
 
 
-def _make_params(arguments: Mapping[str, ConstructorArgument]) -> Iterator[tuple[str, Param]]:
+def _make_params(arguments: Mapping[str, Param]) -> Iterator[tuple[str, Param]]:
     """Yield name and declaration of the param for each argument that a mission can set."""
     for name, argument in arguments.items():
         mission_type, default = find_mission_type(argument.type), argument.default
@@ -138,7 +138,7 @@ def _make_params(arguments: Mapping[str, ConstructorArgument]) -> Iterator[tuple
             # The default is documentation: the constructor applies the real default.
             default = default.name if isinstance(default, Enum) else default
             default = default if default is ... or isinstance(default, str | int | float) else None
-            yield name, replace(param(default, doc=argument.doc), name=name, type=mission_type)
+            yield name, replace(argument, type=mission_type, default=default)
         elif name != NAME_ARGUMENT and default is ...:
             raise InputError(
                 f'needs the argument "{name}", and no mission can contain a value of its type; '

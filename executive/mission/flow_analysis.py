@@ -97,31 +97,24 @@ class FlowAnalysis:
         if skill is None:
             return make_unknown_flow(node.skill, node.path)
         precondition, postcondition = skill.tool_state
-        if skill.is_condition:
-            return self._compute_condition_flow(node, skill, state)
         state = state.apply_precondition(precondition, node.path)
         outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
         final_state = state.with_arm_moved() if skill.moves else state
-        success = final_state.with_variables(outputs).apply_success(postcondition, node.path)
+        success_state = final_state.with_variables(outputs)
+        apply_success = success_state.apply_observation if skill.is_condition else success_state.apply_success
+        # A condition does not fill the tool: after its failure, a tool that was empty is still empty.
+        may_be_holding = state.tool_states is None or state.find_tool_state(HOLDING) is not None
+        left_states = skill.tool_state_after_failure if may_be_holding or not skill.is_condition else {}
         end_states = {
-            key: final_state.apply_failure(skill.tool_state_after_failure.get(key), node.path)
+            key: final_state.apply_failure(left_states.get(key), node.path)
             for key in (*skill.reasons, HALT_KEY)
         }
         failures = {PossibleFailure(node.skill, key, node.path): end_states[key] for key in skill.reasons}
+        success = apply_success(postcondition, node.path)
         if skill.is_instantaneous():
             return Flow(success, failures, None)
         halted = end_states[HALT_KEY]
         return Flow(None, {}, halted) if self._is_first_tick else Flow(success, failures, halted)
-
-    def _compute_condition_flow(self, node: SkillNode, skill: type[Skill], state: FlowState) -> Flow:
-        # A condition does not fill the tool: after its failure, a tool that was empty is still empty.
-        may_be_holding = state.tool_states is None or state.find_tool_state(HOLDING) is not None
-        left_states = skill.tool_state_after_failure if may_be_holding else {}
-        failures = {
-            PossibleFailure(node.skill, key, node.path): state.apply_failure(left_states.get(key), node.path)
-            for key in skill.reasons
-        }
-        return Flow(state.apply_observation(skill.tool_state[1], node.path), failures, None)
 
     def _compute_subtree_flow(self, node: SubtreeNode, body: Node, state: FlowState) -> Flow:
         flow = self._analyse(body, state)

@@ -128,6 +128,11 @@ class CheckContext:
         add_uses_below(self.tree, None)
         return uses
 
+    def locate_skill(self, node: SkillNode) -> tuple[str, Span]:
+        """Return the name and the position of a skill in messages; for a skill in a library, of the `use`."""
+        use = self.library_uses_by_path.get(node.path)
+        return (f'{node.skill} in the subtree "{use.name}"', use.span) if use else (node.skill, node.span)
+
     def make_unknown_param_hint(self, reference: Reference) -> str:
         """Return the hint for a reference to a variable where only a param or an argument is allowed."""
         params = self.mission.params

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from executive.cell.protocols import MinTimes
 from executive.mission.check.context import CheckContext
 from executive.mission.model.conversion import WrongType, convert_value
 from executive.mission.model.instance import get_mission_node, has_valid_constants, make_inspection_instance
@@ -43,29 +42,7 @@ def _compute_min_time_of_skill(context: CheckContext, node: SkillNode) -> float:
     state = context.flow_analysis.entry_states.get(node.path)
     tool_states = state.tool_states if state else None
     may_have_moved = tool_states is None or any(tool_state.has_arm_moved for tool_state in tool_states)
-    min_times = context.min_times
     if skill.tool_state[0] is HOLDING and may_have_moved:
-        # The duration of a transport has a lower bound only if the arm starts at the place of the grasp.
-        min_times = _MinTimesFromAnyPose(min_times)
-    return skill.min_time(min_times, values)
-
-
-class _MinTimesFromAnyPose:
-    """Minimum times of a cell if a transport may start at any pose of the arm."""
-
-    def __init__(self, min_times: MinTimes) -> None:
-        self._min_times = min_times
-
-    @property
-    def descent_time(self) -> float:
-        """Minimum time of the descent until contact at the end of an approach [s]."""
-        return self._min_times.descent_time
-
-    def get_transport_time(self, bin: str | None) -> float:
-        """Return 0 [s], because the transport may start above the bin."""
-        del bin
-        return 0.0
-
-    def get_answer_time(self, detector: str) -> float:
-        """Return the minimum time from a frame to the answer of a detector [s]."""
-        return self._min_times.get_answer_time(detector)
+        # A transport may start above its bin. The minimum time of a transport to an unknown bin is 0.
+        values |= {port.name: "" for port in skill.ports.values() if port.refers_to == "bin"}
+    return skill.min_time(context.min_times, values)

@@ -34,9 +34,7 @@ def find_shared_resources(context: CheckContext) -> Iterator[Finding]:
             conflicts = {(users[name].span, later_users[name].span): name for name in shared_resources}
             for resource in conflicts.values():
                 user, later_user = users[resource], later_users[resource]
-                use = context.library_uses_by_path.get(later_user.path)
-                span = use.span if use else later_user.span
-                name = f'{later_user.skill} in the subtree "{use.name}"' if use else later_user.skill
+                name, span = context.locate_skill(later_user)
                 message = (
                     f"{name} uses the {resource}, and {user.skill} in "
                     f"{user.span.describe_place(span.source)} "

@@ -42,9 +42,7 @@ def check_tool_states(context: CheckContext) -> Iterator[Finding]:
         if not isinstance(node, SkillNode) or node.skill not in context.skills:
             continue
         required_state = context.skills[node.skill].tool_state[0]
-        use = context.library_uses_by_path.get(path)
-        span = use.span if use else node.span
-        name = f'{node.skill} in the subtree "{use.name}"' if use else node.skill
+        name, span = context.locate_skill(node)
         if required_state is EMPTY and (tool := entry_state.find_tool_state(HOLDING)):
             message = f"{name} needs an empty tool, but the tool may hold an object here"
             explanation = _explain_tool_state(flow, tool, span)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from executive.mission.check.context import CheckContext, VariableRead
-from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
+from executive.mission.findings import Finding, make_error, make_warning, suggest_choice
 from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import Node, SubtreeNode
 from executive.mission.model.values import Reference
-from executive.mission.model.wiring import find_control_node_outputs, find_wires, find_written_variables
+from executive.mission.model.wiring import find_control_node_outputs, find_written_variables
 from executive.mission.source import Span
 from executive.skill import Direction
 
@@ -130,13 +130,12 @@ def _describe_writers(context: CheckContext, variable: str, span: Span) -> str:
 
 def _list_writers(context: CheckContext, variable: str, span: Span) -> list[str]:
     """Return each skill that writes a variable, for a message at `span`: `Grasp in line 3`."""
-    nodes = [
-        node
-        for node, skill in context.iterate_installed_skills()
-        if any(wire.variable == variable for wire in find_wires(node, skill, Direction.OUT))
+    wires = [
+        (node, wire) for node in context.iterate_nodes() for wire in context.find_wires(node, Direction.OUT)
     ]
-    nodes.sort(key=lambda node: node.span.line)
-    return list(dict.fromkeys(f"{node.skill} in {node.span.describe_place(span.source)}" for node in nodes))
+    nodes = [(node.span, wire.skill) for node, wire in wires if wire.variable == variable]
+    nodes.sort(key=lambda node: node[0].line)
+    return list(dict.fromkeys(f"{skill} in {place.describe_place(span.source)}" for place, skill in nodes))
 
 
 def _suggest_writers(context: CheckContext, variable: str, span: Span) -> str:
@@ -157,10 +156,8 @@ def _make_unwritten_hint(context: CheckContext, read: VariableRead) -> str:
         return f"It is written by: {skills}."
     if not read.is_explicit:
         return f"Set {read.input_name}."
-    global_names = sorted(name for name in context.written_variables if "." not in name)
-    similar = find_similar_word(variable, global_names)
-    names = ", ".join(f"${name}" for name in global_names) or "none"
-    return (f'Did you mean "${similar}"? ' if similar else "") + f"Variables that are written: {names}."
+    global_names = sorted(f"${name}" for name in context.written_variables if "." not in name)
+    return suggest_choice(f"${variable}", global_names, "Variables that are written")
 
 
 def list_skills_with_output(context: CheckContext, name: str) -> str:

@@ -5,22 +5,16 @@ from __future__ import annotations
 import functools
 import json
 import math
-import types
-import typing
-from typing import Any, Union, cast, get_args, get_origin
+from typing import cast
 
 from pydantic import TypeAdapter, ValidationError
 
+from executive.behaviours.arguments import find_mission_type
 from executive.mission.descriptions import describe_validation_error, describe_value
 from executive.mission.findings import suggest_word
 from executive.mission.model.port_types import is_assignable
 from executive.skill import Param, Port
 from executive.tree.keys import Key
-
-_SIMPLE_TYPES = (str, int, float, bool, type(None), Any, Ellipsis)
-"""Types without type arguments; Ellipsis occurs as an argument of `tuple`."""
-_CONTAINER_TYPES = (tuple, list, dict, frozenset, set)
-"""Types that may have type arguments."""
 
 
 class WrongType(Exception):
@@ -37,11 +31,7 @@ class WrongType(Exception):
 
 def is_plain_type(declared_type: object) -> bool:
     """Return True if values of this type can be written in a mission file."""
-    origin = get_origin(declared_type)
-    if declared_type in _SIMPLE_TYPES or declared_type in _CONTAINER_TYPES or origin is typing.Literal:
-        return True
-    is_compound = origin in (Union, types.UnionType, *_CONTAINER_TYPES)
-    return is_compound and all(is_plain_type(part) for part in get_args(declared_type))
+    return find_mission_type(declared_type) == declared_type
 
 
 def find_problem(value: object, declaration: Param | Port) -> WrongType | None:

@@ -57,16 +57,17 @@ def read_control_node(
 
     `entry` is the entry of the mapping with the keyword; the other entries have sibling keys.
     """
-    key_reader = _KeyReader(parser)
     keyword, span, sibling_keys = entry.key.text, entry.key.span, find_sibling_keys(node_class)
     siblings = tuple(sibling for sibling in mapping.entries if sibling.key.text in sibling_keys)
     values = {
-        **key_reader.read_inner_keys(keyword, span, entry.value, node_class),
-        **key_reader.read_keys(keyword, span, replace(mapping, entries=siblings), sibling_keys),
+        **_read_inner_keys(parser, keyword, span, entry.value, node_class),
+        **_read_keys(parser, keyword, span, replace(mapping, entries=siblings), sibling_keys),
     }
     any_of = node_class.any_of
-    given_keys = {*mapping.keys, *(entry.value.keys if isinstance(entry.value, YamlMapping) else ())}
-    if key_reader.is_mapping_valid and any_of and given_keys.isdisjoint(any_of):
+    inner_keys = entry.value.keys if isinstance(entry.value, YamlMapping) else ()
+    # If the value has no keys, but must have keys, another error reports this.
+    may_have_keys = isinstance(entry.value, YamlMapping) or find_shorthand_key(node_class) is not None
+    if any_of and may_have_keys and not {*mapping.keys, *inner_keys} & {*any_of}:
         level = f" at the level of {keyword}" if set(any_of) <= set(sibling_keys) else ""
         alternatives = " or ".join(f'"{name}"' for name in any_of)
         parser.add_error(span, "missing-key", f"{keyword} needs {alternatives}{level}")
@@ -79,114 +80,113 @@ def read_control_node(
     return InnerNode(span, label, node_class, values)
 
 
-class _KeyReader:
-    """Reader of the keys of one control node.
+def _read_inner_keys(
+    parser: NodeParser, name: str, span: Span, value: YamlNode, owner: KeyClass
+) -> dict[str, KeyValue]:
+    """Return the values of the keys of `owner`; `value` is the YAML node below the keyword `name`."""
+    shorthand_key, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
+    is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
+    # A mapping could also be a node in the shorthand form, but is always read as inner keys.
+    is_scalar_for_list = is_list_required and isinstance(value, YamlScalar)
+    reads_inner_keys = isinstance(value, YamlMapping) or is_scalar_for_list  # an error names the keys
+    if shorthand_key is not None and not (reads_inner_keys and inner_keys):
+        key_node = YamlScalar(span, name, shorthand_key.name)
+        value = YamlMapping(span, (YamlEntry(key_node, value),))
+        inner_keys = {shorthand_key.name: shorthand_key}
+    return _read_keys(parser, name, span, value, inner_keys)
 
-    Attributes:
-        is_mapping_valid: False if the body of the node or of a section must be a mapping, but is not.
-    """
 
-    def __init__(self, parser: NodeParser) -> None:
-        self.parser = parser
-        self.is_mapping_valid = True
+def _read_keys(
+    parser: NodeParser, name: str, span: Span, mapping: YamlNode, keys: Mapping[str, Key]
+) -> dict[str, KeyValue]:
+    """Return the valid values of `keys` in a mapping; a missing required node is an invalid node."""
+    reader = MappingReader(name, span, mapping, keys, parser.findings)
+    values: dict[str, KeyValue] = {}
+    for key in keys.values():
+        if (node := reader.get(key.name)) is not None:
+            value = _read_value(parser, reader, key, node)
+            values |= {} if value is None else {key.name: value}
+        elif key.kind is KeyKind.NODE and key.is_required:
+            values[key.name] = InvalidNode(span, "")
+    return values
 
-    def read_inner_keys(self, name: str, span: Span, value: YamlNode, owner: KeyClass) -> dict[str, KeyValue]:
-        """Return the values of the keys of `owner`; `value` is the YAML node below the keyword `name`."""
-        shorthand_key, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
-        is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
-        # A mapping could also be a node in the shorthand form, but is always read as inner keys.
-        is_scalar_for_list = is_list_required and isinstance(value, YamlScalar)
-        reads_inner_keys = isinstance(value, YamlMapping) or is_scalar_for_list  # an error names the keys
-        if shorthand_key is not None and not (reads_inner_keys and inner_keys):
-            key_node = YamlScalar(span, name, shorthand_key.name)
-            value = YamlMapping(span, (YamlEntry(key_node, value),))
-            inner_keys = {shorthand_key.name: shorthand_key}
-        return self.read_keys(name, span, value, inner_keys)
 
-    def read_keys(
-        self, name: str, span: Span, mapping: YamlNode, keys: Mapping[str, Key]
-    ) -> dict[str, KeyValue]:
-        """Return the valid values of `keys` in a mapping; a missing required node is an invalid node."""
-        reader = MappingReader(name, span, mapping, keys, self.parser.findings)
-        self.is_mapping_valid = self.is_mapping_valid and reader.is_mapping
-        values: dict[str, KeyValue] = {}
-        for key in keys.values():
-            if (node := reader.get(key.name)) is not None:
-                value = self._read_value(reader, key, node)
-                values |= {} if value is None else {key.name: value}
-            elif key.kind is KeyKind.NODE and key.is_required:
-                values[key.name] = InvalidNode(span, "")
-        return values
+def _read_value(parser: NodeParser, reader: MappingReader, key: Key, node: YamlNode) -> KeyValue | None:
+    """Return the value of a key, or None after an error and for an omitted optional child."""
+    span = reader.get_key_span(key.name)
+    match key.kind:
+        case KeyKind.NODE:
+            is_omitted = is_empty(node) and key.shorthand and not key.is_required
+            return None if is_omitted else parser.read_node(node, span)
+        case KeyKind.NODES:
+            return _read_nodes(parser, reader, key, node)
+        case KeyKind.REASONS:
+            return reader.read_failure_names(key.name)
+        case KeyKind.REASONS_OR_SECTIONS:
+            return _read_reasons_or_sections(parser, reader, key)
+        case KeyKind.VARIABLE:
+            return _read_variable(parser, reader, key.name)
+        case KeyKind.SECTION:
+            return _read_section(parser, key, node, span)
+        case KeyKind.SECTIONS:
+            return tuple(_read_sections(parser, key, node))
+    return read_value(node, parser.findings)
 
-    def _read_value(self, reader: MappingReader, key: Key, node: YamlNode) -> KeyValue | None:
-        """Return the value of a key, or None after an error and for an omitted optional child."""
-        span = reader.get_key_span(key.name)
-        match key.kind:
-            case KeyKind.NODE:
-                is_omitted = is_empty(node) and key.shorthand and not key.is_required
-                return None if is_omitted else self.parser.read_node(node, span)
-            case KeyKind.NODES:
-                return self._read_nodes(reader, key, node)
-            case KeyKind.REASONS:
-                return reader.read_failure_names(key.name)
-            case KeyKind.REASONS_OR_SECTIONS:
-                return self._read_reasons_or_sections(reader, key)
-            case KeyKind.VARIABLE:
-                return self._read_variable(reader, key.name)
-            case KeyKind.SECTION:
-                return self._read_section(key, node, span)
-            case KeyKind.SECTIONS:
-                return tuple(self._read_sections(key, node))
-        return read_value(node, self.parser.findings)
 
-    def _read_nodes(self, reader: MappingReader, key: Key, value: YamlNode) -> tuple[Node, ...] | None:
-        nodes = self.parser.read_nodes(value, reader.owner)
-        if key.max_count is not None and len(nodes) > key.max_count:
-            message = f"{reader.owner} has {len(nodes)} branches, but may have at most {key.max_count}"
-            self.parser.add_error(reader.span, "too-large", message)
+def _read_nodes(
+    parser: NodeParser, reader: MappingReader, key: Key, value: YamlNode
+) -> tuple[Node, ...] | None:
+    nodes = parser.read_nodes(value, reader.owner)
+    if key.max_count is not None and len(nodes) > key.max_count:
+        message = f"{reader.owner} has {len(nodes)} branches, but may have at most {key.max_count}"
+        parser.add_error(reader.span, "too-large", message)
+        return None
+    return nodes or None
+
+
+def _read_variable(parser: NodeParser, reader: MappingReader, key: str) -> LocatedName | None:
+    """Return the output variable of a key; for `$name`, add an error and return the variable `name`."""
+    variable = LocatedName(reader.read_text(key), reader.get_value_span(key))
+    if NAME_PATTERN.fullmatch(variable.name):
+        return variable
+    hint = f"Write the name without $, for example {key}: target; $target is then the value."
+    message = f'"{variable.name}" is no valid name of a variable'
+    parser.add_error(variable.span, "bad-name", message, hint)
+    name = variable.name.removeprefix("$")
+    return LocatedName(name, variable.span) if NAME_PATTERN.fullmatch(name) else None
+
+
+def _read_reasons_or_sections(
+    parser: NodeParser, reader: MappingReader, key: Key
+) -> tuple[FailureName | NodeSection, ...]:
+    """Return the failure names and the sections in the list or single value of a key."""
+    mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
+    sections = [_read_section(parser, key, item, item.span) for item in mappings]
+    names = reader.read_failure_names(key.name, tuple(key.section.keys))
+    return (*names, *(section for section in sections if section is not None))
+
+
+def _read_section(parser: NodeParser, key: Key, value: YamlNode, span: Span) -> NodeSection | None:
+    """Return the section below a key, or None if the section lacks a required constant."""
+    values = _read_inner_keys(parser, key.name, span, value, key.section)
+    if key.section.any_of and isinstance(value, YamlMapping) and not value.entries:
+        alternatives = " or ".join(f'"{name}"' for name in key.section.any_of)
+        parser.add_error(span, "missing-key", f"{key.name} needs {alternatives}")
+    for name, inner_key in key.section.keys.items():
+        if inner_key.is_required and inner_key.kind is KeyKind.CONSTANT and name not in values:
             return None
-        return nodes or None
+    return NodeSection(key.section, span, values)
 
-    def _read_variable(self, reader: MappingReader, key: str) -> LocatedName | None:
-        """Return the output variable of a key; for `$name`, add an error and return the variable `name`."""
-        variable = LocatedName(reader.read_text(key), reader.get_value_span(key))
-        if NAME_PATTERN.fullmatch(variable.name):
-            return variable
-        hint = f"Write the name without $, for example {key}: target; $target is then the value."
-        message = f'"{variable.name}" is no valid name of a variable'
-        self.parser.add_error(variable.span, "bad-name", message, hint)
-        name = variable.name.removeprefix("$")
-        return LocatedName(name, variable.span) if NAME_PATTERN.fullmatch(name) else None
 
-    def _read_reasons_or_sections(
-        self, reader: MappingReader, key: Key
-    ) -> tuple[FailureName | NodeSection, ...]:
-        """Return the failure names and the sections in the list or single value of a key."""
-        mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
-        sections = [self._read_section(key, item, item.span) for item in mappings]
-        names = reader.read_failure_names(key.name, tuple(key.section.keys))
-        return (*names, *(section for section in sections if section is not None))
-
-    def _read_section(self, key: Key, value: YamlNode, span: Span) -> NodeSection | None:
-        """Return the section below a key, or None if the section lacks a required constant."""
-        values = self.read_inner_keys(key.name, span, value, key.section)
-        if key.section.any_of and isinstance(value, YamlMapping) and not value.entries:
-            alternatives = " or ".join(f'"{name}"' for name in key.section.any_of)
-            self.parser.add_error(span, "missing-key", f"{key.name} needs {alternatives}")
-        for name, inner_key in key.section.keys.items():
-            if inner_key.is_required and inner_key.kind is KeyKind.CONSTANT and name not in values:
-                return None
-        return NodeSection(key.section, span, values)
-
-    def _read_sections(self, key: Key, value: YamlNode) -> Iterable[NodeSection]:
-        """Yield the sections of a list, or a single section."""
-        section_kind = "mapping with " + " and ".join(f'"{name}"' for name in key.section.keys)
-        if not isinstance(value, YamlSequence | YamlMapping):
-            message = f"{key.name} must be a {section_kind}, or a list of those, not {describe_node(value)}"
-            self.parser.add_error(value.span, "wrong-type", message)
-            return
-        if isinstance(value, YamlSequence) and not value.items:
-            self.parser.add_error(value.span, "empty-list", f"{key.name} needs at least one {section_kind}")
-        for item in value.items if isinstance(value, YamlSequence) else (value,):
-            if (section := self._read_section(key, item, item.span)) is not None:
-                yield section
+def _read_sections(parser: NodeParser, key: Key, value: YamlNode) -> Iterable[NodeSection]:
+    """Yield the sections of a list, or a single section."""
+    section_kind = "mapping with " + " and ".join(f'"{name}"' for name in key.section.keys)
+    if not isinstance(value, YamlSequence | YamlMapping):
+        message = f"{key.name} must be a {section_kind}, or a list of those, not {describe_node(value)}"
+        parser.add_error(value.span, "wrong-type", message)
+        return
+    if isinstance(value, YamlSequence) and not value.items:
+        parser.add_error(value.span, "empty-list", f"{key.name} needs at least one {section_kind}")
+    for item in value.items if isinstance(value, YamlSequence) else (value,):
+        if (section := _read_section(parser, key, item, item.span)) is not None:
+            yield section

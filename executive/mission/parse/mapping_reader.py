@@ -40,7 +40,6 @@ class MappingReader:
         owner: Name, in messages, of the node, key or file to which the mapping belongs.
         span: Position of the owner, for findings about missing keys.
         findings: List to which the reader adds its findings.
-        is_mapping: True if the YAML node is a mapping.
     """
 
     def __init__(
@@ -52,17 +51,17 @@ class MappingReader:
         findings: list[Finding],
     ) -> None:
         self.owner, self.span, self.findings = owner, span, findings
-        self.is_mapping = isinstance(node, YamlMapping)
         self._mapping = node if isinstance(node, YamlMapping) else YamlMapping(node.span, ())
-        if not self.is_mapping:
+        if not isinstance(node, YamlMapping):
             message = f"{owner} must be a mapping, not {describe_node(node)}"
             self.add_error(node.span, "wrong-type", message, f"Its keys: {', '.join(keys)}.")
+            return
         for entry in self._mapping.entries:
             if entry.key.text not in keys:
                 hint = suggest_choice(entry.key.text, keys, "Allowed keys")
                 self.add_error(entry.key.span, "unknown-key", f'{owner} has no key "{entry.key.text}"', hint)
         for name, key in keys.items():
-            if self.is_mapping and key.is_required and self.get(name) is None:
+            if key.is_required and self.get(name) is None:
                 self.add_error(span, "missing-key", f'{owner} needs the key "{name}"')
 
     def get(self, key: str) -> YamlNode | None:

@@ -173,16 +173,16 @@ class NodeParser:
         if isinstance(path, Literal) and isinstance(path.value, str):
             try:
                 skill = load_behaviour(path.value)
+                name = skill.__name__
+                if {**self._skills, **self.behaviours}.get(name, skill) is not skill:
+                    advice = "register this class as a skill under another name"
+                    raise InputError(f'there is another skill "{name}"; {advice}')
             except InputError as error:
                 self.add_error(path.span, "unknown-behaviour", str(error))
                 return InvalidNode(span, label)
-            name = skill.__name__
-            if {**self._skills, **self.behaviours}.get(name, skill) is skill:
-                self.behaviours[name] = skill
-                return SkillNode(span, label, name, settings)
-            message = f'there is another skill "{name}"; register this class as a skill under another name'
-            self.add_error(path.span, "unknown-behaviour", message)
-        elif isinstance(path, Literal | Reference):
+            self.behaviours[name] = skill
+            return SkillNode(span, label, name, settings)
+        if isinstance(path, Literal | Reference):
             message = (
                 f"{keyword}.{class_key} must be an import path, for example py_trees.behaviours:TickCounter"
             )
