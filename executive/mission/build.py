@@ -10,7 +10,7 @@ from executive.cell.protocols import Cell
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.load import LoadedMission
-from executive.mission.model.conversion import convert_value
+from executive.mission.model.conversion import convert_setting
 from executive.mission.model.grammar import SEQUENCE_KEYWORD
 from executive.mission.model.instance import make_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
@@ -83,10 +83,11 @@ class TreeBuilder:
     def _build_skill_leaf(self, context: NodeContext, node: SkillNode) -> TreeNode:
         skill = self.skills[node.skill]
         declarations: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
-        types = {name: declaration.type for name, declaration in declarations.items()}
         input_wires = list(find_wires(node, skill, Direction.IN))
         wiring = Wiring(
-            constants={name: convert_value(value.value, types[name]) for name, value in find_literals(node)},
+            constants={
+                name: convert_setting(value.value, declarations[name]) for name, value in find_literals(node)
+            },
             inputs={wire.port.name: wire.variable for wire in input_wires},
             fields={wire.port.name: wire.field for wire in input_wires if wire.field},
             outputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.OUT)},

@@ -67,7 +67,7 @@ class LoadedMission:
     @property
     def params(self) -> dict[str, JsonValue]:
         """Values of the mission's params, with overrides."""
-        return {name: param.value.value for name, param in self.mission.params.items()}
+        return {name: cast("Literal", param.value).value for name, param in self.mission.params.items()}
 
     @property
     def routes(self) -> dict[str, tuple[str, ...]]:

@@ -12,7 +12,7 @@ from executive.skill import ANY, Direction, Skill
 
 
 def find_non_conditions(context: CheckContext, parent: InnerNode) -> Iterator[Finding]:
-    """Yield an error for every child that is no condition, under a key that takes only conditions."""
+    """Yield an error for each child that is not a condition although its key allows only conditions."""
     for key, value in iterate_keys(parent):
         for node in list_nodes(value) if key.conditions else ():
             if problem := _find_problem(context, node):
@@ -28,10 +28,10 @@ def _find_problem(context: CheckContext, node: Node) -> str:
             return problem and f'in the subtree "{node.name}", {problem}'
         case SkillNode() if node.skill in context.skills:
             skill = context.skills[node.skill]
-            effects = [*list_effects(skill), "does not declare that it changes nothing"]
+            effects = [*list_effects(skill), "is not declared as a condition (is_condition)"]
             return "" if skill.is_condition else f"{node.skill} {effects[0]}"
         case InnerNode() if not node.declaring_class.is_condition:
-            return "a list is a sequence" if node.is_list else f"{get_type_name(node)} is no condition"
+            return "a list runs as a sequence" if node.is_list else f"{get_type_name(node)} is no condition"
     return ""
 
 

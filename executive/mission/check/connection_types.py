@@ -30,14 +30,14 @@ class Writer:
         span: Position of the node.
         type: Type of the written values.
         refers_to: Kind of the written names, for example `bin` or `item`; "" if the output writes no names.
-        values: Written constants with their positions; None if the values are unknown before the run.
+        constants: Written constants; None if the values are unknown before the run.
     """
 
     name: str
     span: Span
     type: object
     refers_to: str
-    values: tuple[tuple[object, Span], ...] | None = None
+    constants: tuple[Literal, ...] | None = None
 
     def describe(self, span: Span) -> str:
         """Return name and position of the writer, for a message at `span`."""
@@ -100,8 +100,7 @@ class ElementLoop:
         if isinstance(self.elements, Literal):
             if self.elements.value == "items":
                 return [Writer(self.keyword, self.span, list[Item], "item")]
-            values = ((self.elements.value, self.elements.span),)
-            return [Writer(self.keyword, self.span, list[Any], "", values)]
+            return [Writer(self.keyword, self.span, list[Any], "", (self.elements,))]
         return list(_select_field(writers.get(self.elements.name, ()), self.elements.field))
 
     def check_lists(self, list_writers: Iterable[Writer]) -> Iterator[Finding]:
@@ -110,26 +109,27 @@ class ElementLoop:
             return
         variable, span, key = self.elements.name, self.elements.span, f"{self.keyword}.{self.key}"
         for writer in list_writers:
-            for value, value_span in writer.values or ():
-                if not isinstance(value, list):
-                    message = f"{key} takes a list, but ${variable} gets {describe_value(value)} here"
-                    hint = f"{key} reads ${variable} in {span.describe_place(value_span.source)}."
-                    yield make_error(value_span, "port-type", message, hint)
-            if writer.values is None and find_element_type(writer.type) is None:
+            for constant in writer.constants or ():
+                if not isinstance(constant.value, list):
+                    message = (
+                        f"{key} takes a list, but ${variable} gets {describe_value(constant.value)} here"
+                    )
+                    hint = f"{key} reads ${variable} in {span.describe_place(constant.span.source)}."
+                    yield make_error(constant.span, "port-type", message, hint)
+            if writer.constants is None and find_element_type(writer.type) is None:
                 message = f"{key} takes a list, but {self.elements} holds {describe_type(writer.type)}"
                 yield make_error(span, "port-type", message, f"It is written by {writer.describe(span)}.")
 
     def make_element_writers(self, list_writer: Writer) -> Iterator[Writer]:
         """Yield a writer of the elements of the list that `list_writer` writes: the control node."""
-        if list_writer.values is not None:
-            literal = self.elements if isinstance(self.elements, Literal) else None
-            values = [
-                (element, literal.get_element_span(index) if literal else span)
-                for value, span in list_writer.values
-                if isinstance(value, list)
-                for index, element in enumerate(value)
+        if list_writer.constants is not None:
+            elements = [
+                Literal(element, constant.get_element_span(index))
+                for constant in list_writer.constants
+                if isinstance(constant.value, list)
+                for index, element in enumerate(constant.value)
             ]
-            yield Writer(self.keyword, self.span, Any, "", tuple(values))
+            yield Writer(self.keyword, self.span, Any, "", tuple(elements))
         elif (element_type := find_element_type(list_writer.type)) is not None:
             yield Writer(self.keyword, self.span, element_type, list_writer.refers_to)
 
@@ -146,7 +146,7 @@ def _check_field(reader: str, reference: Reference, writers: Iterable[Writer]) -
     for writer in writers if reference.field else ():
         fields = find_fields(writer.type, writer.refers_to)
         if reference.field not in fields:
-            is_constant = writer.values is not None
+            is_constant = writer.constants is not None
             values = "a constant" if is_constant else describe_values(writer.type, writer.refers_to)
             message = f"{reader} reads {reference}, but ${reference.local_name} holds {values}"
             fields_hint = suggest_choice(reference.field, fields, "Fields") if fields else "It has no fields."
@@ -170,17 +170,15 @@ def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iter
     port_type = describe_values(port.type, port.refers_to)
     if choices and not port.refers_to:
         port_type = " or ".join(map(str, choices))
-    for value, span in writer.values or ():
-        names = context.names_in_cell_by_kind.get(port.refers_to)
-        if find_problem(value, port):
-            message = f"{wire} takes {port_type}, but ${wire.variable} gets {describe_value(value)} here"
-            hint = f"{wire} reads ${wire.variable} in {wire.span.describe_place(span.source)}."
-            yield make_error(span, "port-type", message, hint)
-        elif names is not None and isinstance(value, str) and value not in (*names, *choices):
-            message = f'the cell has no {port.refers_to} "{value}" for {wire}'
-            hint = suggest_choice(value, [*names, *choices], "Allowed names")
-            yield make_error(span, f"unknown-{port.refers_to}", message, hint)
-    if writer.values is not None:
+    for constant in writer.constants or ():
+        if find_problem(constant.value, port):
+            value = describe_value(constant.value)
+            message = f"{wire} takes {port_type}, but ${wire.variable} gets {value} here"
+            hint = f"{wire} reads ${wire.variable} in {wire.span.describe_place(constant.span.source)}."
+            yield make_error(constant.span, "port-type", message, hint)
+        else:
+            yield from find_unknown_names(context, wire.skill, port, constant)
+    if writer.constants is not None:
         return
     has_type = is_assignable(writer.type, port.type)
     if has_type and (writer.refers_to == port.refers_to if port.refers_to else not choices):
@@ -195,7 +193,9 @@ def _check_compared_constants(
     context: CheckContext, node: Node, wire: Wire, writer: Writer
 ) -> Iterator[Finding]:
     """Yield an error for each constant that a node compares with an input, and that can never be equal."""
-    for name, value in find_literals(node) if isinstance(node, SkillNode) and writer.values is None else ():
+    for name, value in (
+        find_literals(node) if isinstance(node, SkillNode) and writer.constants is None else ()
+    ):
         port = context.skills[wire.skill].ports.get(name)
         # `check_settings` reports a constant that fits no variable.
         if port is None or port.same_as != wire.port.name or find_problem(value.value, port):

@@ -9,7 +9,7 @@ from executive.mission.model.conversion import WrongType, convert_value
 from executive.mission.model.instance import get_mission_node, has_valid_constants, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.wiring import find_literals
-from executive.skill import HOLDING, Direction, Param, Port
+from executive.skill import HOLDING, Param, Port
 
 
 def compute_min_time(context: CheckContext, node: Node) -> float:
@@ -30,15 +30,18 @@ def _compute_min_time_of_skill(context: CheckContext, node: SkillNode) -> float:
     if skill is None or context.min_times is None:
         return 0.0
     declarations: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
-    if any(isinstance(wire.port, Param) for wire in context.find_wires(node, Direction.IN)):
-        return 0.0  # a variable gives the value of a param
-    values = {name: param.default for name, param in skill.params.items() if not param.is_required}
-    for name, literal in find_literals(node):
-        try:
-            values[name] = convert_value(literal.value, declarations[name].type)
-        except (KeyError, WrongType):
-            # `check_settings` reports an unknown name or a wrong type.
-            return 0.0
+    constants, params = dict(find_literals(node)), skill.params.values()
+    if any(
+        param.name not in constants for param in params if param.is_required or param.name in node.settings
+    ):
+        return 0.0  # a param has no valid value, or a variable gives the value
+    values = {param.name: param.default for param in params if not param.is_required}
+    try:
+        values |= {
+            name: convert_value(value.value, declarations[name].type) for name, value in constants.items()
+        }
+    except (KeyError, WrongType):
+        return 0.0  # `check_settings` reports unknown names and wrong types
     state = context.flow_analysis.entry_states.get(node.path)
     tool_states = state.tool_states if state else None
     may_have_moved = tool_states is None or any(tool_state.has_arm_moved for tool_state in tool_states)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from executive.mission.model.nodes import Node
-from executive.mission.model.values import Literal, LocatedName, Value
+from executive.mission.model.values import InvalidValue, Literal, LocatedName, Value
 from executive.mission.source import Span
 from executive.skill import Param
 
@@ -47,12 +47,12 @@ class MissionParam:
 
     Attributes:
         span: Position of the name.
-        value: Value in this run: the value of `--set`, otherwise the default.
+        value: Value in this run: the value of `--set`, otherwise the default; or an invalid value.
         declaration: Type, bounds and choices; the type is `Any` if it is unknown.
     """
 
     span: Span
-    value: Literal
+    value: Literal | InvalidValue
     declaration: Param
 
 

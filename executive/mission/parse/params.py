@@ -12,7 +12,7 @@ from executive.mission.findings import suggest_choice
 from executive.mission.model import grammar
 from executive.mission.model.conversion import WrongType, convert_setting, convert_value
 from executive.mission.model.mission import MissionParam
-from executive.mission.model.values import Literal
+from executive.mission.model.values import InvalidValue, Literal
 from executive.mission.parse.mapping_reader import MappingReader, make_literal
 from executive.mission.parse.overrides import CELL_PREFIX, make_override_source, parse_override
 from executive.mission.text.yaml_text import YamlMapping, to_python_value
@@ -57,10 +57,9 @@ def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> 
         le=_read_bound(reader, "max"),
         choices=None if choices is None else tuple(map(to_python_value, reader.list_items("choices"))),
     )
-    value = Literal(None, reader.span) if default is None else make_literal(default)
-    declaration = replace(declaration, type=_read_type(reader) or _infer_type(value.value))
-    # After an error, the param has a valid value, so that references to the param cause no other errors.
-    fallback = MissionParam(reader.span, Literal(_choose_valid_value(declaration), reader.span), declaration)
+    default_type = _infer_type(None if default is None else to_python_value(default))
+    declaration = replace(declaration, type=_read_type(reader) or default_type)
+    without_value = MissionParam(reader.span, InvalidValue(reader.span), declaration)
     problem = f"no value is allowed for {name}"
     if declaration.choices == ():
         reader.add_error(reader.get_value_span("choices"), "empty-list", f"{problem}: choices is empty")
@@ -68,26 +67,11 @@ def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> 
         problem = f"{problem}: min {declaration.ge:g} is greater than max {declaration.le:g}"
         reader.add_error(reader.get_value_span("min"), "out-of-range", problem)
     elif default is not None:
-        return _set_value(name, fallback, value, reader)
+        return _set_value(name, without_value, make_literal(default), reader)
     elif not is_overridden:
         message = f'the param "{name}" has neither a default nor a value'
         reader.add_error(reader.span, "missing-param", message, f"Set it with --set {name}=...")
-    return fallback
-
-
-def _choose_valid_value(declaration: Param) -> JsonValue:
-    """Return a value that the declaration of a param allows, or None if the type is unknown."""
-    if declaration.choices:
-        return cast("JsonValue", declaration.choices[0])
-    minimum = 1 if declaration.ge is None else declaration.ge
-    values: dict[object, JsonValue] = {
-        str: "",
-        int: int(minimum),
-        float: float(minimum),
-        bool: False,
-        list[Any]: [None],
-    }
-    return values.get(declaration.type)
+    return without_value
 
 
 def _read_type(reader: MappingReader) -> object:
