@@ -13,7 +13,7 @@ from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model.conversion import find_problem
 from executive.mission.model.node_paths import get_type_name
-from executive.mission.model.nodes import InnerNode, Node, SkillNode
+from executive.mission.model.nodes import InnerNode, KeyValue, Node, SkillNode
 from executive.mission.model.port_types import describe_type, find_element_type, find_fields, is_assignable
 from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import Wire, find_control_node_outputs, find_literals
@@ -57,14 +57,15 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
             skill_writers.setdefault(wire.variable, []).append(writer)
 
     def check_below(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
-        for loop in _find_element_loops(node):
+        for key, variable in find_control_node_outputs(node):
             all_writers = {**skill_writers, **loop_writers}
-            if isinstance(reference := loop.elements, Reference):
-                yield from _check_field(loop.keyword, reference, all_writers.get(reference.name, ()))
-            list_writers = loop.find_list_writers(all_writers)
-            yield from loop.check_lists(list_writers)
-            elements = [element for writer in list_writers for element in loop.make_element_writers(writer)]
-            loop_writers = {**loop_writers, loop.variable: elements}
+            elements = node.values.get(key.list_key, ()) if isinstance(node, InnerNode) else ()
+            list_writers = _find_list_writers(node, elements, all_writers)
+            if isinstance(elements, Reference):
+                keyword = get_type_name(node)
+                yield from _check_field(keyword, elements, all_writers.get(elements.name, ()))
+                yield from _check_lists(f"{keyword}.{key.list_key}", elements, list_writers)
+            loop_writers = {**loop_writers, variable.name: [*_make_element_writers(node, list_writers)]}
         for wire in context.find_wires(node, Direction.IN):
             writers = loop_writers.get(wire.variable, skill_writers.get(wire.variable, ()))
             yield from _check_field(str(wire), wire.reference, writers)
@@ -77,68 +78,44 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
     yield from check_below(context.tree, {})
 
 
-@dataclass(frozen=True)
-class ElementLoop:
-    """A control node that writes the elements of a list, one per iteration, to a variable.
+def _find_list_writers(node: Node, elements: KeyValue, writers: WritersByVariable) -> list[Writer]:
+    """Return the writers of a list; a node with a constant list counts as the writer of the list."""
+    if isinstance(elements, Reference):
+        return list(_select_field(writers.get(elements.name, ()), elements.field))
+    if not isinstance(elements, Literal):
+        return []
+    if elements.value == "items":
+        return [Writer(get_type_name(node), node.span, list[Item], "item")]
+    return [Writer(get_type_name(node), node.span, list[Any], "", (elements,))]
 
-    Attributes:
-        keyword: Keyword of the control node.
-        span: Position of the control node.
-        variable: Name of the variable.
-        key: Key of the control node for the list.
-        elements: The list, or the variable that contains the list.
-    """
 
-    keyword: str
-    span: Span
-    variable: str
-    key: str
-    elements: Literal | Reference
+def _check_lists(name: str, reference: Reference, list_writers: Iterable[Writer]) -> Iterator[Finding]:
+    """Yield an error for each writer that writes another value than a list to the value of the key `name`."""
+    for writer in list_writers:
+        for constant in writer.constants or ():
+            if not isinstance(constant.value, list):
+                message = f"{name} takes a list, but {reference} gets {describe_value(constant.value)} here"
+                hint = f"{name} reads {reference} in {reference.span.describe_place(constant.span.source)}."
+                yield make_error(constant.span, "port-type", message, hint)
+        if writer.constants is None and find_element_type(writer.type) is None:
+            message = f"{name} takes a list, but {reference} holds {describe_type(writer.type)}"
+            hint = f"It is written by {writer.describe(reference.span)}."
+            yield make_error(reference.span, "port-type", message, hint)
 
-    def find_list_writers(self, writers: WritersByVariable) -> Sequence[Writer]:
-        """Return the writers of the list; the control node itself counts as the writer of a constant list."""
-        if isinstance(self.elements, Literal):
-            if self.elements.value == "items":
-                return [Writer(self.keyword, self.span, list[Item], "item")]
-            return [Writer(self.keyword, self.span, list[Any], "", (self.elements,))]
-        return list(_select_field(writers.get(self.elements.name, ()), self.elements.field))
 
-    def check_lists(self, list_writers: Iterable[Writer]) -> Iterator[Finding]:
-        """Yield an error for each writer that writes another value than a list to the variable `elements`."""
-        if not isinstance(self.elements, Reference):
-            return
-        variable, span, key = self.elements.name, self.elements.span, f"{self.keyword}.{self.key}"
-        for writer in list_writers:
-            for constant in writer.constants or ():
-                if not isinstance(constant.value, list):
-                    message = (
-                        f"{key} takes a list, but ${variable} gets {describe_value(constant.value)} here"
-                    )
-                    hint = f"{key} reads ${variable} in {span.describe_place(constant.span.source)}."
-                    yield make_error(constant.span, "port-type", message, hint)
-            if writer.constants is None and find_element_type(writer.type) is None:
-                message = f"{key} takes a list, but {self.elements} holds {describe_type(writer.type)}"
-                yield make_error(span, "port-type", message, f"It is written by {writer.describe(span)}.")
-
-    def make_element_writers(self, list_writer: Writer) -> Iterator[Writer]:
-        """Yield a writer of the elements of the list that `list_writer` writes: the control node."""
-        if list_writer.constants is not None:
+def _make_element_writers(node: Node, list_writers: Iterable[Writer]) -> Iterator[Writer]:
+    """Yield a writer of the elements of each list: the node that iterates over the list."""
+    for writer in list_writers:
+        if writer.constants is not None:
             elements = [
                 Literal(element, constant.get_element_span(index))
-                for constant in list_writer.constants
+                for constant in writer.constants
                 if isinstance(constant.value, list)
                 for index, element in enumerate(constant.value)
             ]
-            yield Writer(self.keyword, self.span, Any, "", tuple(elements))
-        elif (element_type := find_element_type(list_writer.type)) is not None:
-            yield Writer(self.keyword, self.span, element_type, list_writer.refers_to)
-
-
-def _find_element_loops(node: Node) -> Iterator[ElementLoop]:
-    for key, variable in find_control_node_outputs(node):
-        elements = node.values.get(key.list_key) if isinstance(node, InnerNode) else None
-        if isinstance(elements, Literal | Reference):
-            yield ElementLoop(get_type_name(node), node.span, variable.name, key.list_key, elements)
+            yield Writer(get_type_name(node), node.span, Any, "", tuple(elements))
+        elif (element_type := find_element_type(writer.type)) is not None:
+            yield Writer(get_type_name(node), node.span, element_type, writer.refers_to)
 
 
 def _check_field(reader: str, reference: Reference, writers: Iterable[Writer]) -> Iterator[Finding]:

@@ -9,7 +9,7 @@ from executive.mission.check.conditions import find_non_conditions
 from executive.mission.check.context import CheckContext
 from executive.mission.check.node_min_times import compute_min_time
 from executive.mission.descriptions import describe_value
-from executive.mission.findings import Finding, find_similar_word, make_error, make_warning
+from executive.mission.findings import Finding, make_error, make_warning, suggest_word
 from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model.conversion import WrongType, convert_constant
 from executive.mission.model.instance import find_upper_bound, get_mission_node, make_inspection_instance
@@ -44,13 +44,13 @@ def _check_keys(context: CheckContext, owner: InnerNode | NodeSection, name: str
             and not isinstance(value.value, list)
             and value.value not in ELEMENT_WORDS
         ):
-            description = f"{describe_value(value.value)}{value.origin_note}"
+            suggestion = suggest_word(value.value, ELEMENT_WORDS)
+            description = f"{describe_value(value.value)}{suggestion}{value.origin_note}"
             words = ", ".join(ELEMENT_WORDS)
             message = f"{name}.{key.name} must be a list, a variable, or one of {words}, not {description}"
             is_text_at_key = isinstance(value.value, str) and not value.origin
-            similar_word = find_similar_word(str(value.value), ELEMENT_WORDS)
-            hint = f'Did you mean "{similar_word}"?' if similar_word else f"Write a list: [{value.value}]."
-            yield make_error(value.span, "wrong-type", message, hint if is_text_at_key else "")
+            hint = f"Write a list: [{value.value}]." if is_text_at_key else ""
+            yield make_error(value.span, "wrong-type", message, hint)
 
 
 def check_constant(

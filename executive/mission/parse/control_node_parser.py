@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from executive.mission.model.nodes import InnerNode, InvalidNode, KeyValue, Node, NodeSection, list_nodes
-from executive.mission.model.values import FailureName, LocatedName
+from executive.mission.model.values import FailureName, InvalidValue, LocatedName
 from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
 from executive.mission.source import Span
 from executive.mission.text.yaml_text import (
@@ -99,15 +99,17 @@ def _read_inner_keys(
 def _read_keys(
     parser: NodeParser, name: str, span: Span, mapping: YamlNode, keys: Mapping[str, Key]
 ) -> dict[str, KeyValue]:
-    """Return the valid values of `keys` in a mapping; a missing required node is an invalid node."""
+    """Return the valid values of `keys` in a mapping; a missing required node or constant is invalid."""
     reader = MappingReader(name, span, mapping, keys, parser.findings)
     values: dict[str, KeyValue] = {}
     for key in keys.values():
         if (node := reader.get(key.name)) is not None:
             value = _read_value(parser, reader, key, node)
             values |= {} if value is None else {key.name: value}
-        elif key.kind is KeyKind.NODE and key.is_required:
+        elif key.is_required and key.kind is KeyKind.NODE:
             values[key.name] = InvalidNode(span, "")
+        elif key.is_required and key.kind is KeyKind.CONSTANT:
+            values[key.name] = InvalidValue(span)
     return values
 
 
@@ -162,19 +164,15 @@ def _read_reasons_or_sections(
     """Return the failure names and the sections in the list or single value of a key."""
     mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
     sections = [_read_section(parser, key, item, item.span) for item in mappings]
-    names = reader.read_failure_names(key.name, tuple(key.section.keys))
-    return (*names, *(section for section in sections if section is not None))
+    return *reader.read_failure_names(key.name, tuple(key.section.keys)), *sections
 
 
-def _read_section(parser: NodeParser, key: Key, value: YamlNode, span: Span) -> NodeSection | None:
-    """Return the section below a key, or None if the section lacks a required constant."""
+def _read_section(parser: NodeParser, key: Key, value: YamlNode, span: Span) -> NodeSection:
+    """Return the section below a key."""
     values = _read_inner_keys(parser, key.name, span, value, key.section)
     if key.section.any_of and isinstance(value, YamlMapping) and not value.entries:
         alternatives = " or ".join(f'"{name}"' for name in key.section.any_of)
         parser.add_error(span, "missing-key", f"{key.name} needs {alternatives}")
-    for name, inner_key in key.section.keys.items():
-        if inner_key.is_required and inner_key.kind is KeyKind.CONSTANT and name not in values:
-            return None
     return NodeSection(key.section, span, values)
 
 
@@ -188,5 +186,4 @@ def _read_sections(parser: NodeParser, key: Key, value: YamlNode) -> Iterable[No
     if isinstance(value, YamlSequence) and not value.items:
         parser.add_error(value.span, "empty-list", f"{key.name} needs at least one {section_kind}")
     for item in value.items if isinstance(value, YamlSequence) else (value,):
-        if (section := _read_section(parser, key, item, item.span)) is not None:
-            yield section
+        yield _read_section(parser, key, item, item.span)
