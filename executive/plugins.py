@@ -18,6 +18,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
+from packaging.utils import canonicalize_name
 from py_trees.behaviour import Behaviour
 
 from executive.behaviours.behaviour_skill import make_behaviour_skill
@@ -170,7 +171,7 @@ def _list_installed_entries(group: str, noun: str, project: Project | None) -> I
     """Yield the entries of all installed packages except the project itself."""
     for entry in entry_points(group=group):
         package = entry.dist.name if entry.dist else entry.module.partition(".")[0]
-        if project is None or _normalize(package) != _normalize(project.name):
+        if project is None or canonicalize_name(package) != canonicalize_name(project.name):
             yield PluginEntry(entry.name, entry.value, noun, f"uninstall the package {package}")
 
 
@@ -184,11 +185,6 @@ def _enable_project_entries(group: str, noun: str, project: Project | None) -> I
         sys.path.append(folder)
     for name, value in entries.items():
         yield PluginEntry(name, value, noun, f"remove it from {project.file}")
-
-
-def _normalize(package: str) -> str:
-    """Return the normalized name of a package: `my-package` for `My_Package`."""
-    return re.sub(r"[-_.]+", "-", package).lower()
 
 
 def _locate_error(error: Exception) -> str:

@@ -8,6 +8,7 @@ documentation and the tree use the declarations in the class body.
 
 from __future__ import annotations
 
+import inspect
 import keyword
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -237,8 +238,12 @@ class Skill:
 
     @classmethod
     def is_instantaneous(cls) -> bool:
-        """Return True if `run` is declared to return None, so that the skill ends in its first tick."""
-        return cls.is_condition or cls.run.__annotations__.get("return", "") in ("None", None)
+        """Return True if the skill ends in its first tick: `run` is no generator and returns None.
+
+        A `run` that returns the iterator of another function must declare this in its annotation.
+        """
+        has_steps = inspect.isgeneratorfunction(cls.run)
+        return cls.is_condition or (not has_steps and cls.run.__annotations__.get("return") in ("None", None))
 
     @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:

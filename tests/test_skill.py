@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from collections.abc import Iterator
+from typing import Any, ClassVar, cast
 
 import pytest
 
@@ -55,3 +56,31 @@ def test_a_port_may_be_named_like_a_word_of_python() -> None:
     run = SkillRun(Choose(**{"not": "here", "class": "!"}), cast("Cell", None))
     assert run.step()
     assert run.read_outputs() == {"in": "here!"}
+
+
+def test_a_skill_is_instantaneous_if_its_run_has_no_steps() -> None:
+    class Plain(Skill):
+        def run(self, cell: Cell) -> None:
+            del cell
+
+    class Wrong(Skill):
+        def run(self, cell: Cell) -> None:  # type: ignore[misc]
+            yield
+
+    class Bare(Skill):
+        def run(self, cell):  # type: ignore[no-untyped-def]
+            del cell
+
+    class Steps(Skill):
+        def run(self, cell):  # type: ignore[no-untyped-def]
+            yield
+
+    class Delegating(Skill):
+        def run(self, cell: Cell) -> Iterator[None]:
+            return Steps().run(cell)
+
+    class Condition(Steps):
+        is_condition: ClassVar = True
+
+    skills = (Plain, Wrong, Bare, Steps, Delegating, Condition)
+    assert [skill.is_instantaneous() for skill in skills] == [True, False, True, False, False, True]

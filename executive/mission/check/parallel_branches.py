@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations, permutations
-from typing import NamedTuple
+from typing import TypeAlias
 
 from executive.mission.check.context import CheckContext, VariableRead
 from executive.mission.findings import Finding, make_error
@@ -15,13 +15,8 @@ from executive.mission.model.wiring import find_control_node_outputs
 from executive.mission.source import Span
 from executive.skill import Direction
 
-
-class _VariableWrite(NamedTuple):
-    """A node that writes a variable: its name, the position of the variable, and a hint to rename it."""
-
-    node_name: str
-    span: Span
-    hint: str
+_VariableWrite: TypeAlias = tuple[str, Span, str]
+"""Name of a node that writes a variable, position of the variable, and a hint to rename it."""
 
 
 def find_shared_resources(context: CheckContext) -> Iterator[Finding]:
@@ -126,8 +121,8 @@ def _find_first_writes(context: CheckContext, branch: Node) -> dict[str, _Variab
     for node in branch.walk():
         for key, variable in find_control_node_outputs(node):
             hint = f"Let {get_type_name(node)} write another variable: {key.name}: other."
-            writes.setdefault(variable.name, _VariableWrite(get_type_name(node), variable.span, hint))
+            writes.setdefault(variable.name, (get_type_name(node), variable.span, hint))
         for wire in context.find_wires(node, Direction.OUT):
             hint = f"Let {wire.skill} write another variable: {wire.port.name}: $other."
-            writes.setdefault(wire.variable, _VariableWrite(wire.skill, wire.span, hint))
+            writes.setdefault(wire.variable, (wire.skill, wire.span, hint))
     return writes

@@ -11,7 +11,8 @@ from executive.mission.findings import Finding, make_error, make_warning, sugges
 from executive.mission.model.values import Literal, LocatedName
 from executive.tree.keys import Key
 
-_LIMIT = Key(doc="Maximum number of objects.", ge=1, value_type=int)
+_LIMIT_KEY = Key(doc="Maximum number of objects.", ge=1, value_type=int)
+"""Declaration that checks the limits of quotas."""
 
 
 def check_names(context: CheckContext) -> Iterator[Finding]:
@@ -31,10 +32,10 @@ def check_names(context: CheckContext) -> Iterator[Finding]:
 
 
 def check_quotas(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every invalid or useless quota, and a warning if objects would lie on others."""
+    """Yield an error for each invalid quota or quota without a route, and a warning for too few slots."""
     for quota in context.mission.quotas:
         bin, label, limit = quota.bin, quota.label, quota.limit
-        yield from check_constant(context, str(quota), _LIMIT, limit)
+        yield from check_constant(context, str(quota), _LIMIT_KEY, limit)
         if context.cell is None or bin.name not in context.cell.bins:
             continue
         routes = [route for route in context.mission.routes if label is None or route.label == label.name]
@@ -46,6 +47,8 @@ def check_quotas(context: CheckContext) -> Iterator[Finding]:
             yield make_error((label or bin).span, "no-route", message, hint)
         slot_count = math.prod(context.cell.bins[bin.name].slots)
         if isinstance(limit, Literal) and isinstance(limit.value, int) and limit.value > slot_count:
-            message = f"{bin.name} has {slot_count} slots, so the quota lets objects fall onto others"
-            hint = f"Write at most {slot_count}, or more slots in the cell file."
+            message = (
+                f"the quota exceeds the {slot_count} slots of {bin.name}, so objects would lie on others"
+            )
+            hint = f"Lower the quota to {slot_count} or less, or add slots to the bin in the cell file."
             yield make_warning(limit.span, "large-quota", message + limit.origin_note, hint)

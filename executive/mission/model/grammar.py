@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from executive.tree.keys import Key
+
 
 @dataclass(frozen=True)
 class GrammarKey:
@@ -25,6 +27,9 @@ class GrammarKey:
 
 GrammarKeys = Mapping[str, GrammarKey]
 """The keys of a mapping by name."""
+
+AllowedKeys = Mapping[str, Key | GrammarKey]
+"""The keys of a mapping or of a control node by name."""
 
 LABEL_PATTERN = "[a-z_][a-z0-9_]*"
 """Regular expression that every label matches."""

@@ -47,23 +47,21 @@ def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Ite
     A param with a name as its value counts as an input if the mission gives a variable. An input in `one_of`
     of the skill is connected only if the mission sets it.
     """
-    if direction is Direction.IN:
-        for name, setting in node.settings.items():
-            value, param = setting.value, skill.params.get(name)
-            if isinstance(value, Reference) and param is not None and param.is_name:
-                yield Wire(node.skill, param, value.name, value.span, is_explicit=True, field=value.field)
-    for port in skill.ports.values():
-        if port.direction is not direction:
-            continue
-        port_setting = node.settings.get(port.name)
-        if port_setting is None and port.name in skill.one_of:
-            continue
-        if port_setting is None or (direction is Direction.OUT and isinstance(port_setting.value, Literal)):
-            # `check_settings` reports a constant for an output.
-            variable = node.variables_by_port.get(port.name, port.name)
-            yield Wire(node.skill, port, variable, node.span, is_explicit=False)
-        elif isinstance(value := port_setting.value, Reference):
-            yield Wire(node.skill, port, value.name, value.span, is_explicit=True, field=value.field)
+    params = [param for param in skill.params.values() if direction is Direction.IN and param.is_name]
+    ports = [port for port in skill.ports.values() if port.direction is direction]
+    declarations: list[Param | Port] = [*params, *ports]
+    for declaration in declarations:
+        setting = node.settings.get(declaration.name)
+        value = setting.value if setting else None
+        if isinstance(value, Reference):
+            yield Wire(node.skill, declaration, value.name, value.span, is_explicit=True, field=value.field)
+        # `check_settings` reports a constant for an output.
+        elif isinstance(declaration, Port) and (
+            (direction is Direction.OUT and isinstance(value, Literal))
+            or (value is None and declaration.name not in skill.one_of)
+        ):
+            variable = node.variables_by_port.get(declaration.name, declaration.name)
+            yield Wire(node.skill, declaration, variable, node.span, is_explicit=False)
 
 
 def find_literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:

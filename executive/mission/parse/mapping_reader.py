@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from pydantic import JsonValue
 
 from executive.mission.findings import Finding, make_error, suggest_choice
-from executive.mission.model.grammar import GrammarKey
+from executive.mission.model.grammar import AllowedKeys
 from executive.mission.model.values import FailureName, InvalidValue, Literal, Reference, Setting, Value
 from executive.mission.source import Span
 from executive.mission.text.yaml_text import (
@@ -21,7 +21,6 @@ from executive.mission.text.yaml_text import (
     iterate_scalars,
     to_python_value,
 )
-from executive.tree.keys import Key
 
 NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 """Matches the names of params, arguments, variables and subtrees."""
@@ -43,12 +42,7 @@ class MappingReader:
     """
 
     def __init__(
-        self,
-        owner: str,
-        span: Span,
-        node: YamlNode,
-        keys: Mapping[str, Key | GrammarKey],
-        findings: list[Finding],
+        self, owner: str, span: Span, node: YamlNode, keys: AllowedKeys, findings: list[Finding]
     ) -> None:
         self.owner, self.span, self.findings = owner, span, findings
         self._mapping = node if isinstance(node, YamlMapping) else YamlMapping(node.span, ())

@@ -16,7 +16,7 @@ from executive.mission.model.values import InvalidValue, Literal
 from executive.mission.parse.mapping_reader import MappingReader, make_literal
 from executive.mission.parse.overrides import CELL_PREFIX, make_override_source, parse_override
 from executive.mission.text.yaml_text import YamlMapping, to_python_value
-from executive.skill import Param, param
+from executive.skill import param
 
 PARAM_TYPES = {"text": str, "integer": int, "number": float, "boolean": bool, "list": list[Any]}
 """Python types of params, by their names in a mission."""
@@ -33,8 +33,7 @@ def parse_params(reader: MappingReader, overrides: Mapping[str, str]) -> dict[st
             params[name] = _read_declaration(name, param_reader, name in overrides)
         else:
             value = make_literal(node)
-            declaration: Param = replace(param(), type=_infer_type(value.value))
-            params[name] = MissionParam(span, value, declaration)
+            params[name] = MissionParam(span, value, replace(param(), type=_infer_type(value.value)))
     for name, text in overrides.items():
         if name in params:
             override, findings = parse_override(name, text, is_text=params[name].declaration.type is str)

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Mapping, Sequence
 
 from executive.mission.model import grammar
-from executive.mission.model.grammar import GrammarKey, GrammarKeys
+from executive.mission.model.grammar import AllowedKeys, GrammarKey, GrammarKeys
 from executive.mission.parse.control_node_parser import find_inner_keys, find_shorthand_key, has_optional_body
 from executive.mission.parse.mapping_reader import NAME_PATTERN
 from executive.mission.parse.node_parser import Skills
@@ -194,7 +194,7 @@ def _make_param_schema() -> Schema:
     return {**declaration, "type": ["object", "array", "string", "number", "boolean", "null"]}
 
 
-def _make_mapping_schema(keys: Mapping[str, Key | GrammarKey]) -> Schema:
+def _make_mapping_schema(keys: AllowedKeys) -> Schema:
     return {
         "type": "object",
         "properties": _make_properties(keys),
@@ -203,7 +203,7 @@ def _make_mapping_schema(keys: Mapping[str, Key | GrammarKey]) -> Schema:
     }
 
 
-def _make_properties(keys: Mapping[str, Key | GrammarKey]) -> Schema:
+def _make_properties(keys: AllowedKeys) -> Schema:
     return {name: {"description": key.doc, **_make_value_schema(key)} for name, key in keys.items()}
 
 

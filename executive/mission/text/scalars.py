@@ -40,9 +40,5 @@ def convert_scalar(text: str) -> ScalarValue:
 
 def _convert_large_integer(number: int) -> int | float:
     """Return an integer of at most 64 bits unchanged, and a larger integer as a float, for JSON readers."""
-    if -(2**63) <= number < 2**63:
-        return number
-    try:
-        return float(number)
-    except OverflowError:
-        return math.inf if number > 0 else -math.inf
+    # Unlike the conversion of an integer, that of a text returns infinity for numbers that are too large.
+    return number if -(2**63) <= number < 2**63 else float(str(number))
