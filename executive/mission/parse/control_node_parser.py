@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from executive.mission.model.nodes import InnerNode, InvalidNode, KeyValue, Node, NodeSection, list_nodes
-from executive.mission.model.values import FailureName, InvalidValue, LocatedName
+from executive.mission.model.values import InvalidValue, LocatedName
 from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
 from executive.mission.source import Span
 from executive.mission.text.yaml_text import (
@@ -121,11 +121,18 @@ def _read_value(parser: NodeParser, reader: MappingReader, key: Key, node: YamlN
             is_omitted = is_empty(node) and key.shorthand and not key.is_required
             return None if is_omitted else parser.read_node(node, span)
         case KeyKind.NODES:
-            return _read_nodes(parser, reader, key, node)
+            nodes = parser.read_nodes(node, reader.owner)
+            if key.max_count is None or len(nodes) <= key.max_count:
+                return nodes or None
+            message = f"{reader.owner} has {len(nodes)} branches, but may have at most {key.max_count}"
+            parser.add_error(reader.span, "too-large", message)
+            return None
         case KeyKind.REASONS:
             return reader.read_failure_names(key.name)
         case KeyKind.REASONS_OR_SECTIONS:
-            return _read_reasons_or_sections(parser, reader, key)
+            names = reader.read_failure_names(key.name, tuple(key.section.keys))
+            mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
+            return *names, *(_read_section(parser, key, item, item.span) for item in mappings)
         case KeyKind.VARIABLE:
             return _read_variable(parser, reader, key.name)
         case KeyKind.SECTION:
@@ -133,17 +140,6 @@ def _read_value(parser: NodeParser, reader: MappingReader, key: Key, node: YamlN
         case KeyKind.SECTIONS:
             return tuple(_read_sections(parser, key, node))
     return read_value(node, parser.findings)
-
-
-def _read_nodes(
-    parser: NodeParser, reader: MappingReader, key: Key, value: YamlNode
-) -> tuple[Node, ...] | None:
-    nodes = parser.read_nodes(value, reader.owner)
-    if key.max_count is not None and len(nodes) > key.max_count:
-        message = f"{reader.owner} has {len(nodes)} branches, but may have at most {key.max_count}"
-        parser.add_error(reader.span, "too-large", message)
-        return None
-    return nodes or None
 
 
 def _read_variable(parser: NodeParser, reader: MappingReader, key: str) -> LocatedName | None:
@@ -156,15 +152,6 @@ def _read_variable(parser: NodeParser, reader: MappingReader, key: str) -> Locat
     parser.add_error(variable.span, "bad-name", message, hint)
     name = variable.name.removeprefix("$")
     return LocatedName(name, variable.span) if NAME_PATTERN.fullmatch(name) else None
-
-
-def _read_reasons_or_sections(
-    parser: NodeParser, reader: MappingReader, key: Key
-) -> tuple[FailureName | NodeSection, ...]:
-    """Return the failure names and the sections in the list or single value of a key."""
-    mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
-    sections = [_read_section(parser, key, item, item.span) for item in mappings]
-    return *reader.read_failure_names(key.name, tuple(key.section.keys)), *sections
 
 
 def _read_section(parser: NodeParser, key: Key, value: YamlNode, span: Span) -> NodeSection:
