@@ -96,10 +96,16 @@ class Trajectory:
         states = self.samples
         # The samples are checked, because ruckig's `position_extrema` are too small if a joint turns back
         # (pantor/ruckig issue 215).
-        _require_in_range(states.q, limits)
+        excess = limits.position.compute_excess(states.q)
+        row, joint = np.unravel_index(np.argmax(excess), excess.shape)
+        if excess[row, joint] > _ROUNDING_ERROR:
+            raise Unreachable(
+                f"the motion would take joint {joint + 1} to {math.degrees(states.q[row, joint]):.1f}°; "
+                f"its limit is {limits.position.describe(int(joint))}"
+            )
         peak_fractions = compute_peak_fractions(states, limits)
         for name, peaks in zip(("velocity", "acceleration", "jerk"), peak_fractions, strict=True):
-            joint = int(np.argmax(peaks))
+            joint = np.argmax(peaks)
             if peaks[joint] > 1 + _ROUNDING_ERROR:
                 factor = f"{peaks[joint]:.3f} times"
                 raise JointLimitError(f"the {name} of joint {joint + 1} would be {factor} its limit")
@@ -165,14 +171,3 @@ def _require_equal(state: JointState, next_state: JointState, problem: str) -> N
         difference = float(np.max(np.abs(left - right)))
         if difference > _ROUNDING_ERROR:
             raise Fault(f"invalid trajectory: {problem}; the joint {name} differs by {difference:.2g}")
-
-
-def _require_in_range(qs: Array, limits: JointLimits) -> None:
-    """Raise Unreachable if joint positions `(N, n)` [rad] exceed the joint range."""
-    excess = limits.position.compute_excess(qs)
-    row, joint = np.unravel_index(np.argmax(excess), excess.shape)
-    if excess[row, joint] > _ROUNDING_ERROR:
-        raise Unreachable(
-            f"the motion would take joint {joint + 1} to {math.degrees(qs[row, joint]):.1f}°; "
-            f"its limit is {limits.position.describe(int(joint))}"
-        )

@@ -39,13 +39,11 @@ class FakeObstacles:
     def __init__(self, config: CellConfig) -> None:
         self._cup_radius = config.tool.cup_radius
         # The first box is the table: it has no lateral limits, and its top is at height 0.
-        self._names = ["the table"]
-        centres, half_sizes = [np.zeros(3)], [np.array([np.inf, np.inf, 0.0])]
+        boxes = [("the table", np.zeros(3), (np.inf, np.inf, 0.0))]
         for name, bin in config.bins.items():
             for half_size, centre in list_bin_boxes(bin.size):
-                self._names.append(name)
-                centres.append(np.add(bin.position, centre))
-                half_sizes.append(np.array(half_size))
+                boxes.append((name, np.add(bin.position, centre), half_size))
+        self._names, centres, half_sizes = zip(*boxes, strict=True)
         self._lower_corners = np.array(centres) - half_sizes
         self._upper_corners = np.array(centres) + half_sizes
 

@@ -13,7 +13,7 @@ from executive.cell.config import CellConfig
 from executive.cell.protocols import Clock
 from executive.cells.sim import command_log
 from executive.cells.sim.contacts import ContactMonitor
-from executive.cells.sim.rebuild import InterruptedState
+from executive.cells.sim.rebuild import WorldRebuilder
 from executive.cells.sim.world import World
 from executive.errors import Fault
 from executive.events import Emit, discard_event
@@ -44,7 +44,7 @@ class SimArm:
         clock: Clock of the run.
         get_held_body: Returns the held body, or None; contacts of this body count as contacts of the arm.
         emit: Receives the events of the arm.
-        interrupted_state: State of an interrupted run, from which the arm brakes; None: the arm is at rest.
+        rebuilder: Rebuilder of the world of an interrupted run, whose motion the arm brakes; None: new run.
 
     Attributes:
         planner: Motion planner of the arm.
@@ -59,7 +59,7 @@ class SimArm:
         clock: Clock,
         get_held_body: Callable[[], int | None] = lambda: None,
         emit: Emit = discard_event,
-        interrupted_state: InterruptedState | None = None,
+        rebuilder: WorldRebuilder | None = None,
     ) -> None:
         self.planner = planner
         self.collision: str | None = None
@@ -73,11 +73,11 @@ class SimArm:
         self._fault_message: str | None = None
         self._commanded_q = self.q
         # A run may be interrupted before the first joint command is logged.
-        if interrupted_state is None or not interrupted_state.command.size:
+        if rebuilder is None or not rebuilder.braking_start[0].size:
             self.send_command()
         else:
-            self._commanded_q, self._motion = interrupted_state.command, interrupted_state.motion
-            self._motion_time = interrupted_state.motion_time
+            self._commanded_q, self._motion_time = rebuilder.braking_start
+            self._motion = rebuilder.motion
             self.stop()
 
     @property

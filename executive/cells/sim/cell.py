@@ -19,7 +19,7 @@ from executive.cells.sim.command_log import CommandLog, read_commands
 from executive.cells.sim.min_times import SimMinTimes
 from executive.cells.sim.models import build_simulated_class, find_model_errors
 from executive.cells.sim.poses import find_places_out_of_reach, find_pose_errors
-from executive.cells.sim.rebuild import InterruptedState, WorldRebuilder
+from executive.cells.sim.rebuild import WorldRebuilder
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import build_initial_world, derive_seeds, find_lack_of_room
 from executive.cells.sim.tool import SuctionTool
@@ -77,8 +77,8 @@ class SimCell(CellWithoutHardware):
         self._clearance_checker = ClearanceChecker(config)
         planner = build_planner(config, self._clearance_checker.check)
         self._tool = SuctionTool(world, config.tool, load_seed)
-        state = None if options.resume is None else self._rebuild_world(options.resume.log_path)
-        self._arm = SimArm(world, planner, config, clock, lambda: self._tool.held_body, emit, state)
+        rebuilder = None if options.resume is None else self._rebuild_world(options.resume.log_path)
+        self._arm = SimArm(world, planner, config, clock, lambda: self._tool.held_body, emit, rebuilder)
         name, camera_config = next(iter(config.cameras.items()))
         self._camera = build_camera(
             self._world,
@@ -169,15 +169,14 @@ class SimCell(CellWithoutHardware):
         self._clearance_checker.close()
         self._world.close()
 
-    def _rebuild_world(self, log: Path) -> InterruptedState:
-        """Execute the commands of a log, continue the log, and return the state of the interrupted run."""
+    def _rebuild_world(self, log: Path) -> WorldRebuilder:
+        """Execute the commands of a log, continue the log, and return the rebuilder."""
         rebuilder = WorldRebuilder(self._world, self._tool)
         for command in read_commands(log):
             rebuilder.execute(command)
-        state = rebuilder.interrupted_state
-        self.steps, self.last_command_step = state.step_count, state.last_command_step
+        self.steps, self.last_command_step = rebuilder.step_count, rebuilder.last_command_step
         self._world.log = CommandLog(log, self._world.robot.joint_count, resume=True)
-        return state
+        return rebuilder
 
 
 def _find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:

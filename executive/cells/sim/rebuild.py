@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.interpolate import BPoly
 
@@ -17,25 +15,6 @@ from executive.motion.joints import JointState
 from executive.motion.trajectory import Trajectory
 
 
-@dataclass(frozen=True, eq=False)
-class InterruptedState:
-    """State of a run at its interruption.
-
-    Attributes:
-        command: Commanded joint positions from which the arm brakes `(n,)` [rad]; empty without a command.
-        motion: Interrupted motion of the arm, or None if the arm was at rest.
-        motion_time: Time of `command` since the start of the motion [s].
-        step_count: Number of control steps of the run.
-        last_command_step: Number of control steps before the last motion or vacuum command; 0: no command.
-    """
-
-    command: Array
-    motion: Trajectory | None
-    motion_time: float
-    step_count: int
-    last_command_step: int
-
-
 class WorldRebuilder:
     """Executes recorded commands in a new world with the cell file and the seed of the recorded world.
 
@@ -44,35 +23,42 @@ class WorldRebuilder:
     Args:
         world: The new world.
         tool: Tool of the new world.
+
+    Attributes:
+        motion: Motion of the arm, or None if the arm is at rest.
+        step_count: Number of control steps of the run.
+        last_command_step: Number of control steps before the last motion or vacuum command; 0: no command.
     """
 
     def __init__(self, world: World, tool: SuctionTool) -> None:
+        self.motion: Trajectory | None = None
+        self.step_count = self.last_command_step = 0
         self._world, self._tool = world, tool
         self._joint_targets: Array = np.zeros(0)
-        self._motion: Trajectory | None = None
         self._motion_time = 0.0
-        self._step_count = self._last_command_step = 0
         self._applied_targets: tuple[Array, float] | None = None
         """Joint targets and motion time of the last physics step, if newer targets followed it; else None."""
 
     @property
-    def interrupted_state(self) -> InterruptedState:
-        """State after the executed commands."""
+    def braking_start(self) -> tuple[Array, float]:
+        """Joint positions from which the arm brakes `(n,)` [rad], empty without a command; their time [s].
+
+        The time counts from the start of the motion.
+        """
         # If the arm started from joint targets that no physics step has used, the arm would move by two steps
         # at once, which may tear a load off the cup.
-        command, time = self._joint_targets, self._motion_time
-        if self._applied_targets and self._motion is not None:
-            command, time = self._applied_targets
-        return InterruptedState(command, self._motion, time, self._step_count, self._last_command_step)
+        if self._applied_targets and self.motion is not None:
+            return self._applied_targets
+        return self._joint_targets, self._motion_time
 
     def execute(self, command: Command) -> None:
         """Execute the next command."""
         kind, numbers, states, _ = command
         if kind in (command_log.MOTION, command_log.VACUUM_ON, command_log.VACUUM_OFF):
-            self._last_command_step = self._step_count
+            self.last_command_step = self.step_count
         world, tool = self._world, self._tool
         if kind in (command_log.RUN_STEP, command_log.IDLE_STEP):
-            self._step_count += kind == command_log.RUN_STEP
+            self.step_count += kind == command_log.RUN_STEP
             self._applied_targets = None
             world.step()
             tool.advance()
@@ -84,10 +70,10 @@ class WorldRebuilder:
         elif kind == command_log.MOTION:
             assert states is not None
             duration, guarded_start_time, _ = numbers
-            self._motion = Trajectory([SampledMotion(states, duration)], guarded_start_time)
+            self.motion = Trajectory([SampledMotion(states, duration)], guarded_start_time)
             self._motion_time = 0.0
         elif kind == command_log.MOTION_END:
-            self._motion = None
+            self.motion = None
         elif kind == command_log.SET_POSE:
             world.place_object(int(numbers[0]), Pose.of(numbers[1:4], numbers[4:]))
         elif kind == command_log.REMOVE:
