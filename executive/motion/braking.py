@@ -15,6 +15,7 @@ import numpy as np
 from ruckig import ControlInterface, InputParameter, Ruckig
 from ruckig import Trajectory as Profile
 
+from executive.cell.clock import STEP
 from executive.geometry import Array
 from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
@@ -38,16 +39,16 @@ class _BrakingProfile(NamedTuple):
     rate_derivatives: Array
 
 
-def plan_braking(trajectory: Trajectory, start_time: float, limits: JointLimits, period: float) -> Array:
+def plan_braking(trajectory: Trajectory, start_time: float, limits: JointLimits) -> Array:
     """Return the path times `(N,)` [s] of the control steps after `start_time`, until the arm is at rest.
 
     The arm either brakes along the path or completes the motion. The result is the shortest candidate within
     the stop limits of joint acceleration and jerk; if no candidate is within the limits, the candidate with
-    the smallest excess. The braking begins at path time `start_time` [s]; `period` is the control period [s].
+    the smallest excess. The braking begins at path time `start_time` [s].
     """
     best_path_times, min_peak_fraction = np.array([start_time]), math.inf
-    for profile in _list_profiles(trajectory, start_time, period):
-        peak_fraction = _compute_peak_fraction(trajectory, start_time, profile, limits, period)
+    for profile in _list_profiles(trajectory, start_time):
+        peak_fraction = _compute_peak_fraction(trajectory, start_time, profile, limits)
         if peak_fraction <= 1.0:
             return profile.path_times
         if peak_fraction < min_peak_fraction:
@@ -55,28 +56,26 @@ def plan_braking(trajectory: Trajectory, start_time: float, limits: JointLimits,
     return best_path_times
 
 
-def _list_profiles(trajectory: Trajectory, start_time: float, period: float) -> Iterator[_BrakingProfile]:
+def _list_profiles(trajectory: Trajectory, start_time: float) -> Iterator[_BrakingProfile]:
     """Yield braking profiles and the completion of the motion, the shortest first."""
     remaining_time = max(0.0, trajectory.duration - start_time)
     completion_index = np.searchsorted(_BRAKING_TIMES, remaining_time)
     for index, braking_time in enumerate(_BRAKING_TIMES.tolist()):
         if index == completion_index:
-            step_count = _count_steps(remaining_time, period)
+            step_count = _count_steps(remaining_time)
             end_time = start_time + remaining_time
-            path_times = np.minimum(start_time + period * np.arange(1, step_count + 1), end_time)
+            path_times = np.minimum(start_time + STEP * np.arange(1, step_count + 1), end_time)
             yield _BrakingProfile(path_times, np.ones(step_count), np.zeros(step_count))
         for ramp_fraction in _RAMP_FRACTIONS:
-            yield _make_profile(start_time, braking_time, ramp_fraction, period)
+            yield _make_profile(start_time, braking_time, ramp_fraction)
 
 
-def _count_steps(duration: float, period: float) -> int:
+def _count_steps(duration: float) -> int:
     """Return the number of control steps that a duration [s] takes, at least 1."""
-    return max(1, math.ceil(duration / period - _ROUNDING_ERROR))
+    return max(1, math.ceil(duration / STEP - _ROUNDING_ERROR))
 
 
-def _make_profile(
-    start_time: float, braking_time: float, ramp_fraction: float, period: float
-) -> _BrakingProfile:
+def _make_profile(start_time: float, braking_time: float, ramp_fraction: float) -> _BrakingProfile:
     """Return the profile that brakes from full speed at `start_time` to rest within `braking_time` [s]."""
     inputs = InputParameter(1)
     inputs.control_interface = ControlInterface.Velocity
@@ -85,13 +84,13 @@ def _make_profile(
     inputs.max_acceleration, inputs.max_jerk = [deceleration], [deceleration / (braking_time * ramp_fraction)]
     profile = Profile(1)
     Ruckig(1).calculate(inputs, profile)
-    times = (step * period for step in range(1, _count_steps(profile.duration, period) + 1))
+    times = (step * STEP for step in range(1, _count_steps(profile.duration) + 1))
     samples = [profile.at_time(min(time, profile.duration)) for time in times]
     return _BrakingProfile(*np.array(samples)[:, :, 0].T)
 
 
 def _compute_peak_fraction(
-    trajectory: Trajectory, start_time: float, profile: _BrakingProfile, limits: JointLimits, period: float
+    trajectory: Trajectory, start_time: float, profile: _BrakingProfile, limits: JointLimits
 ) -> float:
     """Return the largest joint acceleration or jerk of a braking profile as a fraction of its stop limit."""
     accelerations = [trajectory.state_at(start_time).qdd]
@@ -99,6 +98,6 @@ def _compute_peak_fraction(
         _, velocity, acceleration = trajectory.state_at(float(path_time))
         accelerations.append(acceleration * rate**2 + velocity * rate_derivative)
     accelerations.append(np.zeros_like(accelerations[0]))
-    jerks = np.diff(accelerations, axis=0) / period
+    jerks = np.diff(accelerations, axis=0) / STEP
     fractions = np.abs(accelerations) / limits.stop_acceleration, np.abs(jerks) / limits.stop_jerk
     return float(max(map(np.max, fractions)))

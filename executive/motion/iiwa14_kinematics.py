@@ -96,9 +96,7 @@ class Iiwa14:
         the time of complete frames. Joint 7 has no effect, because its axis is the tool axis.
         """
         cosines, sines = np.cos(qs.T), np.sin(qs.T)
-        zero = np.zeros(len(qs))
-        axis = np.array([sines[5], zero, cosines[5]])
-        axis = np.array([cosines[4] * axis[0], sines[4] * axis[0], axis[2]])
+        axis = np.array([cosines[4] * sines[5], sines[4] * sines[5], cosines[5]])
         tcp = self._wrist_to_tool * axis
         tcp[2] += FOREARM
         tcp_and_axis = np.stack([tcp, axis], axis=1)  # (3, 2, N)

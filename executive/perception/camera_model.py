@@ -94,12 +94,6 @@ def project(matrix: Array, X_WC: Pose, points: ArrayLike) -> Array:
 
 
 def compute_pixel_ray(matrix: Array, X_WC: Pose, pixel: ArrayLike) -> Array:
-    """Return the unit vector `(3,)` in the world along the ray through `pixel` `(2,)`."""
-    ray = _compute_ray(matrix, X_WC, pixel)
-    return np.asarray(ray / np.linalg.norm(ray))
-
-
-def _compute_ray(matrix: Array, X_WC: Pose, pixel: ArrayLike) -> Array:
     """Return the vector `(3,)` [m] from the camera to the point at depth 1 m on the ray through `pixel`."""
     return np.asarray(X_WC.rotation @ np.linalg.solve(matrix, np.append(np.asarray(pixel, dtype=float), 1.0)))
 
@@ -110,7 +104,7 @@ def intersect_plane(matrix: Array, X_WC: Pose, pixel: ArrayLike, z: float) -> Ar
     Raises:
         ValueError: The ray through the pixel does not intersect the plane in front of the camera.
     """
-    ray = _compute_ray(matrix, X_WC, pixel)
+    ray = compute_pixel_ray(matrix, X_WC, pixel)
     height = z - X_WC.position[2]
     if abs(ray[2]) < 1e-9 or height / ray[2] <= 0:
         raise ValueError(

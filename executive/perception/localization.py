@@ -6,6 +6,8 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.detection import Detection, Detections, Observation
 from executive.cell.frame import Frame
@@ -113,9 +115,8 @@ class CellLocalizer:
         if self.method == "depth":
             return measure_top_height(detection, frame) - half_height
         assert self.cast_ray is not None, "the method `ray` needs a simulator"
-        hit = self.cast_ray(
-            frame.X_WC.position, compute_pixel_ray(frame.matrix, frame.X_WC, detection.centre)
-        )
+        ray = compute_pixel_ray(frame.matrix, frame.X_WC, detection.centre)
+        hit = self.cast_ray(frame.X_WC.position, ray / np.linalg.norm(ray))
         if hit is None:
             column, row = detection.centre
             raise NoDepth(f"the ray through pixel ({column:.0f}, {row:.0f}) of frame {frame.id} hits nothing")

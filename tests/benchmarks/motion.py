@@ -123,7 +123,7 @@ class _MethodComparison:
         tips, _ = planner.kinematics.compute_tcps_and_axes(approach.samples.q)
         above = int(np.flatnonzero(tips[:, 2] > scene.contact_height)[-1])
         touched = min((above + 1) * STEP, approach.duration)
-        stop = plan_braking(approach, touched, planner.limits, STEP)
+        stop = plan_braking(approach, touched, planner.limits)
         grasp = approach.state_at(float(stop[-1])).q
         transit = self._call_timed(
             "ours", planner.plan, grasp, scene.drop, scene.make_carry_task(scene.breakaway_force)

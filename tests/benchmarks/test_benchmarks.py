@@ -131,7 +131,7 @@ class TestHalts:
         )
         stopped = 40
         times = [step * STEP for step in range(stopped + 1)]
-        times += plan_braking(path, times[-1], limits, STEP).tolist()
+        times += plan_braking(path, times[-1], limits).tolist()
         commands = [path.state_at(time).q for time in (*times, *[times[-1]] * 4)]
         good = halts.measure_braking(commands, stopped, path, limits)
         assert good["deviation_rad"] < 1e-7

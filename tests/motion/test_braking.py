@@ -24,7 +24,7 @@ def commands(trajectory: Trajectory, s: float, times: Array) -> Array:
 
 def assert_short_and_inside(trajectory: Trajectory, s: float, limits) -> None:
     """A stop from path time `s` takes half a second at most, goes never back, and keeps the stop limits."""
-    times = plan_braking(trajectory, s, limits, STEP)
+    times = plan_braking(trajectory, s, limits)
     assert len(times) * STEP <= 0.5 + 1e-9
     assert np.all(np.diff([s, *times]) >= 0)
     assert times[-1] <= trajectory.duration + 1e-9
@@ -49,7 +49,7 @@ def test_a_halt_on_a_way_around_something_is_inside_the_stop_limits_too(planner,
     for s in np.arange(0.0, trajectory.duration, 10 * STEP):
         assert_short_and_inside(trajectory, float(s), limits)
     shares = (0.0, 0.2, 0.5, 0.8, 0.99)
-    stops = [plan_braking(trajectory, share * trajectory.duration, limits, STEP) for share in shares]
+    stops = [plan_braking(trajectory, share * trajectory.duration, limits) for share in shares]
     assert [len(times) for times in stops] == [5, 83, 83, 39, 2]
     ends = [0.01, 0.331967, 0.573134, 0.803889, 0.803889]
     assert [times[-1] for times in stops] == pytest.approx(ends, abs=1e-5)

@@ -61,7 +61,9 @@ def test_a_point_is_found_again_on_the_plane_it_lies_in(X_WC, point):
     towards = point - X_WC.position
     # A point behind the camera has a pixel too, on the way to the other side.
     towards *= np.sign(X_WC.inverse().apply(point)[2])
-    assert compute_pixel_ray(K, X_WC, pixel) == pytest.approx(towards / np.linalg.norm(towards), abs=1e-9)
+    ray = compute_pixel_ray(K, X_WC, pixel)
+    assert ray / np.linalg.norm(ray) == pytest.approx(towards / np.linalg.norm(towards), abs=1e-9)
+    assert X_WC.rotation[:, 2] @ ray == pytest.approx(1.0)
 
 
 @given(cameras, points)

@@ -18,7 +18,7 @@ from executive.cell.workcell import KeyPath
 from executive.cells.fake.fake_obstacles import Collision, FakeObstacles
 from executive.cells.fake.world import FakeWorld
 from executive.errors import Blocked, Fault, Unreachable
-from executive.events import Emit, discard_event
+from executive.events import Emit
 from executive.geometry import GRAVITY, Array, Pose, make_tool_down_pose
 from executive.motion.arms import build_kinematics
 from executive.motion.plans import Plan, PlanFactory
@@ -65,9 +65,7 @@ class FakeArm:
         commands: Names of the executed commands, `start` or `stop`, in order, for tests.
     """
 
-    def __init__(
-        self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit = discard_event
-    ) -> None:
+    def __init__(self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit) -> None:
         compute_tool_pose = build_kinematics(config).compute_tool_pose
         self.poses = {name: compute_tool_pose(np.radians(q)) for name, q in config.arm.poses_deg.items()}
         self.tool_pose = self.poses["home"]

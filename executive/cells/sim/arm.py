@@ -155,7 +155,7 @@ class SimArm:
         """Begin to brake along the path of the running motion, if any."""
         if self._motion is not None and self._braking_times is None:
             limits = self.planner.limits
-            self._braking_times = list(plan_braking(self._motion, self._motion_time, limits, STEP))
+            self._braking_times = list(plan_braking(self._motion, self._motion_time, limits))
 
     def stop_after_collision(self, message: str) -> None:
         """Set `collision` to a message and brake; do nothing if the arm is at rest or brakes already."""

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from executive.cell.config import CameraConfig, Colour, NoiseConfig
-from executive.cells.sim.camera import CELL_LIGHT, Light
+from executive.cells.sim.camera import Light
 from executive.cells.sim.table_top import PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE
 from executive.geometry import Array, Pose, rotate_about_z
 from executive.perception.camera_model import intersect_plane
@@ -34,7 +34,7 @@ def draw_light(rng: np.random.Generator) -> Light:
     """Return the light of the cell (probability 0.2), or a light with normal, low or high brightness."""
     shadow = bool(rng.random() < 0.35)
     if rng.random() < 0.2:
-        return Light(shadow=shadow) if shadow else CELL_LIGHT
+        return Light(shadow=shadow)
     azimuth, elevation = rng.uniform(0, math.tau), rng.uniform(math.radians(18), math.pi / 2)
     x, y = math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth)
     red, green, blue = rng.uniform(0.72, 1.0, 3)

@@ -82,9 +82,7 @@ def merge_detections(detections: Sequence[LocatedDetection], size: tuple[int, in
     For an object with boxes in several regions, an untruncated box is preferred to a more confident box.
     `size` is the width and height of the image [pixel].
     """
-    candidates = sorted(
-        detections, key=lambda pair: (_is_truncated(pair[0], pair[1], size), -pair[0].confidence)
-    )
+    candidates = sorted(detections, key=lambda pair: (_is_truncated(pair, size), -pair[0].confidence))
     is_same_object = _compare_objects([detection.box for detection, _ in candidates])
     selection: list[int] = []
     for index, (_, region) in enumerate(candidates):
@@ -118,9 +116,9 @@ def _compare_objects(boxes: Sequence[Box]) -> NDArray[np.bool_]:
     return np.asarray((box_iou_batch(corners, corners) > MIN_TILE_IOU) | is_contained)
 
 
-def _is_truncated(detection: Detection, region: Region, size: tuple[int, int]) -> bool:
+def _is_truncated(located_detection: LocatedDetection, size: tuple[int, int]) -> bool:
     """Return True if a box reaches a border of its region that is not a border of the image."""
-    left, top, right, bottom = detection.box
+    (left, top, right, bottom), region = located_detection[0].box, located_detection[1]
     margin = MAX_TRUNCATION_DISTANCE * (region[2] - region[0])
     return (
         (region[0] > 0 and left - region[0] < margin)

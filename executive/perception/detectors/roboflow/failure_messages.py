@@ -81,7 +81,8 @@ def _fill_in(template: tuple[str, str], options: RoboflowOptions) -> tuple[str, 
     """Return failure and advice of a template, with the names of model, workflow and options inserted."""
     problem, advice = template
     problem = problem.format(model=options.model_or_workflow, output=options.workflow_output)
-    return problem, advice.format(options=options.model_option_names)
+    names = "workspace and workflow_id" if options.api == "workflow" else "model_id"
+    return problem, advice.format(options=names)
 
 
 def shorten_to_line(text: str) -> str:

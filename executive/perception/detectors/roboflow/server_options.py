@@ -66,11 +66,6 @@ class RoboflowOptions(DetectorOptions):
             return f"workflow {self.workspace}/{self.workflow_id}"
         return f"model {self.model_id}"
 
-    @property
-    def model_option_names(self) -> str:
-        """Names of the options that select the model or the workflow, for messages."""
-        return "workspace and workflow_id" if self.api == "workflow" else "model_id"
-
     @classmethod
     def find_errors(cls, config: DetectorConfig) -> OptionErrors:
         """Yield each invalid option in the section `config`, with an error message."""
