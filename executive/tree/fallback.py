@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.inspection import Counterpart, MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Child, Children, key
 from executive.tree.ordered import OrderedNode
@@ -39,20 +38,6 @@ class Fallback(OrderedNode):
         if index > 0:
             failure = self.get_failure(self.do[index - 1])
             self.report_choice(f"choice {index + 1} of {len(self.do)}", failure)
-
-    def compute_pass(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the outcomes; each child starts in the states after failures of the previous child."""
-        success = halted = None
-        failures: Mapping[PossibleFailure, FlowState] = {}
-        entry: FlowState | None = state
-        for child in self.do:
-            if entry is None:
-                break
-            flow = get_flow(child, entry)
-            success, halted = join_states((success, flow.success)), join_states((halted, flow.halted))
-            failures = flow.failures
-            entry = join_states(end.with_handled_failure(failure) for failure, end in failures.items())
-        return Flow(success, failures, halted)
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the shortest minimum time of a child [s]."""

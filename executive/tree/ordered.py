@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.tree.flow import UNKNOWN_STATE, Flow, FlowFunction, FlowState
+from executive.tree.flow import UNKNOWN_STATE, Flow, FlowFunction, FlowState, join_states
 from executive.tree.inspection import NodeAnalysis, NodeFinding
 from executive.tree.keys import Child, Children, key
 from executive.tree.reactive_node import ReactiveNode
@@ -62,15 +62,33 @@ class OrderedNode(ReactiveNode):
         Without memory, a pass through the children also begins in the states while a child is running.
         """
         while True:
-            flow = self.compute_pass(get_flow, state)
+            flow = self._compute_pass(get_flow, state)
             joined_state = state if self.memory else state.join(flow.halted or state)
             if joined_state == state:
                 return flow
             state = joined_state
 
-    def compute_pass(self, get_flow: FlowFunction, state: FlowState) -> Flow:
+    def _compute_pass(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes of one pass through the children."""
-        raise NotImplementedError
+        flows: list[Flow] = []
+        entry: FlowState | None = state
+        for child in self.do:
+            if entry is None:
+                break
+            flows.append(get_flow(child, entry))
+            entry = self._compute_passed_state(flows[-1])
+        # A sequence ends with the first failure; a fallback ends with the first success or the last failure.
+        is_sequence = self.passed_status is Status.SUCCESS
+        success = entry if is_sequence else join_states(flow.success for flow in flows)
+        last_flows = flows if is_sequence else flows[-1:]
+        failures = {failure: end for flow in last_flows for failure, end in flow.failures.items()}
+        return Flow(success, failures, join_states(flow.halted for flow in flows))
+
+    def _compute_passed_state(self, flow: Flow) -> FlowState | None:
+        """Return the state after a child ended with `passed_status`; None if the child cannot end so."""
+        if self.passed_status is Status.SUCCESS:
+            return flow.success
+        return join_states(end.with_handled_failure(failure) for failure, end in flow.failures.items())
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield a warning for each use of `memory: false` without effect or with a wrong effect."""
@@ -102,4 +120,4 @@ class OrderedNode(ReactiveNode):
     def _may_pass_at_once(self, child: Child, analysis: NodeAnalysis) -> bool:
         """Return True if a child may end in its first tick with the status `passed_status`."""
         flow = analysis.compute_flow(child, UNKNOWN_STATE, is_first_tick=True)
-        return bool(flow.failures) if self.passed_status is Status.FAILURE else flow.success is not None
+        return self._compute_passed_state(flow) is not None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.inspection import Counterpart, MinTimeFunction
 from executive.tree.keys import Child, Children, key
 from executive.tree.ordered import OrderedNode
@@ -28,19 +27,6 @@ class Sequence(OrderedNode):
     unreachable_reason = "an earlier child never succeeds"
 
     do: Children = key(shorthand=True, doc="Nodes to run, in order.")
-
-    def compute_pass(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the outcomes; each child starts in the state after success of the previous child."""
-        failures: dict[PossibleFailure, FlowState] = {}
-        halted = None
-        entry: FlowState | None = state
-        for child in self.do:
-            if entry is None:
-                break
-            flow = get_flow(child, entry)
-            failures.update(flow.failures)
-            entry, halted = flow.success, join_states((halted, flow.halted))
-        return Flow(entry, failures, halted)
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the sum of the minimum times of all children [s]."""
