@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.tree.inspection import Counterpart, MinTimeFunction, PropagatedFailure
+from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Child, Children, key
 from executive.tree.ordered import OrderedNode
 
@@ -52,8 +52,3 @@ class Fallback(OrderedNode):
         """Yield all children except the first, with the names `choice 2`, `choice 3`, …."""
         for number, child in enumerate(self.do[1:], 2):
             yield f"choice {number}", child
-
-    @property
-    def counterpart(self) -> Counterpart | None:
-        """`Fallback`, or `ReactiveFallback` without memory."""
-        return Counterpart("Fallback" if self.memory else "ReactiveFallback")

@@ -102,8 +102,7 @@ class TreeNode(Behaviour):
 
     def tick(self) -> Iterator[Behaviour]:
         """Continue by one tick, then yield the ticked nodes for visitors of py_trees, children first."""
-        visited_nodes: list[Behaviour] = []
-        self._visited_nodes = visited_nodes
+        visited_nodes = self._visited_nodes = []
         try:
             self.tick_once()
         finally:
@@ -322,9 +321,8 @@ class ControlNode(KeyOwner, TreeNode):
                     # For a union of types, pydantic reports several errors. An exceeded bound, for instance
                     # `greater_than`, explains more than a wrong type.
                     error = min(invalid.errors(), key=lambda error: "than" not in error["type"])
-                    name = f"{self.keyword}.{key.name}"
-                    message = f"{self.path}: {name} cannot be {value!r}: {error['msg']}"
-                    raise InputError(message) from None
+                    message = f"{self.keyword}.{key.name} cannot be {value!r}: {error['msg']}"
+                    raise InputError(f"{self.path}: {message}") from None
 
 
 def _find_nodes(value: object) -> list[Child]:

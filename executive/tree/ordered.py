@@ -8,7 +8,7 @@ from typing import ClassVar
 from py_trees.common import Status
 
 from executive.tree.flow import UNKNOWN_STATE, Flow, FlowFunction, FlowState, join_states
-from executive.tree.inspection import NodeAnalysis, NodeFinding
+from executive.tree.inspection import Counterpart, NodeAnalysis, NodeFinding
 from executive.tree.keys import Child, Children, key
 from executive.tree.reactive_node import ReactiveNode
 
@@ -121,3 +121,9 @@ class OrderedNode(ReactiveNode):
         """Return True if a child may end in its first tick with the status `passed_status`."""
         flow = analysis.compute_flow(child, UNKNOWN_STATE, is_first_tick=True)
         return self._compute_passed_state(flow) is not None
+
+    @property
+    def counterpart(self) -> Counterpart | None:
+        """`Sequence` or `Fallback`; without memory `ReactiveSequence` or `ReactiveFallback`."""
+        name = "Sequence" if self.passed_status is Status.SUCCESS else "Fallback"
+        return Counterpart(name if self.memory else f"Reactive{name}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.inspection import Counterpart, MinTimeFunction
+from executive.tree.inspection import MinTimeFunction
 from executive.tree.keys import Child, Children, key
 from executive.tree.ordered import OrderedNode
 
@@ -36,8 +36,3 @@ class Sequence(OrderedNode):
     def first_child(self) -> Child | None:
         """The first child, which runs once; None without memory, because each tick runs the child again."""
         return self.do[0] if self.memory else None
-
-    @property
-    def counterpart(self) -> Counterpart | None:
-        """`Sequence`, or `ReactiveSequence` without memory."""
-        return Counterpart("Sequence" if self.memory else "ReactiveSequence")

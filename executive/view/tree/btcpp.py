@@ -141,16 +141,15 @@ class _Exporter:
             self._add_node(element, child)
         return element
 
-    def _add_custom_node(self, parent: Element, name: str, node_or_section: nodes.NodeOrSection) -> Element:
-        """Add a custom node for a control node, or for a section that contains nodes."""
-        keys = node_or_section.declaring_class.keys.values()
-        ports, node_keys = [key for key in keys if not _has_nodes(key)], list(filter(_has_nodes, keys))
-        items = list(nodes.iterate_keys(node_or_section))
-        values = {key.name: _format(value) for key, value in items if key in ports}
-        has_single_child = [(key.kind, key.is_required) for key in node_keys] == [(KeyKind.NODE, True)]
-        kind = "Decorator" if has_single_child else "Control"
+    def _add_custom_node(self, parent: Element, name: str, owner: nodes.NodeOrSection) -> Element:
+        """Add a custom node for `owner`, which is a control node, or a section that contains nodes."""
+        keys = owner.declaring_class.keys.values()
+        ports = [key for key in keys if not _has_nodes(key)]
+        values = {key.name: _format(value) for key, value in nodes.iterate_keys(owner) if key in ports}
+        kinds = [(key.kind, key.is_required) for key in keys if _has_nodes(key)]
+        kind = "Decorator" if kinds == [(KeyKind.NODE, True)] else "Control"
         element = self._add_element(parent, kind, name, ports, values)
-        for key, value in items:
+        for key, value in nodes.iterate_keys(owner):
             key_element = element
             if key.kind in (KeyKind.NODE, KeyKind.NODES) and key.name != "do":
                 kind = "Decorator" if key.kind is KeyKind.NODE else "Control"
@@ -158,7 +157,7 @@ class _Exporter:
             for part in value if isinstance(value, tuple) else (value,):
                 if isinstance(part, nodes.Node):
                     self._add_node(key_element, part)
-                elif isinstance(part, nodes.NodeSection) and key in node_keys:
+                elif isinstance(part, nodes.NodeSection) and _has_nodes(key):
                     self._add_custom_node(element, f"{name}-{key.name}", part)
         return element
 
