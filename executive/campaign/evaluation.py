@@ -86,10 +86,8 @@ class DetectorUnderTest:
 
     def make_measurement_name(self, dataset: Path | None) -> str:
         """Return the name of a measurement on a dataset, or on scenes of the cell if `dataset` is None."""
-        if dataset is None:
-            assert self.cell is not None
-            return self.cell.cell
-        return f"{self.cell.cell} on {dataset}" if self.cell else str(dataset)
+        cell_name = self.cell.cell if self.cell else ""
+        return " on ".join(filter(None, (cell_name, str(dataset or ""))))
 
 
 def list_detectors(

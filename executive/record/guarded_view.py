@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from executive.events import TimedEvent
-
-if TYPE_CHECKING:
-    from executive.record.recorded_run import View
-    from executive.run.run import Run
+from executive.record.recorded_run import View
+from executive.run.run import Run
 
 
 class GuardedView:

@@ -9,10 +9,11 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from executive.errors import ExecutiveError
 from executive.events import Observer, RunEnded, TimedEvent
+from executive.mission.load import LoadedMission
 from executive.mission.outline import make_outline
 from executive.mission.text.file_search import read_source
 from executive.record.audit_comparison import Audit, ItemCounts
@@ -22,12 +23,9 @@ from executive.record.recorder import Recorder
 from executive.record.result import FINAL_STATUSES, Result, list_requests, write_result
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import Timeline
-
-if TYPE_CHECKING:
-    from executive.mission.load import LoadedMission
-    from executive.run.assembly import RunOptions
-    from executive.run.run import Run
-    from executive.skill import Skill
+from executive.run.assembly import RunOptions, assemble
+from executive.run.run import Run
+from executive.skill import Skill
 
 
 class View(Protocol):
@@ -81,8 +79,6 @@ def record_run(
         InputError: The run directory cannot be made, or the cell cannot be built.
         ExecutiveError: The result cannot be written.
     """
-    from executive.run.assembly import assemble
-
     start_time = time.perf_counter()
     run = assemble(loaded, skills, options)
     with closing(run):

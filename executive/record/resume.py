@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from executive.errors import InputError
 from executive.events import MotionPlanned, RequestGiven, RunStarted, TimedEvent
@@ -20,10 +19,8 @@ from executive.record.result import FINAL_STATUSES, Result, read_result
 from executive.record.run_directory import RunDirectory
 from executive.replay.input_log import UNKNOWN_ACTION, InputLog
 from executive.replay.replayed_cell import ReplayedCell
-
-if TYPE_CHECKING:
-    from executive.run.assembly import RunOptions
-    from executive.skill import Skill
+from executive.run.assembly import RunOptions, assemble_resumed
+from executive.skill import Skill
 
 EVENTS_WITHOUT_REPLAY = (RunStarted, MotionPlanned, RequestGiven)
 """Kinds of events that a replay does not emit."""
@@ -54,8 +51,6 @@ def resume_run(
             is incomplete, or the replay differs from the record.
         ExecutiveError: The result cannot be written.
     """
-    from executive.run.assembly import assemble_resumed
-
     start_time = time.perf_counter()
     directory = RunDirectory(path)
     # The recorder locks the journal, so that no other process writes to the directory.

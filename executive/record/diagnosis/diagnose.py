@@ -6,9 +6,9 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING
 
 from executive.events import RunEnded
+from executive.mission.load import LoadedMission
 from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import Node, SkillNode
 from executive.record.diagnosis.advice import list_advice
@@ -21,9 +21,6 @@ from executive.record.timeline.activation import Reading, get_skill_name
 from executive.record.timeline.items import ItemHistory, Look, Sighting
 from executive.record.timeline.timeline import Timeline
 from executive.skill import Skill
-
-if TYPE_CHECKING:
-    from executive.mission.load import LoadedMission
 
 DECIDING_INPUTS: Mapping[str, tuple[str, ...]] = {
     "arm": ("arm.met",),  # Recorded name of `arm.collision`.

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from executive.errors import RecordLost
 from executive.events import RunEnded
+from executive.mission.load import LoadedMission
 from executive.mission.model.nodes import Node, SkillNode
 from executive.record.diagnosis.failure_path import find_failure_path, find_nodes_on_path
 from executive.record.timeline.activation import get_skill_name
 from executive.record.timeline.timeline import Timeline
-
-if TYPE_CHECKING:
-    from executive.mission.load import LoadedMission
 
 MAX_NAMED_ITEMS = 5
 """Maximum number of item names in a sentence."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import cast
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,8 +31,6 @@ TEXT_SCALE, PADDING = 0.36, 2
 
 def draw_picture(content: PictureContent) -> NDArray[np.uint8]:
     """Return a picture `(H, PICTURE_WIDTH, 3)`, RGB."""
-    import cv2
-
     image_bgr = content.image[:, :, ::-1]
     height, width = image_bgr.shape[:2]
     scale = PICTURE_WIDTH / width
@@ -60,8 +59,6 @@ def _shade_occlusions(image: NDArray[np.uint8], visible: NDArray[np.bool_] | Non
 
 def _draw_close_up(image: NDArray[np.uint8], box: Box, colour: str) -> NDArray[np.uint8]:
     """Return the enlarged square region around a box, `(STATUS_BAR_HEIGHT, STATUS_BAR_HEIGHT, 3)` BGR."""
-    import cv2
-
     left, top, right, bottom = box
     side = max(2.0, CLOSE_UP_SCALE * max(right - left, bottom - top))
     zoom = STATUS_BAR_HEIGHT / side

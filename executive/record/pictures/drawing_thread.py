@@ -6,6 +6,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
 from pathlib import Path
 
+import cv2
+
 from executive.errors import ExecutiveError, explain_os_errors
 from executive.record.atomic_file import replace_atomically
 from executive.record.pictures.draw import draw_picture
@@ -59,8 +61,6 @@ def save_picture(path: Path, content: PictureContent) -> None:
     Raises:
         ExecutiveError: The file cannot be written.
     """
-    import cv2
-
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -130,8 +131,6 @@ def _limit_outcomes(outcomes: Sequence[tuple[str, Sequence[str]]]) -> Sequence[t
 
 def _make_width_check(max_width: float, scale: float = _TEXT_SCALE) -> Callable[[str], bool]:
     """Return a predicate that is True for a text with a width of at most `max_width` [pixel]."""
-    import cv2
-
     return lambda text: cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)[0][0] <= max_width
 
 
@@ -139,7 +138,5 @@ def _write(
     bar: NDArray[np.uint8], text: str, x: int, row: int, colour: str, scale: float = _TEXT_SCALE
 ) -> None:
     """Write a text in a colour to a row of the status bar; the text starts at column `x` [pixel]."""
-    import cv2
-
     baseline = MARGIN + (row + 1) * LINE_HEIGHT - _BASELINE_OFFSET
     cv2.putText(bar, text, (x, baseline), cv2.FONT_HERSHEY_SIMPLEX, scale, to_bgr(colour), 1, cv2.LINE_AA)

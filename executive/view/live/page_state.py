@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 
 from executive import events
+from executive.record.timeline.activation import STATUS_TEXTS
 from executive.record.timeline.timeline import Timeline
 from executive.view.live.messages import CameraImage, JsonObject, Message
 
@@ -68,9 +69,8 @@ class PageState:
         """Return the status, last failure and item of a node, and the number of times it ended by status."""
         activation = self._timeline.activation_by_path[path]
         end_counts = self._timeline.end_counts.get(path, Counter())
-        statuses = {"done": "SUCCESS", "failed": "FAILURE", "halted": "INVALID"}
         return {
-            **{name: end_counts[status] for name, status in statuses.items()},
+            **{text: end_counts[status] for status, text in STATUS_TEXTS.items() if status != "RUNNING"},
             "status": activation.status.lower(), "failure": activation.failure, "item": activation.item,
         }  # fmt: skip
 

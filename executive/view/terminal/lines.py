@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from executive import events
 from executive.mission.outline import make_outline
 from executive.record.timeline.activation import STATUS_TEXTS
 from executive.record.timeline.timeline import Timeline
+from executive.run.run import Run
 from executive.view.tree.tree_text import find_skill_names
-
-if TYPE_CHECKING:
-    from executive.run.run import Run
 
 
 class LineView:
