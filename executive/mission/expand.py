@@ -224,8 +224,6 @@ class _Expander:
             return use
         arguments = self._collect_arguments(use, subtree)
         returns = self._map_returned_variables(use, subtree)
-        if arguments is None:
-            return use
         self._use_counts[use.name] += 1
         self._outermost_span = self._outermost_span if callers else use.span
         # A library must not depend on the params of a mission.
@@ -281,8 +279,8 @@ class _Expander:
                 self._add_error(setting.value.span, "wrong-type", message)
         return variables
 
-    def _collect_arguments(self, use: SubtreeNode, subtree: Subtree) -> dict[str, Value] | None:
-        """Return the value of every argument of the subtree, or None if a value is missing."""
+    def _collect_arguments(self, use: SubtreeNode, subtree: Subtree) -> dict[str, Value]:
+        """Return the value of every argument of the subtree; a missing value is an `InvalidValue`."""
         for name, setting in use.arguments.items():
             if name not in subtree.arguments:
                 hint = suggest_choice(name, subtree.arguments, "Arguments of the subtree")
@@ -291,13 +289,12 @@ class _Expander:
         values: dict[str, Value] = {}
         for name, argument in subtree.arguments.items():
             value = use.arguments[name].value if name in use.arguments else argument.default
-            if value is not None:
-                values[name] = value
-            else:
+            values[name] = value or InvalidValue(use.span)
+            if value is None:
                 message = f'the subtree "{subtree.name}" needs the argument "{name}"'
                 hint = f"Write with: {{{name}: ...}} at the level of use."
                 self._add_error(use.span, "missing-argument", message, hint)
-        return values if len(values) == len(subtree.arguments) else None
+        return values
 
     def _add_error(self, span: Span, code: str, message: str, hint: str = "") -> None:
         self.findings.append(make_error(span, code, message, hint))

@@ -72,9 +72,7 @@ def read_control_node(
         alternatives = " or ".join(f'"{name}"' for name in any_of)
         parser.add_error(span, "missing-key", f"{keyword} needs {alternatives}{level}")
     missing = {key.kind for name, key in node_class.keys.items() if key.is_required and name not in values}
-    if KeyKind.NODES in missing:
-        return InvalidNode(span, "")
-    if missing & {KeyKind.VARIABLE, KeyKind.ELEMENTS}:
+    if missing & {KeyKind.NODES, KeyKind.VARIABLE}:
         children = [node for value in values.values() for node in list_nodes(value)]
         return InvalidNode(span, label, tuple(children))
     return InnerNode(span, label, node_class, values)
@@ -108,7 +106,7 @@ def _read_keys(
             values |= {} if value is None else {key.name: value}
         elif key.is_required and key.kind is KeyKind.NODE:
             values[key.name] = InvalidNode(span, "")
-        elif key.is_required and key.kind is KeyKind.CONSTANT:
+        elif key.is_required and key.kind in (KeyKind.CONSTANT, KeyKind.ELEMENTS):
             values[key.name] = InvalidValue(span)
     return values
 
