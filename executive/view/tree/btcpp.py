@@ -141,24 +141,24 @@ class _Exporter:
             self._add_node(element, child)
         return element
 
-    def _add_custom_node(self, parent: Element, name: str, owner: nodes.NodeOrSection) -> Element:
-        """Add a custom node for `owner`, which is a control node, or a section that contains nodes."""
-        keys = owner.declaring_class.keys.values()
+    def _add_custom_node(self, parent: Element, name: str, part: nodes.NodeOrSection) -> Element:
+        """Add a custom node for `part`, which is a control node, or a section that contains nodes."""
+        keys = part.declaring_class.keys.values()
         ports = [key for key in keys if not _has_nodes(key)]
-        values = {key.name: _format(value) for key, value in nodes.iterate_keys(owner) if key in ports}
+        values = {key.name: _format(value) for key, value in nodes.iterate_keys(part) if key in ports}
         kinds = [(key.kind, key.is_required) for key in keys if _has_nodes(key)]
         kind = "Decorator" if kinds == [(KeyKind.NODE, True)] else "Control"
         element = self._add_element(parent, kind, name, ports, values)
-        for key, value in nodes.iterate_keys(owner):
+        for key, value in nodes.iterate_keys(part):
             key_element = element
             if key.kind in (KeyKind.NODE, KeyKind.NODES) and key.name != "do":
                 kind = "Decorator" if key.kind is KeyKind.NODE else "Control"
                 key_element = self._add_element(element, kind, f"{name}-{key.name}", (), {})
-            for part in value if isinstance(value, tuple) else (value,):
-                if isinstance(part, nodes.Node):
-                    self._add_node(key_element, part)
-                elif isinstance(part, nodes.NodeSection) and _has_nodes(key):
-                    self._add_custom_node(element, f"{name}-{key.name}", part)
+            for child in value if isinstance(value, tuple) else (value,):
+                if isinstance(child, nodes.Node):
+                    self._add_node(key_element, child)
+                elif isinstance(child, nodes.NodeSection) and _has_nodes(key):
+                    self._add_custom_node(element, f"{name}-{key.name}", child)
         return element
 
     def _add_element(
