@@ -38,7 +38,7 @@ START = np.radians([0.0, 20.0, 0.0, -80.0, 0.0, 60.0, 0.0])
 
 def load(mission: str = "sort_overhead", kind: Any = None, **overrides: str) -> MissionUnderTest:
     loaded = load_mission_under_test(mission, {**FAKE, **overrides}, has_oracle=False, seed=7)
-    return MissionUnderTest(loaded.loaded, loaded.skills, kind, "fake", 7)
+    return replace(loaded, make_cell=kind or loaded.make_cell)
 
 
 @pytest.fixture(scope="module")
