@@ -123,7 +123,7 @@ def _key_rows(owner: str, node: type[ControlNode | KeySection], prefix: str = ""
         if key.shorthand:
             written = (f"{written}, or " if find_inner_keys(node) else "") + f"the value of `{owner}`"
         value = KINDS.get(key.kind) or _value(key.make_validator().json_schema())
-        value = value.replace("node", "condition") if key.conditions else value
+        value = value.replace("node", "condition") if key.requires_conditions else value
         value += f", at most {key.max_count}" if key.max_count else ""
         yield [written, value, _default(key.default), key.doc]
         if key.kind in (KeyKind.SECTION, KeyKind.SECTIONS, KeyKind.REASONS_OR_SECTIONS):

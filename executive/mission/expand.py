@@ -57,13 +57,13 @@ class ExpandedMission:
 
 
 def expand(
-    mission: Mission, skills: Mapping[str, type[Skill]], names_by_word: Mapping[str, Sequence[str]]
+    mission: Mission, skills: Mapping[str, type[Skill]], predefined_lists: Mapping[str, Sequence[str]]
 ) -> ExpandedMission:
-    """Return the mission with expanded subtrees, params, arguments and words for lists.
+    """Return the mission with expanded subtrees, params, arguments and predefined lists.
 
-    `names_by_word` contains the names that replace each word; a word without an entry remains.
+    `predefined_lists` contains the names in each list; a list without an entry, such as `items`, remains.
     """
-    expander = _Expander(mission, skills, names_by_word)
+    expander = _Expander(mission, skills, predefined_lists)
     quotas = tuple(expander.expand_quota(quota) for quota in mission.quotas)
     tree = None if mission.tree is None else expander.expand_tree(mission.tree, expander.params)
     unused_subtrees = []
@@ -96,9 +96,12 @@ class _Expander:
     """
 
     def __init__(
-        self, mission: Mission, skills: Mapping[str, type[Skill]], names_by_word: Mapping[str, Sequence[str]]
+        self,
+        mission: Mission,
+        skills: Mapping[str, type[Skill]],
+        predefined_lists: Mapping[str, Sequence[str]],
     ) -> None:
-        self.mission, self.skills, self._names_by_word = mission, skills, names_by_word
+        self.mission, self.skills, self._predefined_lists = mission, skills, predefined_lists
         self.params: ValuesByName = {name: param.value for name, param in mission.params.items()}
         self.findings: list[Finding] = []
         self.used_names: set[str] = set()
@@ -154,17 +157,17 @@ class _Expander:
             return map_parts(part, expand_part)
 
         self.findings += self._find_shadowed_names(node, values)
-        expanded = self._expand_words(map_parts(node, expand_part))
+        expanded = self._expand_predefined_lists(map_parts(node, expand_part))
         return self._expand_use(expanded, callers, depth) if isinstance(expanded, SubtreeNode) else expanded
 
-    def _expand_words(self, node: Node) -> Node:
-        """Return a control node with lists of names in place of words such as `bins`."""
+    def _expand_predefined_lists(self, node: Node) -> Node:
+        """Return a control node with the names in place of each predefined list such as `bins`."""
         if not isinstance(node, InnerNode):
             return node
         values = dict(node.values)
         for key, value in iterate_keys(node):
             if key.kind is KeyKind.ELEMENTS and isinstance(value, Literal) and isinstance(value.value, str):
-                names = self._names_by_word.get(value.value)
+                names = self._predefined_lists.get(value.value)
                 values[key.name] = value if names is None else replace(value, value=list(names))
         return replace(node, values=values)
 

@@ -121,7 +121,7 @@ def load_mission(
             findings += cell_findings
             classes_by_detector = dict(cell_kind.labels(config, folder))
             min_times = None if cell_findings else cell_kind.min_times(config)
-    expansion = expand(mission, skills, _list_names_by_word(mission, config) if config else {})
+    expansion = expand(mission, skills, _make_predefined_lists(mission, config) if config else {})
     mission = replace(mission, quotas=expansion.quotas)
     tree = assign_paths(expansion.tree or InvalidNode(files.source.make_span(), label=""))
     context = CheckContext(
@@ -140,8 +140,8 @@ def load_mission(
     )  # fmt: skip
 
 
-def _list_names_by_word(mission: Mission, config: CellConfig) -> dict[str, Sequence[str]]:
-    """Return the names for which each word for a constant list stands."""
+def _make_predefined_lists(mission: Mission, config: CellConfig) -> dict[str, Sequence[str]]:
+    """Return the predefined lists whose names are known before the run."""
     return {
         "poses": next(iter(config.cameras.values())).scan_poses,
         "bins": list(config.bins),

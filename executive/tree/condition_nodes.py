@@ -20,7 +20,7 @@ class ConditionList(KeyOwner):
     is_condition: ClassVar[bool] = True
     memory = True
 
-    do: Children = key(shorthand=True, conditions=True, doc="Conditions, in order.")
+    do: Children = key(shorthand=True, requires_conditions=True, doc="Conditions, in order.")
 
 
 class AllConditions(ConditionList, Sequence):
@@ -57,4 +57,4 @@ class NotCondition(Invert):
     keyword = "not"
     is_condition = True
 
-    do: Child = key(shorthand=True, in_path=False, conditions=True, doc="Condition.")
+    do: Child = key(shorthand=True, in_path=False, requires_conditions=True, doc="Condition.")

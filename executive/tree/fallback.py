@@ -28,7 +28,7 @@ class Fallback(OrderedNode):
     keyword = "fallback"
     keyword_hints: ClassVar = {"selector": "Write fallback."}
     symbol, shape = "?", "octagon"
-    passed_status = Status.FAILURE
+    continue_status = Status.FAILURE
     unreachable_reason = "an earlier child never fails"
 
     do: Children = key(shorthand=True, doc="Alternatives, in order.")

@@ -35,7 +35,7 @@ class Guard(ReactiveNode):
     symbol = "◉"
     counterpart = Counterpart("ReactiveSequence")
 
-    holds: Child = key(conditions=True, doc="Condition that must succeed at every tick.")
+    holds: Child = key(requires_conditions=True, doc="Condition that must succeed at every tick.")
     do: Child = key(doc="Body.")
 
     def step(self) -> Status:

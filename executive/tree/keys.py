@@ -42,7 +42,7 @@ Reasons: TypeAlias = tuple[Reason, ...]
 Elements: TypeAlias = tuple[object, ...] | VariableName | Literal["items"]
 """Type of a key with a list of values, the name of a variable that holds a list, or `items`: the items that
 still have to be sorted."""
-ELEMENT_WORDS = ("poses", "bins", "classes", "items")
+PREDEFINED_LISTS = ("poses", "bins", "classes", "items")
 """Words for lists of names. Lists replace all words except `items` before the tree is built."""
 
 
@@ -73,9 +73,9 @@ class Key:
         shorthand: True if the key may be omitted and its value written directly under the keyword.
         sibling: True if the key is a sibling of the keyword in the mission file: `catch` next to `try`.
         in_path: True if the paths of the nodes under the key contain the key.
-        raising_key: For a list of reasons: key with the nodes that may fail with the reasons.
+        failing_nodes_key: For a list of reasons: key with the nodes that may fail with the reasons.
         list_key: For a loop variable: key of the list of its values; otherwise "".
-        conditions: True if each node under the key must be a condition.
+        requires_conditions: True if each node under the key must be a condition.
         name: Name of the key in the mission file.
         attribute: Name of the attribute in the class.
         kind: Kind of the value.
@@ -91,9 +91,9 @@ class Key:
     shorthand: bool = False
     sibling: bool = False
     in_path: bool = True
-    raising_key: str = "do"
+    failing_nodes_key: str = "do"
     list_key: str = ""
-    conditions: bool = False
+    requires_conditions: bool = False
     name: str = ""
     attribute: str = ""
     kind: KeyKind = KeyKind.CONSTANT
@@ -117,12 +117,12 @@ class Key:
 _Arguments = ParamSpec("_Arguments")
 
 
-def _return_any(key_class: Callable[_Arguments, Key]) -> Callable[_Arguments, Any]:
+def _with_any_result(key_class: Callable[_Arguments, Key]) -> Callable[_Arguments, Any]:
     """Return a class as a function whose result mypy accepts as the value of an attribute of any type."""
     return key_class
 
 
-key = _return_any(Key)
+key = _with_any_result(Key)
 """Declare a key in the body of a class: `seconds: float = key(gt=0, doc="Limit [s].")`.
 
 `KeyOwner` derives name, kind and type from the attribute. The name of the key is the name of the

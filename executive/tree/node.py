@@ -78,7 +78,7 @@ class TreeNode(Behaviour):
         self._failure: Failure | None = None
         self._visited_nodes: list[Behaviour] | None = None
         """Nodes below this node that the current call of `tick` has ticked; None outside of `tick`."""
-        self._emit_from_root = context.emit
+        self._emit_without_parent = context.emit
 
     @property
     def failure(self) -> Failure | None:
@@ -92,7 +92,7 @@ class TreeNode(Behaviour):
 
     def emit(self, event: Event) -> None:
         """Emit an event of this node or of a node below, through all ancestors."""
-        emit = self.parent.emit if isinstance(self.parent, TreeNode) else self._emit_from_root
+        emit = self.parent.emit if isinstance(self.parent, TreeNode) else self._emit_without_parent
         emit(event)
 
     def update(self) -> Status:

@@ -14,16 +14,16 @@ from executive.tree.reactive_node import ReactiveNode
 
 
 class OrderedNode(ReactiveNode):
-    """Run the children in order until a child takes time, or ends with another status than `passed_status`.
+    """Run the children in order until a child takes time, or ends with another status than `continue_status`.
 
     Without memory, every tick begins with the first child. A child that runs again and ends as before emits
     no events. The semantics are those of ReactiveSequence and ReactiveFallback of BehaviorTree.CPP 4.
 
     Attributes:
-        passed_status: Status of a child after which the next child is ticked in the same tick.
+        continue_status: Status of a child after which the next child is ticked in the same tick.
     """
 
-    passed_status: ClassVar[Status]
+    continue_status: ClassVar[Status]
 
     memory: bool = key(
         default=True,
@@ -39,13 +39,13 @@ class OrderedNode(ReactiveNode):
     def step(self) -> Status:
         """Tick the children in order until one of them decides the status of the tick."""
         previous_index = index = self._child_index
-        status = self.passed_status
+        status = self.continue_status
         for index in range(previous_index if self.memory else 0, len(self.do)):
             if index > previous_index:
                 self.report_next(index)
             child = self.do[index]
             status = self.tick_child(child) if self.memory else self.tick_again(child)
-            if status is not self.passed_status:
+            if status is not self.continue_status:
                 break
         if index < previous_index:
             self.halt_children([self.do[previous_index]])
@@ -76,17 +76,17 @@ class OrderedNode(ReactiveNode):
             if entry is None:
                 break
             flows.append(get_flow(child, entry))
-            entry = self._compute_passed_state(flows[-1])
+            entry = self._compute_next_entry(flows[-1])
         # A sequence ends with the first failure; a fallback ends with the first success or the last failure.
-        is_sequence = self.passed_status is Status.SUCCESS
+        is_sequence = self.continue_status is Status.SUCCESS
         success = entry if is_sequence else join_states(flow.success for flow in flows)
         last_flows = flows if is_sequence else flows[-1:]
         failures = {failure: end for flow in last_flows for failure, end in flow.failures.items()}
         return Flow(success, failures, join_states(flow.halted for flow in flows))
 
-    def _compute_passed_state(self, flow: Flow) -> FlowState | None:
-        """Return the state after a child ended with `passed_status`; None if the child cannot end so."""
-        if self.passed_status is Status.SUCCESS:
+    def _compute_next_entry(self, flow: Flow) -> FlowState | None:
+        """Return the entry state of the next child; None if the child never ends with `continue_status`."""
+        if self.continue_status is Status.SUCCESS:
             return flow.success
         return join_states(end.with_handled_failure(failure) for failure, end in flow.failures.items())
 
@@ -101,7 +101,7 @@ class OrderedNode(ReactiveNode):
             yield NodeFinding("memory", "useless-reactive", message, is_warning=True)
             return
         # While a child after `blocker` would run, each tick runs `blocker` again, which takes time again.
-        blocker = next((child for child in slow if not self._may_pass_at_once(child, analysis)), slow[-1])
+        blocker = next((child for child in slow if not self._may_continue_at_once(child, analysis)), slow[-1])
         name = analysis.get_name(blocker)
         for child in slow[slow.index(blocker) + 1 :]:
             message = (
@@ -117,13 +117,13 @@ class OrderedNode(ReactiveNode):
                 hint = "Put it before this node, or use a condition."
                 yield NodeFinding(child, "repeated-action", message, hint, is_warning=True)
 
-    def _may_pass_at_once(self, child: Child, analysis: NodeAnalysis) -> bool:
-        """Return True if a child may end in its first tick with the status `passed_status`."""
+    def _may_continue_at_once(self, child: Child, analysis: NodeAnalysis) -> bool:
+        """Return True if a child may end in its first tick with the status `continue_status`."""
         flow = analysis.compute_flow(child, UNKNOWN_STATE, is_first_tick=True)
-        return self._compute_passed_state(flow) is not None
+        return self._compute_next_entry(flow) is not None
 
     @property
     def counterpart(self) -> Counterpart | None:
         """`Sequence` or `Fallback`; without memory `ReactiveSequence` or `ReactiveFallback`."""
-        name = "Sequence" if self.passed_status is Status.SUCCESS else "Fallback"
+        name = "Sequence" if self.continue_status is Status.SUCCESS else "Fallback"
         return Counterpart(name if self.memory else f"Reactive{name}")

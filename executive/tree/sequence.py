@@ -23,7 +23,7 @@ class Sequence(OrderedNode):
 
     keyword = "sequence"
     symbol, shape = "→", "box"
-    passed_status = Status.SUCCESS
+    continue_status = Status.SUCCESS
     unreachable_reason = "an earlier child never succeeds"
 
     do: Children = key(shorthand=True, doc="Nodes to run, in order.")

@@ -14,7 +14,7 @@ from executive.skill import ANY, Direction, Skill
 def find_non_conditions(context: CheckContext, parent: InnerNode) -> Iterator[Finding]:
     """Yield an error for each child that is not a condition although its key allows only conditions."""
     for key, value in iterate_keys(parent):
-        for node in list_nodes(value) if key.conditions else ():
+        for node in list_nodes(value) if key.requires_conditions else ():
             if problem := _find_problem(context, node):
                 message = f"{problem}, but {get_type_name(parent)}.{key.name} needs a condition"
                 yield make_error(node.span, "no-condition", message, _make_hint(context))

@@ -20,7 +20,7 @@ from executive.skill import Skill
 from executive.tree.failure import Reason
 from executive.tree.flow import Flow, FlowState
 from executive.tree.inspection import NodeFinding
-from executive.tree.keys import ELEMENT_WORDS, Child, Key, KeyKind
+from executive.tree.keys import PREDEFINED_LISTS, Child, Key, KeyKind
 from executive.tree.node import ControlNode
 
 
@@ -42,12 +42,12 @@ def _check_keys(context: CheckContext, owner: InnerNode | NodeSection, name: str
             key.kind is KeyKind.ELEMENTS
             and isinstance(value, Literal)
             and not isinstance(value.value, list)
-            and value.value not in ELEMENT_WORDS
+            and value.value not in PREDEFINED_LISTS
         ):
-            suggestion = suggest_word(value.value, ELEMENT_WORDS)
+            suggestion = suggest_word(value.value, PREDEFINED_LISTS)
             description = f"{describe_value(value.value)}{suggestion}{value.origin_note}"
-            words = ", ".join(ELEMENT_WORDS)
-            message = f"{name}.{key.name} must be a list, a variable, or one of {words}, not {description}"
+            names = ", ".join(PREDEFINED_LISTS)
+            message = f"{name}.{key.name} must be a list, a variable, or one of {names}, not {description}"
             is_text_at_key = isinstance(value.value, str) and not value.origin
             hint = f"Write a list: [{value.value}]." if is_text_at_key else ""
             yield make_error(value.span, "wrong-type", message, hint)

@@ -65,7 +65,7 @@ def _find_names_with_bodies(node: Node) -> Iterator[tuple[FailureName, str, Node
     if not isinstance(node, InnerNode):
         return
     for key, name in _find_failure_names(node):
-        for body in list_nodes(node.values.get(key.raising_key, ())):
+        for body in list_nodes(node.values.get(key.failing_nodes_key, ())):
             yield name, node.declaring_class.keyword, body
 
 

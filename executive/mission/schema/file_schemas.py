@@ -20,7 +20,7 @@ from executive.mission.schema.types import (
     make_settings_schema,
     make_value_or_reference_schema,
 )
-from executive.tree.keys import ELEMENT_WORDS, Key, KeyKind
+from executive.tree.keys import PREDEFINED_LISTS, Key, KeyKind
 from executive.tree.node import ControlNode
 from executive.tree.node_registry import ControlNodes
 
@@ -151,8 +151,8 @@ def _make_value_schema(key: Key | GrammarKey) -> Schema:
         case KeyKind.VARIABLE:
             return _SCHEMAS_BY_KIND["name"]
         case KeyKind.ELEMENTS:
-            words = {"enum": list(ELEMENT_WORDS)}
-            return make_value_or_reference_schema({"type": "array"}, words)
+            list_names = {"enum": list(PREDEFINED_LISTS)}
+            return make_value_or_reference_schema({"type": "array"}, list_names)
         case KeyKind.SECTIONS:
             section = _make_mapping_schema(key.section.keys)
             return {**section, "type": ["array", "object"], "items": section}
