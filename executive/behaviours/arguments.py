@@ -21,7 +21,7 @@ _PLAIN_TYPES = (str, int, float, bool, NoneType, list, tuple, dict, set, frozens
 _CONTAINERS = {
     list: list, tuple: tuple, dict: dict, set: set, frozenset: frozenset, Sequence: list, Mapping: dict,
 }  # fmt: skip
-"""Type of the values in a mission, by the origin of a declared type with type arguments."""
+"""Container in missions, by the origin of a declared generic type: a list for each `Sequence[int]`."""
 
 
 def list_arguments(behaviour: type[Behaviour]) -> dict[str, Param]:
@@ -51,7 +51,7 @@ def list_arguments(behaviour: type[Behaviour]) -> dict[str, Param]:
 
 
 def find_mission_type(declared_type: object) -> object:
-    """Return the type that a mission uses for a declared type, or None if no mission can contain a value.
+    """Return the type that a mission uses for a declared type, or None if missions cannot contain the values.
 
     An enumeration becomes a Literal of the names of its members. A union keeps the types that a mission can
     contain.
@@ -69,7 +69,7 @@ def find_mission_type(declared_type: object) -> object:
 
 
 def to_argument(value: object, declared_type: object) -> object:
-    """Convert a value from a mission to the declared type: names of members become members."""
+    """Convert a value from a mission to the declared type: names of enumeration members become members."""
     origin, parts = get_origin(declared_type), get_args(declared_type)
     if _is_enumeration(declared_type) and isinstance(value, str):
         return declared_type.__members__.get(value, value)

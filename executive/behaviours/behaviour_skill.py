@@ -124,7 +124,7 @@ def make_behaviour_skill(name: str, behaviour_type: type[Behaviour]) -> type[Beh
         "__doc__": inspect.getdoc(behaviour_type), "__module__": behaviour_type.__module__,
         "behaviour_type": behaviour_type, "arguments": arguments, "params": params, "ports": ports,
         "is_condition": getattr(behaviour_type, "is_condition", False),
-        # Other behaviours may read sensors.
+        # A behaviour that is not replayable may read sensors.
         "is_replayable": is_replayable, "senses": not is_replayable,
     }  # fmt: skip
     return cast("type[BehaviourSkill]", type(name, (BehaviourSkill,), members))
@@ -156,7 +156,7 @@ def _make_port(name: str, direction: Direction, declared: PortInformation) -> Po
 
 
 def _explain_failure(behaviour: Behaviour) -> str:
-    """Return the feedback message of a failed behaviour; if it is empty, that of the failed descendant."""
+    """Return the feedback message of a failed behaviour; if empty, the message of the failed descendant."""
     failed_node = behaviour.tip()
     if behaviour.feedback_message or failed_node in (None, behaviour):
         return behaviour.feedback_message or "it has no feedback message"

@@ -13,7 +13,7 @@ from executive.tree.sequence import Sequence
 class ConditionList(KeyOwner):
     """First base class of `all` and `any`; the second base class is the sequence or the fallback.
 
-    Conditions decide within one tick, so that the key `memory` would have no effect.
+    Conditions decide within one tick, so the key `memory` would have no effect.
     """
 
     shape: ClassVar[str] = "ellipse"

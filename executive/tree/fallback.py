@@ -17,11 +17,11 @@ class Fallback(OrderedNode):
 
     With memory, a child that failed is not run again. Without memory, every tick begins with the first child
     again: children that have failed are tried again while a later child runs, and the later child is halted
-    if one of them succeeds or takes time.
+    if one of them succeeds or returns RUNNING.
 
     * BehaviorTree.CPP: `Fallback`; without memory `ReactiveFallback`. Here, children are never skipped.
-      The checker warns of a second child that takes time, unless the first may fail at once;
-      BehaviorTree.CPP throws an exception in the run in each case, but only if this is enabled.
+      The checker warns if two children can return RUNNING, unless the first of them may fail in its first
+      tick. BehaviorTree.CPP can throw an exception in the run, without this exemption.
     * py_trees: `Selector(memory=True)` or `Selector(memory=False)`. There, a fallback may be empty.
     """
 
@@ -46,7 +46,8 @@ class Fallback(OrderedNode):
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the cause of a failure: all children failed. The text contains the handled failures."""
         causes = ", ".join(f"{name} ({message})" for name, message in failure.last_messages.items())
-        return f"all {len(self.do)} choices failed" + (f"; the others failed with {causes}" if causes else "")
+        earlier_failures = f"; the earlier ones failed with {causes}" if causes else ""
+        return f"all {len(self.do)} choices failed{earlier_failures}"
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
         """Yield all children except the first, with the names `choice 2`, `choice 3`, …."""

@@ -130,7 +130,7 @@ class FlowState:
         return self.with_tool_states(frozenset({PossibleToolState(declared_state, path)}))
 
     def find_tool_state(self, state: ToolState) -> PossibleToolState | None:
-        """Return one of the possible tool states whose `state` is the given EMPTY or HOLDING, or None."""
+        """Return a possible tool state in which the tool is EMPTY or HOLDING as in `state`, or None."""
         candidates = (candidate for candidate in self.tool_states or () if candidate.state is state)
         # Sets have no order; `min` makes the findings reproducible.
         return min(candidates, key=lambda state: (state.cause, state.handled_failure), default=None)
@@ -236,7 +236,7 @@ def find_end_tool_states(flow: Flow, entry: FlowState, can_be_halted: bool) -> T
 def combine_tool_states(entry: ToolStates, branch_ends: Iterable[ToolStates]) -> ToolStates:
     """Return the possible tool states after parallel branches, of which at most one uses the tool.
 
-    `entry` are the states before the branches; `branch_ends` are the states after each branch.
+    `entry` contains the states before the branches; `branch_ends` contains the states after each branch.
     """
     changed_ends = [states for states in branch_ends if _remove_history(states) != _remove_history(entry)]
     if any(states is None for states in changed_ends):

@@ -95,7 +95,8 @@ class Guard(ReactiveNode):
     def _fails_after_release(self, analysis: NodeAnalysis, body_end: FlowState) -> bool:
         """Return True if the body ends with an empty tool, and the condition cannot succeed with that tool.
 
-        A body that releases an object waits until the object lies still, and thus fails in the meantime.
+        A release returns RUNNING until the object lies still; meanwhile, the guard checks its condition, and
+        fails.
         """
         is_empty = body_end.tool_states is not None and body_end.find_tool_state(HOLDING) is None
         return is_empty and analysis.compute_flow(self.holds, body_end).success is None

@@ -1,4 +1,4 @@
-"""Halt of a tree, which stops every running node once, even if the clean-up of another node fails.
+"""Function that halts a tree: it stops every running node once, even if the clean-up of a node fails.
 
 The function `halt` replaces the `stop` of py_trees, because `stop` also calls `terminate` of nodes that have
 ended, and leaves nodes running after the first exception of a `terminate`.

@@ -1,4 +1,4 @@
-"""Arguments and results of the methods of control nodes for the checker, the diagnosis and the export."""
+"""Types that the checker, the diagnosis and the export exchange with control nodes."""
 
 from __future__ import annotations
 
@@ -56,10 +56,13 @@ class NodeAnalysis(Protocol):
         """
 
     def get_name(self, child: Child) -> str:
-        """Return the name of a child in paths."""
+        """Return the last part of the path of a child: its label, or its skill, subtree or keyword."""
 
     def describe_place(self, reason: Reason, reported_reason: Reason) -> str:
-        """Return the line of `reason` as a text, with the file if `reported_reason` is in another file."""
+        """Return the place of `reason`: `line 12`, or `x.yaml:12` if `reported_reason` is in another file.
+
+        The finding is reported at `reported_reason`.
+        """
 
     def is_literal(self, key: str) -> bool:
         """Return True if the value of a key is written at the node itself, not in a param or an argument."""
@@ -71,7 +74,10 @@ class NodeAnalysis(Protocol):
         """Return the name and the minimum time [s] of each skill in the subtree of a child."""
 
     def list_skills(self, child: Child | None = None) -> Mapping[str, type[Skill] | None]:
-        """Return the skills below a child, by default below the node, by name; None: not installed."""
+        """Return the class of each skill in the subtree of `child`, by name; None if not installed.
+
+        If `child` is None, the skills are those in the subtree of the node itself.
+        """
 
 
 @dataclass(frozen=True)
@@ -100,7 +106,7 @@ class PropagatedFailure:
 
     def matches(self, reasons: Sequence[Reason]) -> bool:
         """Return True if one of `reasons` denotes the failure."""
-        # A `FailureName` of the checker is a `Reason` with a position, and equals no plain `Reason`.
+        # The checker passes `FailureName` objects, which have a position and never equal a plain `Reason`.
         return any(Reason(reason.source, reason.reason) in self.reasons for reason in reasons)
 
 
@@ -125,8 +131,8 @@ class Counterpart:
 
     Attributes:
         name: Name of the node type.
-        ports: Value of each port: the name of a key that the mission sets and whose value the port has, or
-            a number that the control node has computed from its constants.
+        ports: By port, a number, or the name of the key whose value the port gets. The mission must set
+            that key.
     """
 
     name: str

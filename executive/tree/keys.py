@@ -43,7 +43,8 @@ Elements: TypeAlias = tuple[object, ...] | VariableName | Literal["items"]
 """Type of a key with a list of values, the name of a variable that holds a list, or `items`: the items that
 still have to be sorted."""
 PREDEFINED_LISTS = ("poses", "bins", "classes", "items")
-"""Words for lists of names. Lists replace all words except `items` before the tree is built."""
+"""Names of predefined lists. `for_each` reads the list `items` in the run; the loader of missions replaces
+every other name by its list before the tree is built."""
 
 
 class KeyKind(Enum):
@@ -73,7 +74,7 @@ class Key:
         shorthand: True if the key may be omitted and its value written directly under the keyword.
         sibling: True if the key is a sibling of the keyword in the mission file: `catch` next to `try`.
         in_path: True if the paths of the nodes under the key contain the key.
-        failing_nodes_key: For a list of reasons: key with the nodes that may fail with the reasons.
+        failing_nodes_key: For a list of reasons: key with the nodes whose failures the reasons denote.
         list_key: For a loop variable: key of the list of its values; otherwise "".
         requires_conditions: True if each node under the key must be a condition.
         name: Name of the key in the mission file.
@@ -118,7 +119,7 @@ _Arguments = ParamSpec("_Arguments")
 
 
 def _with_any_result(key_class: Callable[_Arguments, Key]) -> Callable[_Arguments, Any]:
-    """Return a class as a function whose result mypy accepts as the value of an attribute of any type."""
+    """Return `key_class`, typed as a function with the result Any, so that mypy accepts `x: int = key()`."""
     return key_class
 
 

@@ -8,10 +8,10 @@ from executive.tree.generator_node import GeneratorNode, NodeRun
 
 
 class Loop(GeneratorNode):
-    """Base class of loops, with the rule when the next iteration may begin.
+    """Base class of loops, which determines when the next iteration begins.
 
     After an iteration that took only one tick, the next iteration begins in the next tick, so that a loop
-    never blocks a tick. In the tick in which a longer iteration ends, the next iteration begins.
+    never blocks a tick. After a longer iteration, the next iteration begins in the same tick.
     """
 
     symbol, shape = "↻", "hexagon"

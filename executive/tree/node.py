@@ -56,7 +56,7 @@ class NodeContext:
 
 
 def make_inspection_context(path: str = "", label: str = "") -> NodeContext:
-    """Return the context of a node that is inspected but never executed, so that it needs no run."""
+    """Return a context without a run, for a node that is inspected but never executed."""
     return NodeContext(path, cast("Clock", None), cast("Ledger", None), Blackboard(), label)
 
 
@@ -119,10 +119,10 @@ class ControlNode(KeyOwner, TreeNode):
         reasons: Declared reasons of the failures that the node itself causes.
         symbol: Character before the name of the node in drawings.
         shape: Shape of the node in Graphviz drawings.
-        remedy: Advice to let this node handle a failure: `add a retry around`; the name of the failing node
-            follows. "" if this node handles no failures.
-        is_condition: True if the node is a condition, because its children must be conditions.
-        keyword_hints: Hints for authors, by the wrong keyword that an author writes instead of `keyword`.
+        remedy: Beginning of the advice to handle a failure with this node, such as `add a retry around`; the
+            name of the failing node is appended. "" if this node handles no failures.
+        is_condition: True if the node counts as a condition; its keys must then accept only conditions.
+        keyword_hints: Hint for each wrong keyword that an author may write instead of `keyword`.
         clock: Clock of the run.
         ledger: Ledger of the run.
     """
@@ -174,7 +174,7 @@ class ControlNode(KeyOwner, TreeNode):
     # Methods for the checker.
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible outcomes of the node from a state; `get_flow` returns those of a child."""
+        """Return the outcomes that are possible from a state; `get_flow` returns the outcomes of a child."""
         raise NotImplementedError
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
@@ -202,7 +202,7 @@ class ControlNode(KeyOwner, TreeNode):
 
     @property
     def children_halted_by_sibling(self) -> tuple[Child, ...]:
-        """Children that the node halts after the end of another child; they may contain endless loops."""
+        """Children that the node halts when another child ends. These children may contain endless loops."""
         return ()
 
     # Methods for the diagnosis.
@@ -220,7 +220,7 @@ class ControlNode(KeyOwner, TreeNode):
         yield from ()
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield each child that runs only after a failure or at the end, after its name for reports."""
+        """Yield (name in reports, child) for each child that runs only after a failure or at the end."""
         yield from ()
 
     # Property for the export.

@@ -14,7 +14,7 @@ from executive.tree.reactive_node import ReactiveNode
 
 
 class OrderedNode(ReactiveNode):
-    """Run the children in order until a child takes time, or ends with another status than `continue_status`.
+    """Run the children in order until a child returns another status than `continue_status`.
 
     Without memory, every tick begins with the first child. A child that runs again and ends as before emits
     no events. The semantics are those of ReactiveSequence and ReactiveFallback of BehaviorTree.CPP 4.
@@ -54,12 +54,12 @@ class OrderedNode(ReactiveNode):
         return self.fail(self.get_failure(self.do[index])) if status is Status.FAILURE else status
 
     def report_next(self, index: int) -> None:
-        """Report that the child at `index` follows the child before it, if this is a decision of the node."""
+        """Called when the node goes on or back to the child at `index`; a fallback reports this decision."""
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes.
 
-        Without memory, a pass through the children also begins in the states while a child is running.
+        Without memory, each tick begins a new pass, also from the states in which a child is running.
         """
         while True:
             flow = self._compute_pass(get_flow, state)
@@ -97,10 +97,10 @@ class OrderedNode(ReactiveNode):
         flows = {child: analysis.get_flow(child) for child in self.do}
         slow = [child for child, flow in flows.items() if flow and flow.halted is not None]
         if not slow or slow == [self.do[0]]:
-            message = "without memory, this node does the same as with memory: no later child takes time"
+            message = "`memory: false` has no effect: no child after the first takes time"
             yield NodeFinding("memory", "useless-reactive", message, is_warning=True)
             return
-        # While a child after `blocker` would run, each tick runs `blocker` again, which takes time again.
+        # Each tick runs `blocker` again, which does not pass at once: a running child after it is halted.
         blocker = next((child for child in slow if not self._may_continue_at_once(child, analysis)), slow[-1])
         name = analysis.get_name(blocker)
         for child in slow[slow.index(blocker) + 1 :]:
@@ -108,17 +108,17 @@ class OrderedNode(ReactiveNode):
                 f"{analysis.get_name(child)} takes time, and so does {name}: without memory, every tick "
                 f"runs {name} again, which halts {analysis.get_name(child)}"
             )
-            hint = "Only one child may take time: put these nodes into a list, which is one child."
+            hint = "Only one child may take time: combine these nodes into one child (a list)."
             yield NodeFinding(child, "two-running", message, hint, is_warning=True)
         for child in self.do[: self.do.index(blocker)]:
             skills = analysis.list_skills(child).items() if child not in slow else ()
             if actions := [name for name, skill in skills if skill is not None and not skill.is_condition]:
-                message = f"{actions[0]} is no condition, but runs again at every tick of {name}"
-                hint = "Put it before this node, or use a condition."
+                message = f"{actions[0]} is not a condition, but runs again at every tick of {name}"
+                hint = "Put the action before this node, or use a condition."
                 yield NodeFinding(child, "repeated-action", message, hint, is_warning=True)
 
     def _may_continue_at_once(self, child: Child, analysis: NodeAnalysis) -> bool:
-        """Return True if a child may end in its first tick with the status `continue_status`."""
+        """Return True if a child may end with `continue_status` in its first tick."""
         flow = analysis.compute_flow(child, UNKNOWN_STATE, is_first_tick=True)
         return self._compute_next_entry(flow) is not None
 

@@ -33,9 +33,9 @@ class Parallel(ControlNode):
 
     * If enough children have succeeded, the node halts the running children and succeeds, even if other
       children failed in the same tick.
-    * If too many children have failed, the node fails with the first failure; among failures in one tick,
-      the failure of the earliest child in `do`. With `halt`, the node halts the running children at once;
-      without `halt`, the running children finish.
+    * If too many children have failed, the node fails with the first failure. If several children fail in
+      one tick, the failure of the first of them in `do` counts. With `halt`, the node halts the running
+      children at once; without `halt`, the running children finish.
 
     With `wait_for: lead`, the first child is the lead: the node ends in the same tick as the lead, with the
     status of the lead, and halts the other children.
@@ -134,7 +134,7 @@ class Parallel(ControlNode):
             self.report_choice(choice, failure)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible outcomes: combinations of those of the children, which all start in `state`."""
+        """Return the combinations of the possible outcomes of the children, which all start in `state`."""
         flows = [get_flow(child, state) for child in self.do]
         halted_ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
         halted = join_states(flow.halted for flow in flows)

@@ -16,7 +16,7 @@ class ReactiveNode(ControlNode):
     """Base class of the control nodes that run children again in every tick.
 
     If a run of a child takes one tick and has the same result as the previous run, its events are discarded.
-    Otherwise, a condition that is checked at every tick would fill the journal with equal events.
+    Without this rule, a condition that is checked at every tick would fill the journal with equal events.
     """
 
     def __init__(self, context: NodeContext, **values: object) -> None:

@@ -21,7 +21,7 @@ from executive.tree.loop import Loop
 
 
 class CounterLimits(KeySection):
-    """Values of counters of the run; the loop ends at the first that is reached."""
+    """Limits of counters of the run; the loop ends as soon as one counter reaches its limit."""
 
     any_of = ("placed", "rejected", "elapsed")
 
@@ -138,7 +138,7 @@ class Repeat(Loop):
         if not any(skill is None or skill.tool_state in ((HOLDING, EMPTY), (ANY, EMPTY)) for skill in skills):
             message = "this loop never succeeds: its body releases no object, so `placed` does not increase"
             yield NodeFinding(
-                "", "endless", message, "Add a failure reason or elapsed to until, or add times."
+                "", "endless", message, "Add a failure reason or `elapsed` to `until`, or add `times`."
             )
 
     def explain(self, failure: PropagatedFailure) -> str:

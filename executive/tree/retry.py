@@ -127,7 +127,7 @@ class Retry(Loop):
         may_change = any(skill is None or skill.senses or skill.moves or skill.waits for skill in skills)
         if not self.backoff and skills and not may_change:
             message = "this retry changes nothing between its attempts: no node in it looks, moves or waits"
-            hint = "Put a look or a motion into do or recover, or wait with backoff."
+            hint = "Put a look or a motion into `do` or `recover`, or wait with `backoff`."
             yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
         # A param with the value 1 is no mistake, because the param may have another value in another run.
         if self.attempts == 1 and analysis.is_literal("attempts"):

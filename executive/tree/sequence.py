@@ -13,11 +13,11 @@ class Sequence(OrderedNode):
     """Run the children in order; fail with the first failure.
 
     Without memory, every tick begins with the first child again: children that have succeeded are checked
-    again while a later child runs, and the later child is halted if one of them fails or takes time.
+    again while a later child runs, and the later child is halted if one of them fails or returns RUNNING.
 
     * BehaviorTree.CPP: `Sequence`; without memory `ReactiveSequence`. Here, children are never skipped.
-      The checker warns of a second child that takes time, unless the first may succeed at once;
-      BehaviorTree.CPP throws an exception in the run in each case, but only if this is enabled.
+      The checker warns if two children can return RUNNING, unless the first of them may succeed in its first
+      tick. BehaviorTree.CPP can throw an exception in the run, without this exemption.
     * py_trees: `Sequence(memory=True)` or `Sequence(memory=False)`. There, a sequence may be empty.
     """
 

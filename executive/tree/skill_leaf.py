@@ -27,7 +27,7 @@ class Wiring:
         constants: Values of params and inputs from the mission file, by the name of the param or input.
         inputs: Names of the variables from which inputs are read, by the name of the input.
         outputs: Names of the variables to which outputs are written, by the name of the output.
-        fields: Fields of the variables that inputs read, by the name of the input; without whole values.
+        fields: Fields that inputs read instead of the whole values of variables, by the name of the input.
     """
 
     constants: Mapping[str, object] = field(default_factory=dict)
@@ -129,7 +129,7 @@ class SkillLeaf(TreeNode):
         return inputs
 
     def _read_value(self, value: object, field_name: str | None) -> object:
-        """Return a value, or a field of the value; the fields of an item are those in the ledger now."""
+        """Return a value, or a field of the value; for an item, the ledger contains the current fields."""
         if field_name is None:
             return value
         return getattr(self._cell.ledger.describe(value) if isinstance(value, str) else value, field_name)

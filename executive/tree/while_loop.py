@@ -55,7 +55,7 @@ class While(Loop):
         condition = analysis.get_flow(self.condition)
         if condition is not None and not condition.failures and not analysis.is_halted_by_sibling:
             message = f"this loop never ends: its condition, {analysis.get_name(self.condition)}, cannot fail"
-            yield NodeFinding("", "endless", message, "Use repeat with times or until.")
+            yield NodeFinding("", "endless", message, "Use `repeat` with `times` or `until`.")
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the cause of a failure: the body, not the condition, failed."""

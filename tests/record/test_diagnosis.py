@@ -61,10 +61,10 @@ def test_a_success_has_no_story() -> None:
         ("  timeout: {seconds: 2, do: {Wait: {seconds: 3}}}\n", ""),
         ("  invert: {Wait: {seconds: 0.1}}\n", ""),
         ("  fallback: [{invert: succeed}, IsHolding]\n",
-         "fallback: all 2 choices failed; the others failed with invert.inverted (succeed succeeded)"),
+         "fallback: all 2 choices failed; the earlier ones failed with invert.inverted (succeed succeeded)"),
         ("  fallback:\n    memory: false\n"
          "    do: [{invert: succeed}, IsHolding, {timeout: {seconds: 0.1, do: {Wait: {seconds: 1}}}}]\n",
-         "fallback: all 3 choices failed; the others failed with invert.inverted (succeed succeeded), "
+         "fallback: all 3 choices failed; the earlier ones failed with invert.inverted (succeed succeeded), "
          "IsHolding.empty (the sensor detects no seal)"),
         ("  guard: {holds: {not: {HasElapsed: {seconds: 9}}}, do: [{Wait: {seconds: 0.1}}, IsHolding]}\n",
          "guard: handles no failures of its body"),

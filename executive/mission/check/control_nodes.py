@@ -124,11 +124,11 @@ class CheckerAnalysis:
         return FlowAnalysis(node, self._context.skills, entry, is_first_tick=is_first_tick).root_flow
 
     def get_name(self, child: Child) -> str:
-        """Return the name of a child in paths."""
+        """Return the last part of the path of a child."""
         return get_path_name(get_mission_node(child))
 
     def describe_place(self, reason: Reason, reported_reason: Reason) -> str:
-        """Return the line of `reason` as a text, with the file if `reported_reason` is in another file."""
+        """Return the line of `reason`, with the file if `reported_reason` is in another file."""
         source = cast("FailureName", reported_reason).span.source
         return cast("FailureName", reason).span.describe_place(source)
 
@@ -147,7 +147,7 @@ class CheckerAnalysis:
         return [(node.skill, compute_min_time(self._context, node)) for node in skills]
 
     def list_skills(self, child: Child | None = None) -> Mapping[str, type[Skill] | None]:
-        """Return the skills below a child, by default below the node, by name; None: not installed."""
+        """Return the class of each skill in the subtree of a child or of the node; None if not installed."""
         root = self._node if child is None else get_mission_node(child)
         names = [node.skill for node in root.walk() if isinstance(node, SkillNode)]
         return {name: self._context.skills.get(name) for name in names}

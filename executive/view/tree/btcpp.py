@@ -2,8 +2,8 @@
 
 Each subtree becomes a `BehaviorTree`, and each `use` a `SubTree` with the arguments as ports. A control node
 becomes its counterpart in BehaviorTree.CPP; without a counterpart, it becomes a custom node with its keys as
-ports. Each key with nodes other than `do` becomes a node, for example `retry-recover`, whose children are the
-nodes below that key.
+ports. Each key that contains nodes, except `do`, becomes a node such as `retry-recover`, whose children are
+the nodes under the key.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ class _Exporter:
 
     def _add_control_node(self, parent: Element, node: nodes.InnerNode) -> Element:
         counterpart = make_inspection_instance(node).counterpart
-        # The value of a key that is an argument is unknown here, so that it must be passed on as a port.
+        # A value that refers to an argument is unknown here, and must be passed as a port.
         unknown_keys = {name for name, value in node.values.items() if isinstance(value, Reference)}
         if counterpart is None or unknown_keys - {*counterpart.ports.values()}:
             return self._add_custom_node(parent, node.declaring_class.keyword, node)
