@@ -1,4 +1,4 @@
-"""Skill that makes tool and ledger agree whether the tool holds an item."""
+"""Skill that opens the tool unless sensor and ledger agree that the tool holds an item."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from executive.skill import ANY, EMPTY, HOLDING, Out, Skill, port
 
 
 class ConfirmGrasp(Skill):
-    """Confirm with the sensor of the tool that the tool holds an item; otherwise leave an empty tool.
+    """Confirm with the sensor of the tool that the tool holds an item; otherwise open the tool and fail.
 
-    Unless sensor and ledger both report an item, the skill opens the tool and fails; it also records a drop
-    if only the ledger reports an item. After an interrupted transit, a mission can thus decide how to
-    continue. To check without side effects, use the condition `IsHolding`.
+    The sensor and the ledger must both report an item. If only the ledger reports an item, the skill also
+    records a drop. After an interrupted transit, a mission can thus decide how to continue. To check without
+    side effects, use the condition `IsHolding`.
     """
 
     held: Out[Item] = port(refers_to="item", doc="the item in the tool")

@@ -10,9 +10,9 @@ from executive.skill import In, Skill, param, port
 class Defer(Skill):
     """Defer an item: `SelectTarget` selects the item only after every other candidate.
 
-    The item stays open, so no item is lost. Deferred items are selected in the order of their deferral. The
-    skill fails with `exhausted` if the item was deferred `times` times already. An item in the tool or in a
-    bin keeps its state; the deferral has an effect if the item returns to the table.
+    The item stays open. Deferred items are selected in the order of their deferral. The skill fails with
+    `exhausted` if the item was already deferred as often as `times` permits. An item in the tool or in a bin
+    keeps its state; the deferral has an effect if the item returns to the table.
     """
 
     item: In[Item] = port(refers_to="item", doc="the item to defer")
@@ -23,5 +23,5 @@ class Defer(Skill):
         """Defer the item in the ledger."""
         count = cell.ledger.describe(self.item).deferrals
         if count >= self.times:
-            raise self.failure("exhausted", f"{self.item} was deferred {count} times already")
+            raise self.failure("exhausted", f"{self.item} was already deferred {count} times")
         cell.ledger.defer(self.item)

@@ -1,4 +1,4 @@
-"""Skill that checks how many items are placed or rejected."""
+"""Condition that at least a number of items are placed or rejected."""
 
 from __future__ import annotations
 

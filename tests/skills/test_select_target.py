@@ -125,7 +125,7 @@ def test_an_item_is_deferred_a_limited_number_of_times(fake: FakeCell, look) -> 
     look()
     results = [run_skill(Defer(item="cube-1", times=2), fake) for _ in range(3)]
     assert [result.reason for result in results] == ["", "", "exhausted"]
-    assert results[-1].message == "cube-1 was deferred 2 times already"
+    assert results[-1].message == "cube-1 was already deferred 2 times"
 
 
 def test_the_least_tried_item_comes_first_and_of_equals_the_nearest(fake: FakeCell, look) -> None:
