@@ -18,7 +18,7 @@ from executive.manipulation.tool_goals import (
     compute_min_contact_height,
     make_approach,
 )
-from executive.perception.evidence import describe_touch_contradiction, may_miss_top
+from executive.perception.evidence import describe_touch_contradiction, may_have_missed_top
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
 EARLY_CONTACT_MARGIN = 0.001
@@ -79,8 +79,8 @@ class Approach(Skill):
             raise self.failure("blocked", f"{message}, which {expectation}")
         contradiction = describe_touch_contradiction(label, height, cell.classes)
         is_near_top = height >= compute_min_contact_height(object_class, centre_height, self.overtravel)
-        may_have_missed_top = is_near_top and may_miss_top(label, height, cell.classes)
-        if not cell.ledger.record_touch(item, contradiction, may_miss_top=may_have_missed_top):
+        is_top_missed = is_near_top and may_have_missed_top(label, height, cell.classes)
+        if not cell.ledger.record_touch(item, contradiction, may_have_missed_top=is_top_missed):
             raise self.failure("contradicted", f"{item} may be no {label}: {contradiction}")
         if contradiction and not is_near_top:
             cell.ledger.record_miss(item)

@@ -16,7 +16,7 @@ from executive.skill import In, param, port
 class LookAt(LookingSkill):
     """Verify with the camera that an item, or each item in a bin, is where the ledger believes it to be.
 
-    The skill does not move the arm; first move to a pose from which the camera sees the place. The skill
+    The skill does not move the arm: move first to a pose from which the camera sees the place. The skill
     succeeds if an image shows every item at its place. It fails with `gone` if enough images show the place
     without the item; the position of the item is then unknown, and the item may be sorted again if a later
     look finds an object of its class on the table. The skill fails with `hidden` if the item is in the tool,
@@ -59,5 +59,5 @@ class LookAt(LookingSkill):
             with suppress(NoDepth):
                 observations = cell.localizer.localize(look)
                 cell.ledger.observe(look, observations)
-                return {item: cell.ledger.verify(item, look, observations) for item in items}
+                return {item: cell.ledger.update_presence(item, look, observations) for item in items}
         return dict.fromkeys(items, Presence.UNSURE)

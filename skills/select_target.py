@@ -17,17 +17,17 @@ NOT_OPEN = ("held", "placed", "rejected", "skipped")
 class SelectTarget(Skill):
     """Select the next target to pick, and its bin.
 
-    The skill selects only open items with a valid position, a certain class, and a class with a bin below its
-    quota. The class of an item is certain if the probability of a wrong class, given the error rates of the
-    detector, is at most the limit of the cell. Of the bins of the class, the skill chooses the first one
-    below its quota; without quotas, the one with the fewest objects. A deferred item comes after all others
-    (see `Defer`).
+    The skill selects only open items with a valid position and a certain class, if a bin of the class is
+    below its quota. The class of an item is certain if the probability of a wrong class, given the error
+    rates of the detector, is at most the limit of the cell. The skill chooses the first bin of the class that
+    has a quota and is below this quota; without quotas, the bin with the fewest objects. A deferred item
+    comes after all others (see `Defer`).
 
     * `nearest` prefers the target nearest to the tool or, while the arm moves, to the destination of the arm.
     * `surest` prefers the target with the highest confidence of the last detection.
     * `least_tried` prefers the fewest failed attempts and, of several such targets, the nearest.
     * With `among`, the skill fails with `no_candidate` as soon as none of these items is open or lost.
-    * With `same`, it fails with `no_candidate` if the item is placed, rejected, skipped or in the tool.
+    * With `same`, the skill fails with `no_candidate` if the item is held, placed, rejected or skipped.
     """
 
     targets: In[list[Target]] = port(doc="the known targets")
@@ -67,22 +67,22 @@ class SelectTarget(Skill):
         return known.turn, known.attempts if self.prefer == "least_tried" else 0
 
     def _is_permitted(self, cell: Cell, item: Item) -> bool:
-        """Return True if the mission permits an item of any class, and a bin for the item is free."""
+        """Return True if a bin for an item is free, and `same`, `among` and `not` permit the item."""
         is_excluded = item in (self.not_ or ()) or (self.among is not None and item not in self.among)
         return not is_excluded and self.same in (None, item) and choose_bin(cell, item) != ""
 
     def _is_requested(self, cell: Cell, item: Item) -> bool:
         return self.wanted in (None, cell.ledger.get_label(item)) and self._is_permitted(cell, item)
 
-    def _format_uncertain_items(self, cell: Cell, max_turn: float = math.inf) -> str:
-        """Return the names of the requested items with an uncertain class and a turn below `max_turn`."""
+    def _format_uncertain_items(self, cell: Cell, turn_limit: float = math.inf) -> str:
+        """Return the names of the uncertain requested items whose `turn` is below `turn_limit`."""
         items = (item for item in cell.ledger.find_uncertain_items() if self._is_requested(cell, item))
-        return ", ".join(item for item in items if cell.ledger.describe(item).turn < max_turn)
+        return ", ".join(item for item in items if cell.ledger.describe(item).turn < turn_limit)
 
     def _is_nothing_left(self, cell: Cell) -> bool:
         """Return True if no requested item is left, or if none of the items in `among` is open or lost.
 
-        An item that may belong to the wanted class after a weighing is left.
+        An item counts as left if a weighing may find that it is of the class `wanted`.
         """
         ledger = cell.ledger
         if self.among is None:
@@ -97,18 +97,18 @@ class SelectTarget(Skill):
     def _make_failure_without_candidate(self, cell: Cell) -> SkillFailed:
         """Return the failure with the reason why there is no candidate."""
         if self.same and (state := cell.ledger.describe(self.same).state) in NOT_OPEN:
-            exemption = cell.ledger.explain_exemption(cell.ledger.get_label(self.same))
-            cause = f": {exemption}" if state == "skipped" else ""
+            skip_reason = cell.ledger.explain_skipped_class(cell.ledger.get_label(self.same))
+            cause = f": {skip_reason}" if state == "skipped" else ""
             return self.failure("no_candidate", f"{self.same} is {state}{cause}")
         if names := self._format_uncertain_items(cell):
             return self.failure("doubtful", f"not enough looks agree on {names} yet; look again")
         name = self.same or self.wanted or "object to sort"
         if self._is_nothing_left(cell):
             labels = (label for label in cell.routes if self.wanted in (None, label))
-            exemptions = sorted({cell.ledger.explain_exemption(label) for label in labels} - {""})
-            surplus = " and surplus objects" if exemptions else ""
+            skip_reasons = sorted({cell.ledger.explain_skipped_class(label) for label in labels} - {""})
+            surplus = " and surplus objects" if skip_reasons else ""
             message = f"no {name} is left on the table, except rejected objects{surplus}"
             unknown_labels = describe_unknown_labels(cell.ledger.unknown_labels)
-            details = (message, *exemptions, unknown_labels)
+            details = (message, *skip_reasons, unknown_labels)
             return self.failure("no_candidate", "; ".join(filter(None, details)))
         return self.failure("unseen", f"no {name} is in sight, but it is not certain that the table is empty")

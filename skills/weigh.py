@@ -39,9 +39,9 @@ class Weigh(Skill):
         fail_if_dropped(self, cell, self.held, "during the weighing")
         self.weight = sum(loads) / len(loads)
         if contradiction := cell.ledger.record_weight(self.held, self.weight, cell.tool.load_std):
-            raise self.failure("contradicted", f"{self.held} is of no certain class: {contradiction}")
+            raise self.failure("contradicted", f"the class of {self.held} is uncertain: {contradiction}")
         self.bin = choose_bin(cell, self.held)
         if not self.bin:
             label = cell.ledger.get_label(self.held)
-            explanation = cell.ledger.explain_exemption(label) or "no bin is free"
+            explanation = cell.ledger.explain_skipped_class(label) or "no bin is free"
             raise self.failure("no_bin", f"{self.held} is a {label}: {explanation}")

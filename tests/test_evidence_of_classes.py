@@ -17,7 +17,7 @@ from executive.perception.evidence import (
     describe_top_contradiction,
     describe_touch_contradiction,
     describe_unknown_labels,
-    may_miss_top,
+    may_have_missed_top,
 )
 from executive.perception.localization import CellLocalizer
 from tests.camera_poses import looking_down
@@ -59,7 +59,7 @@ def test_the_height_of_a_touch_has_to_be_that_of_the_class(
 def test_a_touch_that_is_too_low_for_all_classes_may_have_missed_the_top(
     label: str, height: float, is_possible: bool
 ) -> None:
-    assert may_miss_top(label, height, CLASSES) is is_possible
+    assert may_have_missed_top(label, height, CLASSES) is is_possible
 
 
 @pytest.mark.parametrize(

@@ -15,12 +15,12 @@ from executive.geometry import Array
 class Presence(Enum):
     """Answer to the question whether an item is at the place where the ledger believes it to be."""
 
-    THERE = "there"
+    PRESENT = "present"
     """A frame shows the item at its place."""
     GONE = "gone"
-    """Enough frames show the place without the item."""
+    """Enough frames show the place of the item without the item."""
     HIDDEN = "hidden"
-    """The frame does not show the place."""
+    """The frame does not show the place of the item, or the tool holds the item."""
     UNSURE = "unsure"
     """A detection at the place is doubtful, or too few frames show the place without the item."""
 
@@ -60,7 +60,7 @@ class Ledger(Protocol):
         """Return the item in the tool, or None."""
 
     def is_current(self, frame: Frame) -> bool:
-        """Return False if an action since a frame's capture may have moved objects anywhere on the table."""
+        """Return False if an action since the capture of a frame may have moved any object on the table."""
 
     def is_fresh(self, target: Target) -> bool:
         """Return False if the robot may have moved a target since its last detection."""
@@ -82,7 +82,8 @@ class Ledger(Protocol):
     def list_possible_labels(self, item: Item) -> Sequence[str]:
         """Return the classes of an item that a weighing may find, the most probable class first.
 
-        Only classes that look alike are possible, and only one class after a weighing that made it certain.
+        Before a weighing, these are all classes that look alike; after a weighing that determined the class,
+        only this class.
         """
 
     def describe(self, item: Item) -> KnownItem:
@@ -100,38 +101,42 @@ class Ledger(Protocol):
         `label` restricts the count to one class, `bin` to one bin.
         """
 
-    def explain_exemption(self, label: str) -> str:
+    def explain_skipped_class(self, label: str) -> str:
         """Return the reason why the mission does not sort further objects of a class, or "".
 
-        The class has no route, or the quotas of all its bins are reached.
+        There are two reasons: the class has no route, or the quotas of all its bins are reached.
         """
 
-    def count_used_slots(self, bin: str) -> int:
+    def find_next_slot_index(self, bin: str) -> int:
         """Return the index of the next free slot of a bin, behind the slots of all objects in the bin.
 
-        Slots are used in order: a slot before another used slot stays used after its object was taken out.
+        Slots are filled in order: a slot whose object was taken out is not filled again while a later slot
+        contains an object.
         """
 
-    def verify(self, item: Item, detections: Detections, observations: Sequence[Observation]) -> Presence:
-        """Return whether an item is at its place, according to this frame and to earlier calls.
+    def update_presence(
+        self, item: Item, detections: Detections, observations: Sequence[Observation]
+    ) -> Presence:
+        """Record whether a frame shows an item at its place, and return the answer of all frames so far.
 
-        A frame may miss an item by chance. The item is gone if the probability of this is small enough, given
-        the miss rates of the detectors. Its position is then unknown: the item counts as dropped, until a
-        frame shows an object of its class at a new place.
+        The item is gone if the probability that all frames missed the item by chance is small enough, given
+        the miss rates of the detectors. The position of the item is then unknown: the item counts as dropped
+        until a frame shows an object of its class at a new place.
 
         Args:
             item: The item.
-            detections: Detections in a frame that shows the whole image or the place; `observe` knows them.
+            detections: Detections in a frame, for which `observe` was called before. Their view is `full`, or
+                contains the place of the item.
             observations: The same detections, localized in the world.
         """
 
-    def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
+    def record_touch(self, item: Item, contradiction: str = "", *, may_have_missed_top: bool = False) -> bool:
         """Record a touch of an item, and return False if the touch contradicts the class of the item.
 
         Args:
             item: The item.
             contradiction: Sentence that states how the height of the touch contradicts the class, or "".
-            may_miss_top: True if the cup may have touched the object below its top.
+            may_have_missed_top: True if the cup may have missed the top, and touched the object below it.
         """
 
     def record_weight(self, item: Item, weight: float, std: float) -> str:
@@ -170,23 +175,23 @@ class Ledger(Protocol):
         """Reject an item: skills no longer select the item, and the result of the run lists the item."""
 
     def defer(self, item: Item) -> None:
-        """Move an item behind all others: skills select it after every other candidate; it stays open."""
+        """Defer an item: the item stays open, and skills select it only after every other candidate."""
 
     def invalidate_positions(self) -> None:
         """Record that the robot may have moved any object on the table."""
 
-    def lose_track(self) -> None:
-        """Record a loss of track: the tool may have moved any item outside of the bins."""
+    def record_loss_of_track(self) -> None:
+        """Record a loss of track: the tool may have moved any item that is not in a bin."""
 
     def mark_unseen_as_dropped(self) -> None:
-        """Record as dropped every item that no frame has shown since `lose_track`.
+        """Record as dropped every item that no frame has shown since `record_loss_of_track`.
 
         Later frames are searched for these items on the table and in the bins. An item without a detection
         until the end of the run is rejected, because its position is unknown.
         """
 
     def record_bin_contents(self) -> None:
-        """Record an item for each unknown object in a bin, according to the frames since `lose_track`.
+        """Record an item for each unknown object that the frames since `record_loss_of_track` show in a bin.
 
         An unknown object is assigned to a dropped item of its class, or becomes a new item.
         """

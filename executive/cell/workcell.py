@@ -20,11 +20,11 @@ AUDIT_KEYS = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "u
 class Accounts(Protocol):
     """The ledger of a run, as the end and the resumption of the run use it."""
 
-    def close(self, *, completed: bool) -> None:
+    def set_final_states(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the tree succeeded."""
 
-    def reopen(self) -> None:
-        """Discard the items on the table; the next frame adds a new item for each detected object."""
+    def discard_rejected_and_skipped(self) -> None:
+        """Discard all rejected and skipped items; the next frame adds a new item for each visible object."""
 
     def count_states(self) -> dict[str, int]:
         """Return the number of items by final state; the key `seen` is the total without phantoms."""

@@ -53,15 +53,17 @@ class Belief:
         is_confirmed: True if the item certainly exists, by the log odds or by a touch of the tool.
         miss_probability: Probability that all looks since the last detection missed the item by chance.
         low_confidence_count: Number of looks with a doubtful detection since the last confident look.
-        last_label_by_viewpoint: Last detected class by viewpoint key, "" after a miss during a verification;
-            cleared if the item may have moved.
+        last_label_by_viewpoint: For each viewpoint key, the last detected class, or "" after a miss during a
+            verification; empty after a possible move of the item.
         repeat_count: Number of looks that repeated the class of an earlier look from the same viewpoint.
         log_likelihoods: Log likelihood of each detected class, relative to a class that was never detected.
-        label_counts: Number of looks by detected class.
+        label_counts: For each detected class, number of looks.
         max_confusion_rate: Largest confusion rate of the detectors that detected the item, 0 to 1.
-        detected_labels: Detected class by class of the cell; empty until the item is weighed. Until then,
-            each key of `log_likelihoods` represents all classes with the same appearance.
-        weight_log_ratios: Log likelihood ratio of the last weighing by class, part of `log_likelihoods`.
+        detected_labels: Map from each class of the cell to the class that the detectors report for it; empty
+            before the first weighing. Until then, a key of `log_likelihoods` stands for all classes with the
+            same appearance.
+        weight_log_ratios: For each class, log likelihood ratio of the last weighing, which `log_likelihoods`
+            already contains.
     """
 
     first_label: str
@@ -180,8 +182,9 @@ class Belief:
         A weighing replaces the previous one, because both share the same systematic error.
 
         Args:
-            log_ratios: Log likelihood ratio of the measured weight, by class: this class against another one.
-            detected_labels: Detected class by class of the cell; a class without a look-alike maps to itself.
+            log_ratios: For each class, log likelihood ratio of the measured weight: an object of the class
+                against an object of no declared class.
+            detected_labels: Map from each class of the cell to the class that the detectors report for it.
         """
         if not self.detected_labels:
             old, pairs = self.log_likelihoods, detected_labels.items()

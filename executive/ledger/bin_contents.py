@@ -60,7 +60,7 @@ class BinContents:
         items = (record for record in self.records if label in (None, record.label))
         return sum(bin_name in (record.bin, find_probable_bin(record)) for record in items)
 
-    def explain_exemption(self, label: str) -> str:
+    def explain_skipped_class(self, label: str) -> str:
         """Return the reason why the mission does not sort objects of a class, or ""."""
         bin_names = self.routes.get(label, ())
         if not all(is_quota_reached(self.quotas, name, label, self.count_objects_in) for name in bin_names):
@@ -70,13 +70,13 @@ class BinContents:
         subject, verb = ("quota", "is") if len(bin_names) == 1 else ("quotas", "are")
         return f"the {subject} of {', '.join(bin_names)} {verb} reached"
 
-    def count_used_slots(self, bin_name: str) -> int:
-        """Return the index of the next free slot of a bin: behind all used slots, and at least the count."""
+    def find_next_slot_index(self, bin_name: str) -> int:
+        """Return the index after the last used slot of a bin, but at least the number of objects in it."""
         slots = [record.slot for record in self.records if record.bin == bin_name]
         return max([self.count_objects_in(bin_name), *(slot + 1 for slot in slots if slot is not None)])
 
     def measure_slot_distance(self, record: ItemRecord, observations: Sequence[Observation]) -> float:
-        """Return the distance of the nearest observation from the slot of a placed item [m]; default inf.
+        """Return the distance of the nearest observation from the slot of a placed item [m]; inf if none.
 
         If the item fell into the bin, the centre of the bin takes the place of the slot.
         """
@@ -139,7 +139,7 @@ class BinContents:
     def confirm_placed_items(self, detections: Detections, observations: Sequence[Observation]) -> None:
         """Set the time of the last detection of each placed item that an image shows in its bin."""
         for record in self.records.filter_by_state(State.PLACED):
-            if self.find_presence(record, detections, observations) is Presence.THERE:
+            if self.find_presence(record, detections, observations) is Presence.PRESENT:
                 record.stamp = detections.frame.stamp
 
     def find_presence(
@@ -172,8 +172,8 @@ class BinContents:
                 distances[item], missing_count = 0.0, missing_count - 1
         rank = sorted(distances, key=distances.__getitem__, reverse=True).index(record)
         if rank >= missing_count:
-            return Presence.THERE
-        has_layers = self.count_used_slots(record.bin) > len(self.bins[record.bin].slots)
+            return Presence.PRESENT
+        has_layers = self.find_next_slot_index(record.bin) > len(self.bins[record.bin].slots)
         return Presence.UNSURE if has_layers or rank >= len(items) - len(shown) else Presence.GONE
 
 

@@ -21,7 +21,7 @@ SAME_POSITION_TOLERANCE = 0.01
 """Maximum distance between two measurements of the same position [m]."""
 REASON_NOT_FOUND = "more looks missed it than saw it"
 """Reason of the state PHANTOM of an item whose position was empty in most looks."""
-REASON_UNCERTAIN = "no look is certain of it"
+REASON_UNCERTAIN = "it has no confident detection"
 """Reason for the rejection of an item with doubtful detections only."""
 
 
@@ -42,7 +42,7 @@ class State(Enum):
     SKIPPED = "skipped"
     """The item stays on the table because the mission did not have to sort it."""
     LOST = "lost"
-    """The item exists, and no look detects it."""
+    """Final state of an item that existed, and whose position was unknown or empty at the end of the run."""
     PHANTOM = "phantom"
     """The item does not exist, or is the same object as another item of the ledger."""
 
@@ -84,13 +84,13 @@ class ItemRecord:
         touched_label: Class whose height the last touch confirmed, or "".
         low_touch_count: Number of touches below the height of the class, since the last confirmed height.
         contradiction_count: Number of images that contradict the class since the last possible move.
-        last_contradiction: Sentence with the last evidence of size or height against the class, or "".
-        bin_log_odds: Log odds, by bin, that the dropped item lies in the bin.
+        last_contradiction: Last evidence of size, height or weight against the class, as a sentence, or "".
+        bin_log_odds: For each bin, log odds that the dropped item lies in the bin.
         is_untracked: True if the run was interrupted before the journal recorded whether the tool moved the
             item.
         deferral_count: Number of times that the item was deferred.
         turn: Rank among the deferred items; 0 if the item is not deferred.
-        was_taken_away: True for a dropped item that someone, and not the tool, took from its place.
+        was_taken_away: True if the item is dropped because a person, not the tool, removed it.
         slot: Index of the slot of the bin over which the item was released, or None.
     """
 
@@ -155,13 +155,13 @@ class ItemRecord:
             self.belief.look_count, self.failed_pick_count, self.bin, self.reason,
         )  # fmt: skip
 
-    def make_known_item(self, *, is_exempt: bool) -> KnownItem:
-        """Return the item for skills; `is_exempt` is True if the mission does not sort the class any more."""
+    def make_known_item(self, *, is_skipped: bool) -> KnownItem:
+        """Return the item for skills; `is_skipped`: the mission does not sort the class any more."""
         state = self.state.value
         if self.state is State.DROPPED:
             state = State.REJECTED.value if self.reason else State.LOST.value
         elif self.state is State.SEEN:
-            state = State.SKIPPED.value if is_exempt else "deferred" if self.turn else "open"
+            state = State.SKIPPED.value if is_skipped else "deferred" if self.turn else "open"
         return KnownItem(
             self.item, self.label, state, self.bin, self.position, self.failed_pick_count,
             self.deferral_count, self.turn,

@@ -17,7 +17,7 @@ FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
 
 
 def find_final_state(
-    record: ItemRecord, certainty: Certainty, *, exemption: str, is_completed: bool, has_touched_item: bool
+    record: ItemRecord, certainty: Certainty, *, skip_reason: str, is_completed: bool, has_touched_item: bool
 ) -> tuple[State, str] | None:
     """Return the final state of an item and the reason, or None if the current state is final.
 
@@ -39,7 +39,7 @@ def find_final_state(
     Args:
         record: The item.
         certainty: Criteria for an item with sufficient evidence.
-        exemption: Reason why the mission does not sort objects of the item's class, or "".
+        skip_reason: Reason why the mission does not sort objects of the item's class, or "".
         is_completed: True if the behaviour tree succeeded.
         has_touched_item: True if the tool has touched any item at the height of its class.
     """
@@ -61,8 +61,8 @@ def find_final_state(
         return State.LOST, "known to exist, not found again"
     if record.state is State.REJECTED:
         return None
-    if exemption:
-        return State.SKIPPED, exemption
+    if skip_reason:
+        return State.SKIPPED, skip_reason
     had_problem = record.failed_pick_count or record.last_contradiction
     if is_completed and certainty.is_certain(record) and not had_problem:
         return State.SKIPPED, "the mission was completed without it"

@@ -22,8 +22,8 @@ from executive.ledger.staleness import Staleness
 from executive.perception.evidence import find_classes_distinct_by_touch
 
 MIN_LOG_RATIO_OF_WEIGHT = math.log(0.01)
-"""Minimum log likelihood ratio of a weight that agrees with the class of an item: prior odds that the item is
-an object of no declared class."""
+"""Minimum log likelihood ratio of a weight that agrees with a class: logarithm of the prior odds of an object
+of no declared class."""
 
 
 @dataclass(eq=False)
@@ -89,7 +89,7 @@ class LedgerQueries:
         return next((record.item for record in self._records.filter_by_state(State.HELD)), None)
 
     def is_current(self, frame: Frame) -> bool:
-        """Return False if an action since a frame's capture may have moved objects anywhere on the table."""
+        """Return False if an action since the capture of a frame may have moved any object on the table."""
         return self._staleness.is_table_unchanged(frame.change_count)
 
     def is_fresh(self, target: Target) -> bool:
@@ -107,7 +107,7 @@ class LedgerQueries:
         `ignored_items` may be on the table.
         """
         routed_labels = [routed_label for routed_label in self.routes if label in (None, routed_label)]
-        labels = {entry for entry in routed_labels if not self._bin_contents.explain_exemption(entry)}
+        labels = {entry for entry in routed_labels if not self._bin_contents.explain_skipped_class(entry)}
         if routed_labels and not labels:
             return True
         if self._coverage.max_object_probability > self.config.max_miss_probability:
@@ -128,7 +128,7 @@ class LedgerQueries:
     def list_possible_labels(self, item: Item) -> Sequence[str]:
         """Return the classes of an item that a weighing may find, the most probable class first."""
         record = self._records.find(item)
-        if self._is_weighed(record):
+        if self._is_class_certain_by_weight(record):
             return [record.label]
         similar_classes = (
             other for other in self.classes.values() if other.detected_label == record.detected_label
@@ -138,7 +138,7 @@ class LedgerQueries:
     def describe(self, item: Item) -> KnownItem:
         """Return the present knowledge about an item."""
         record = self._records.find(item)
-        return record.make_known_item(is_exempt=bool(self._explain_exemption(record)))
+        return record.make_known_item(is_skipped=bool(self._explain_skipped_item(record)))
 
     def list_known_items(self) -> Sequence[KnownItem]:
         """Return all items that exist with a probability of at least 0.5, in the order of detection."""
@@ -150,26 +150,25 @@ class LedgerQueries:
         return self._bin_contents.count_objects_in(bin, label)
 
     def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
-        """Return the number of known items in a state, of one class (`label`) and in one bin, or of all."""
+        """Return the number of known items in a state; `label` and `bin` restrict it to one class and bin."""
         items = (item for item in self.list_known_items() if item.state == state)
         return sum(label in (None, item.label) and bin in (None, item.bin) for item in items)
 
-    def count_used_slots(self, bin: str) -> int:
+    def find_next_slot_index(self, bin: str) -> int:
         """Return the index of the next free slot of a bin."""
-        return self._bin_contents.count_used_slots(bin)
+        return self._bin_contents.find_next_slot_index(bin)
 
-    def explain_exemption(self, label: str) -> str:
+    def explain_skipped_class(self, label: str) -> str:
         """Return the reason why the mission does not sort further objects of a class, or ""."""
-        return self._bin_contents.explain_exemption(label)
+        return self._bin_contents.explain_skipped_class(label)
 
-    def _explain_exemption(self, record: ItemRecord) -> str:
-        """Return the reason why the mission does not sort an item, whatever a weighing would find, or ""."""
-        reasons = [
-            self._bin_contents.explain_exemption(label) for label in self.list_possible_labels(record.item)
-        ]
+    def _explain_skipped_item(self, record: ItemRecord) -> str:
+        """Return the reason why the mission sorts none of the possible classes of an item, or ""."""
+        labels = self.list_possible_labels(record.item)
+        reasons = [self._bin_contents.explain_skipped_class(label) for label in labels]
         return reasons[0] if all(reasons) else ""
 
-    def _is_weighed(self, record: ItemRecord) -> bool:
+    def _is_class_certain_by_weight(self, record: ItemRecord) -> bool:
         """Return True if the class of an item is certain according to its last weighing."""
         belief = record.belief
         fits = belief.weight_log_ratios.get(belief.label, -math.inf) >= MIN_LOG_RATIO_OF_WEIGHT

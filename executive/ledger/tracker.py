@@ -39,7 +39,7 @@ class Tracker(LedgerQueries):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._bin_recovery: BinRecovery | None = None
-        """Recovery of the contents of the bins from `lose_track` to `record_bin_contents`; otherwise None."""
+        """Recovery of the bin contents between `record_loss_of_track` and `record_bin_contents`, or None."""
         self._last_frame_id = self._deferral_count = 0
         self._last_stamp = 0.0
         """Capture time of the last look [s]."""
@@ -62,8 +62,10 @@ class Tracker(LedgerQueries):
         self.emit(make_look_event(detections, observations))
         return self.find_targets()
 
-    def verify(self, item: Item, detections: Detections, observations: Sequence[Observation]) -> Presence:
-        """Return whether an item is at its place, according to this image and to earlier images.
+    def update_presence(
+        self, item: Item, detections: Detections, observations: Sequence[Observation]
+    ) -> Presence:
+        """Record whether an image shows an item at its place, and return the answer of all images so far.
 
         The item is gone if the probability that all images missed the item by chance is at most
         `max_miss_probability`; its position then becomes unknown.
@@ -73,13 +75,13 @@ class Tracker(LedgerQueries):
             presence = self._bin_contents.find_presence(record, detections, observations)
             if presence is Presence.GONE:
                 record.belief.add_miss(detections.error_rates, make_viewpoint_key(detections))
-            elif presence is Presence.THERE:
+            elif presence is Presence.PRESENT:
                 record.stamp, record.belief.miss_probability = frame.stamp, 1.0
                 record.forget_viewpoints()
         elif record.state not in ON_TABLE:
             return Presence.HIDDEN if record.state is State.HELD else Presence.GONE
         elif record.frame_id == frame.id:
-            return Presence.THERE
+            return Presence.PRESENT
         else:
             is_searched = detections.compute_searched_mask(record.position[None])[0]
             presence = Presence.GONE if is_searched else Presence.HIDDEN
@@ -91,18 +93,18 @@ class Tracker(LedgerQueries):
         self._records.emit(record)
         return Presence.GONE
 
-    def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
+    def record_touch(self, item: Item, contradiction: str = "", *, may_have_missed_top: bool = False) -> bool:
         """Record a touch, and return False if the touch contradicts the class of the item.
 
         A touch proves that the item exists. After a touch at the height of the class, other heights are no
-        contradiction: the item may have fallen. `may_miss_top`: the cup may have touched below the top.
+        contradiction: the item may have fallen. If `may_have_missed_top`, the touch may be below the top.
         """
         record = self._records.find(item)
         record.belief.is_confirmed, record.had_contact, record.empty_probe_count = True, True, 0
         if not contradiction:
             record.touched_label, record.low_touch_count = record.label, 0
         elif record.touched_label != record.label:
-            if may_miss_top and self._certainty.register_low_touch(record):
+            if may_have_missed_top and self._certainty.register_low_touch(record):
                 return True
             record.last_contradiction = contradiction
             self._invalidate_near(record.position, self.config.neighbourhood)
@@ -118,7 +120,7 @@ class Tracker(LedgerQueries):
             log_ratios, {label: other.detected_label for label, other in classes.items()}
         )
         contradiction = ""
-        if not self._is_weighed(record):
+        if not self._is_class_certain_by_weight(record):
             contradiction = record.last_contradiction = describe_weight(weight, record.label, classes)
         self._records.emit(record)
         return contradiction
@@ -164,8 +166,8 @@ class Tracker(LedgerQueries):
         """Record that an item was released in a bin."""
         record = self._records.find(item)
         if record.state is State.HELD:
-            record.reason, record.slot = "", self._bin_contents.count_used_slots(bin)
-        # An object that a look showed before the placement is no item that left the bin later.
+            record.reason, record.slot = "", self._bin_contents.find_next_slot_index(bin)
+        # Objects in earlier images are not this item, which can leave the bin only after the placement.
         record.stamp, record.belief.miss_probability = self._last_stamp, 1.0
         record.forget_viewpoints()
         self._records.set_placed(record, bin)
@@ -186,7 +188,7 @@ class Tracker(LedgerQueries):
         self._records.reject(self._records.find(item), reason)
 
     def defer(self, item: Item) -> None:
-        """Move an item behind all others; it stays open."""
+        """Defer an item: the item stays open, and skills select it after all others."""
         record = self._records.find(item)
         self._deferral_count += 1
         record.turn = self._deferral_count
@@ -196,23 +198,23 @@ class Tracker(LedgerQueries):
         """Record that any object on the table may have been moved."""
         self._invalidate_near(np.zeros(3), math.inf)
 
-    def lose_track(self) -> None:
-        """Record a loss of track: the tool may have moved any item outside of the bins."""
+    def record_loss_of_track(self) -> None:
+        """Record a loss of track: the tool may have moved any item that is not in a bin."""
         self._bin_recovery = BinRecovery(self._bin_contents)
         self._mark_as_dropped(self._records.filter_by_state(State.HELD, State.DROPPED))
 
     def mark_unseen_as_dropped(self) -> None:
-        """Set each item on the table that no look has detected since `lose_track` to DROPPED."""
+        """Set each item on the table that no look has detected since `record_loss_of_track` to DROPPED."""
         items = [record for record in self._records.filter_by_state(State.SEEN) if record.belief.is_probable]
         self._mark_as_dropped([item for item in items if not self._staleness.is_unmoved(item)])
 
     def record_bin_contents(self) -> None:
-        """Record an item for each unknown object in a bin, according to the looks since `lose_track`."""
+        """Record an item for each unknown object that looks since `record_loss_of_track` showed in a bin."""
         recovery, self._bin_recovery = self._bin_recovery, None
-        assert recovery is not None, "the contents of bins are recorded after `lose_track`"
+        assert recovery is not None, "the contents of bins are recorded after `record_loss_of_track`"
         recovery.record_bin_contents(self.change_count)
 
-    def close(self, *, completed: bool) -> None:
+    def set_final_states(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the behaviour tree succeeded."""
         has_touched_item = any(record.touched_label for record in self.records)
         dropped_items = [
@@ -220,7 +222,7 @@ class Tracker(LedgerQueries):
         ]
         for record in self.records:
             final_state = outcomes.find_final_state(
-                record, self._certainty, exemption=self._explain_exemption(record),
+                record, self._certainty, skip_reason=self._explain_skipped_item(record),
                 is_completed=completed, has_touched_item=has_touched_item,
             )  # fmt: skip
             if bin := find_probable_bin(record):
@@ -230,10 +232,10 @@ class Tracker(LedgerQueries):
                 self._records.emit(record)
         self._records.emit(*outcomes.discard_moved_items(self.records, dropped_items))
 
-    def reopen(self) -> None:
+    def discard_rejected_and_skipped(self) -> None:
         """Discard all rejected and skipped items; the next look adds a new item for each visible object."""
         for record in self._records.filter_by_state(State.REJECTED, State.SKIPPED):
-            record.set_state(State.PHANTOM, "the run was resumed, and the next look adds its object again")
+            record.set_state(State.PHANTOM, "the run was resumed; the next look adds the object again")
             self._records.emit(record)
 
     def count_states(self) -> dict[str, int]:
@@ -261,7 +263,7 @@ class Tracker(LedgerQueries):
 
     def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
         """Set items to DROPPED, so that later looks search for them on the table and in the bins."""
-        assert self._bin_recovery is not None, "items are marked as dropped after `lose_track`"
+        assert self._bin_recovery is not None, "items are marked as dropped after `record_loss_of_track`"
         for record in records:
             record.change_count, record.is_untracked, record.was_taken_away = self.change_count, True, False
             record.bin_log_odds.clear()

@@ -41,13 +41,13 @@ def predict_object_count(cell: Cell, bin_name: str, label: str | None = None) ->
     return cell.ledger.count_objects_in(bin_name, label) + is_counted
 
 
-def predict_used_slots(cell: Cell, bin_name: str, excluded_item: Item | None = None) -> int:
+def predict_next_slot_index(cell: Cell, bin_name: str, excluded_item: Item | None = None) -> int:
     """Return the index of the next free slot of a bin, after the release of an item that the arm is moving.
 
-    A plan with this number remains valid after the release. A moving `excluded_item` uses no slot.
+    A plan with this index remains valid after the release. A moving `excluded_item` uses no slot.
     """
     arriving_item = _find_arriving_item(cell, bin_name, excluded_item)
-    return cell.ledger.count_used_slots(bin_name) + (arriving_item is not None)
+    return cell.ledger.find_next_slot_index(bin_name) + (arriving_item is not None)
 
 
 def make_obstacle(cell: Cell, target: Target) -> Obstacle:
@@ -80,9 +80,9 @@ def _list_bin_obstacles(cell: Cell, excluded_item: Item | None) -> Iterator[Obst
     """Yield a cylinder up to the top layer for each slot with objects; `excluded_item` is not counted."""
     radius = max(object_class.radius for object_class in cell.classes.values()) + MAX_ROLL_DISTANCE
     for bin_name, bin in cell.bins.items():
-        used_slots = predict_used_slots(cell, bin_name, excluded_item)
-        for index, (x, y) in enumerate(bin.slots[:used_slots]):
+        next_slot_index = predict_next_slot_index(cell, bin_name, excluded_item)
+        for index, (x, y) in enumerate(bin.slots[:next_slot_index]):
             # Objects fill the slots of a layer in order, before the next layer begins.
-            layer_count = math.ceil((used_slots - index) / len(bin.slots))
+            layer_count = math.ceil((next_slot_index - index) / len(bin.slots))
             top = compute_layer_height(bin, layer_count, find_max_object_height(cell))
             yield Obstacle(float(x), float(y), radius, top, f"the objects in slot {index + 1} of {bin_name}")

@@ -20,8 +20,8 @@ from executive.manipulation.obstacles import (
     find_max_object_height,
     list_obstacles,
     make_obstacle,
+    predict_next_slot_index,
     predict_object_count,
-    predict_used_slots,
 )
 
 DROP_HEIGHT = 0.01
@@ -37,7 +37,8 @@ SPIRAL_SPACING = 0.0025
 MIN_GAP = 0.02
 """Minimum gap between the object in the tool and other objects after a put-down [m]."""
 GRID_HALF_WIDTH = 2
-"""Half width of the grid of candidate positions around the safe place [grid steps]."""
+"""Half width of the grid of candidate positions around `cell.safe_place`, where objects are put down [grid
+steps]."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 """Angle between two successive points of a Vogel spiral [rad]."""
 
@@ -127,8 +128,8 @@ def choose_bin(cell: Cell, item: Item) -> str:
     """Return the first free bin with a quota, else the free bin with the fewest objects, else "".
 
     A bin is free if it is permitted for the class of the item, and its quota is not reached. An item that the
-    arm is moving into a bin counts as an object in the bin. If the class of an unweighed item has no free
-    bin, the bin is one of a class that looks alike.
+    arm is moving into a bin counts as an object in the bin. If the class of the item is not certain by its
+    weight, and has no free bin, the function chooses a bin of a class that looks alike.
     """
     count_objects = partial(predict_object_count, cell)
     for label in cell.ledger.list_possible_labels(item):
@@ -141,11 +142,11 @@ def choose_bin(cell: Cell, item: Item) -> str:
 
 
 def explain_uncertain_bin(cell: Cell, bin_name: str, item: Item) -> str:
-    """Return why a bin may be wrong for `item`, or "".
+    """Return the reason why a bin may be wrong for `item`, or "".
 
     The bin may be wrong if it is permitted for only some of the classes that look like the item, and no
-    weighing made the class certain. If the bin is permitted for none of these classes, the mission chose
-    it on purpose, and the result is "".
+    weighing determined the class. If the bin is permitted for none of these classes, the mission chose the
+    bin on purpose, and the result is "".
     """
     possible_labels = cell.ledger.list_possible_labels(item)
     labels = [label for label in cell.classes if label in possible_labels]
@@ -159,10 +160,10 @@ def explain_uncertain_bin(cell: Cell, bin_name: str, item: Item) -> str:
 
 
 def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
-    """Return the goal of the tool that holds `item` `drop_height` [m] above the next slot of a bin."""
-    bin, used_slots = cell.bins[bin_name], predict_used_slots(cell, bin_name, item)
+    """Return the tool goal at which `item` is `drop_height` [m] above the next slot of a bin."""
+    bin, next_slot_index = cell.bins[bin_name], predict_next_slot_index(cell, bin_name, item)
     height = cell.classes[cell.ledger.get_label(item)].height
-    return make_slot_goal(bin, used_slots, height, find_max_object_height(cell), drop_height)
+    return make_slot_goal(bin, next_slot_index, height, find_max_object_height(cell), drop_height)
 
 
 def make_slot_goal(
@@ -185,7 +186,7 @@ def make_slot_goal(
 def make_put_down_goal(cell: Cell, object_class: ObjectClass, drop_height: float, item: Item | None) -> Goal:
     """Return the goal of a put-down: an object at `drop_height` [m] above a free position on the table.
 
-    The position is the free candidate nearest to the safe place; if no candidate is free, the safe place.
+    The position is the free candidate nearest to `cell.safe_place`; if none is free, `cell.safe_place`.
     `item` is the item in the tool, which is no obstacle; None if the ledger knows no item there.
     """
     x, y, table_height = map(float, cell.safe_place)

@@ -23,7 +23,8 @@ MAX_TOUCH_HEIGHT_ERROR = 0.003
 """Maximum difference between the height of a touch and the height of a class [m]; 52 touches of the mission
 `sort_overhead` had errors of at most 0.4 mm."""
 OTHER_CLASS_TOLERANCE = 0.0025
-"""Maximum difference between the height of a touch and of a class other than the assumed class [m]."""
+"""Maximum difference between the height of a touch and of a class that the touch may show instead of the
+assumed class [m]."""
 TOP_TOLERANCE = 0.012
 """Maximum difference between the height of an object's top in the depth image and an expected height [m].
 
@@ -31,7 +32,7 @@ In 480 scenes of the cell `depth` (60 crowded, 60 with unknown objects), the top
 objects had a mean error of 2.1 mm and a maximum error of 10.1 mm. The tops of 20 of 26 unknown objects
 contradicted the detected class.
 """
-MAX_OTHER_WEIGHT = 10.0
+MAX_WEIGHT_OF_UNDECLARED_CLASS = 10.0
 """Maximum weight of an object of no declared class [N], of the order of the breakaway force of the cups."""
 REFERENCE_DISTANCE = 1.2
 """Maximum distance from the camera at which `TOP_TOLERANCE` applies [m].
@@ -69,7 +70,7 @@ def compute_weight_log_ratios(
     """Return the log likelihood ratio of a measured weight for each class; 0 for a class of unknown mass.
 
     Weights within a class have a normal distribution. The alternative is an object of no declared class,
-    whose weight has a uniform distribution from 0 to `MAX_OTHER_WEIGHT`.
+    whose weight has a uniform distribution from 0 to `MAX_WEIGHT_OF_UNDECLARED_CLASS`.
 
     Args:
         weight: Measured weight [N].
@@ -81,16 +82,17 @@ def compute_weight_log_ratios(
         if math.isfinite(object_class.mass_std):
             total_std = math.hypot(std, object_class.mass_std * GRAVITY)
             deviation = (weight - object_class.mass * GRAVITY) / total_std
-            ratios[label] = math.log(MAX_OTHER_WEIGHT / (math.sqrt(math.tau) * total_std)) - deviation**2 / 2
+            log_ratio_of_mean = math.log(MAX_WEIGHT_OF_UNDECLARED_CLASS / (math.sqrt(math.tau) * total_std))
+            ratios[label] = log_ratio_of_mean - deviation**2 / 2
     return ratios
 
 
 def describe_weight(weight: float, label: str, classes: Mapping[str, ObjectClass]) -> str:
-    """Return a sentence with a weight [N], and with the weights of the classes that look like `label`."""
+    """Return a sentence with a weight [N], and with the weights of the classes that look like `label` [N]."""
     detected_label = classes[label].detected_label
     similar_classes = [other for other in classes.values() if other.detected_label == detected_label]
-    weights = " and ".join(f"a {other.label} {other.mass * GRAVITY:.2f} N" for other in similar_classes)
-    return f"it weighs {weight:.2f} N, and {weights}"
+    weights = " or ".join(f"{other.label} {other.mass * GRAVITY:.2f} N" for other in similar_classes)
+    return f"it weighs {weight:.2f} N; expected: {weights}"
 
 
 def find_classes_distinct_by_touch(classes: Mapping[str, ObjectClass]) -> frozenset[str]:
@@ -103,10 +105,11 @@ def find_classes_distinct_by_touch(classes: Mapping[str, ObjectClass]) -> frozen
     )
 
 
-def may_miss_top(label: str, height: float, classes: Mapping[str, ObjectClass]) -> bool:
-    """Return True if a touch may have hit the assumed object below its top.
+def may_have_missed_top(label: str, height: float, classes: Mapping[str, ObjectClass]) -> bool:
+    """Return True if a touch may have missed the top of an object, and hit the object below the top.
 
-    The touch at `height` [m] is then too low for the assumed class, and no class has this height.
+    This is possible if the touch at `height` [m] is too low for the assumed class, and no class has this
+    height.
     """
     errors = {name: _compute_height_error(name, height, classes) for name in classes}
     return errors[label] < 0 and all(abs(error) > OTHER_CLASS_TOLERANCE for error in errors.values())
@@ -168,10 +171,10 @@ def describe_size_contradiction(
         object_class: The detected class.
     """
     left, top, right, bottom = detection.box
-    cylinder_length = _compute_cylinder_length(position, frame, object_class)
+    projected_length = _compute_projected_length(position, frame, object_class)
     scale = float(frame.matrix[0, 0]) / frame.compute_depth(position)
     min_length = math.sqrt(2) * object_class.radius * scale * (1 - SIZE_TOLERANCE) - SIZE_TOLERANCE_PX
-    max_length = cylinder_length * (1 + SIZE_TOLERANCE) + SIZE_TOLERANCE_PX
+    max_length = projected_length * (1 + SIZE_TOLERANCE) + SIZE_TOLERANCE_PX
     length = max(right - left, bottom - top)
     if min_length <= length <= max_length:
         return ""
@@ -188,7 +191,7 @@ def is_completely_visible(detection: Detection, frame: Frame, region: Box) -> bo
     return border_distance >= MIN_BORDER_DISTANCE and frame.compute_visible_fraction(detection.box) >= 1.0
 
 
-def _compute_cylinder_length(position: Array, frame: Frame, object_class: ObjectClass) -> float:
+def _compute_projected_length(position: Array, frame: Frame, object_class: ObjectClass) -> float:
     """Return the longer side [pixel] of the image of the cylinder that encloses an object."""
     angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
     x, y = object_class.radius * np.cos(angles), object_class.radius * np.sin(angles)

@@ -69,7 +69,7 @@ def finalize_items(accounts: Accounts, has_tree_succeeded: bool) -> None:
     Raises:
         Fault: The number of seen items is not the sum of the placed, rejected, skipped and lost items.
     """
-    accounts.close(completed=has_tree_succeeded)
+    accounts.set_final_states(completed=has_tree_succeeded)
     counts = accounts.count_states()
     if not is_balanced(counts):
         text = ", ".join(f"{count} {state}" for state, count in counts.items())

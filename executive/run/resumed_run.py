@@ -98,7 +98,7 @@ class ResumedRun(Run):
                 halt_running_skills(self.root)
         brake_arm(context.cell, context.advance)
         if interruption.restarts_tree:
-            replayed_cell.accounts.reopen()
+            replayed_cell.accounts.discard_rejected_and_skipped()
         if self._is_scene_known:
             reconcile_ledger(context.cell, interruption.last_action)
         else:

@@ -98,7 +98,7 @@ class Bench:
     def verify(self, item: str, *things: Thing, **options: Any) -> str:
         """Look at the whole image, and return whether an item is at its place."""
         self.look(*things, view="full", **options)
-        return self.ledger.verify(item, *self.last_look).value
+        return self.ledger.update_presence(item, *self.last_look).value
 
     def _observe(
         self, frame: Frame, by: ErrorRates, thing: Thing, confidence: float, contradiction: str = ""
@@ -130,5 +130,5 @@ class Bench:
 
     def end(self, *, completed: bool = True) -> dict[str, tuple[str, str]]:
         """End the run and return the final states; `completed` is True if the tree succeeded."""
-        self.ledger.close(completed=completed)
+        self.ledger.set_final_states(completed=completed)
         return self.states()

@@ -9,7 +9,7 @@ from executive.events import FrameSearched, ItemChanged
 from executive.ledger.certainty import MIN_UNCERTAIN_LOOKS_TO_REJECT
 
 THERE = ("cube", 0.5, 0.0)
-UNSURE = ("rejected", "no look is certain of it")
+UNSURE = ("rejected", "it has no confident detection")
 PHANTOM = ("phantom", "more looks missed it than saw it")
 
 

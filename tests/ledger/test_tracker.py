@@ -135,14 +135,18 @@ def test_a_rejection_after_a_contradiction_contains_it(bench: Bench) -> None:
 def test_a_touch_may_miss_the_top_of_an_object_once(bench: Bench) -> None:
     bench.look(CUBE)
     doubt = "it was touched 40 mm above the table, and a cube is 50 mm high"
-    assert [bench.ledger.record_touch("cube-1", doubt, may_miss_top=True) for _ in range(2)] == [True, False]
+    assert [bench.ledger.record_touch("cube-1", doubt, may_have_missed_top=True) for _ in range(2)] == [
+        True,
+        False,
+    ]
 
 
 def test_after_a_touch_at_its_height_an_object_may_lie_on_its_side(bench: Bench) -> None:
     bench.look(CUBE)
     doubt = "it was touched 40 mm above the table, and a cube is 50 mm high"
     answers = [
-        bench.ledger.record_touch("cube-1", text, may_miss_top=True) for text in (doubt, "", doubt, doubt)
+        bench.ledger.record_touch("cube-1", text, may_have_missed_top=True)
+        for text in (doubt, "", doubt, doubt)
     ]
     assert answers == [True] * 4
 
@@ -151,7 +155,7 @@ def test_three_looks_that_contradict_the_class_of_an_item_reject_it(bench: Bench
     for _ in range(3):
         assert bench.states().get("cube-1", ("seen", ""))[0] == "seen"
         bench.look(unsure=[CUBE], contradiction="its box is 80 mm long")
-    assert bench.states() == {"cube-1": ("rejected", "no look is certain of it: its box is 80 mm long")}
+    assert bench.states() == {"cube-1": ("rejected", "it has no confident detection: its box is 80 mm long")}
 
 
 def test_a_frame_from_before_a_pick_brings_nothing_back(bench: Bench) -> None:
@@ -403,7 +407,7 @@ def test_an_item_that_was_touched_exists_although_the_tool_finds_only_the_table_
         bench.look(CUBE, FAR)
     bench.ledger.record_touch("cube-2")
     bench.look(CUBE, FAR)
-    assert bench.ledger.record_touch("cube-1", contradiction, may_miss_top=True)
+    assert bench.ledger.record_touch("cube-1", contradiction, may_have_missed_top=True)
     for _ in range(3):
         bench.ledger.record_miss("cube-1", found_table=True)
         bench.look(CUBE)

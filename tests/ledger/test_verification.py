@@ -29,7 +29,7 @@ def gone(placed: Bench) -> Bench:
 
 
 def test_an_item_that_a_look_shows_in_its_bin_is_there(placed: Bench) -> None:
-    assert placed.verify("cube-1", SLOT_1) == "there"
+    assert placed.verify("cube-1", SLOT_1) == "present"
     assert placed.states() == {"cube-1": ("placed", "red_bin")}
 
 
@@ -42,7 +42,7 @@ def test_an_item_is_gone_only_after_enough_looks(placed: Bench) -> None:
 
 def test_a_detection_between_two_misses_refutes_the_first_one(placed: Bench) -> None:
     assert placed.verify("cube-1") == "unsure"
-    assert placed.verify("cube-1", SLOT_1) == "there"
+    assert placed.verify("cube-1", SLOT_1) == "present"
     assert placed.verify("cube-1") == "unsure"
 
 
@@ -90,7 +90,7 @@ def test_an_item_that_was_sorted_again_under_another_name_counts_once(placed: Be
         placed.look(ELSEWHERE)
     placed.place("cube-2")
     answers = [placed.verify("cube-1", SLOT_2) for _ in range(2)]
-    assert (answers, placed.verify("cube-2", SLOT_2)) == (["unsure", "gone"], "there")
+    assert (answers, placed.verify("cube-2", SLOT_2)) == (["unsure", "gone"], "present")
     assert placed.end() == {"cube-1": ("phantom", "it is cube-2"), "cube-2": ("placed", "red_bin")}
 
 
@@ -108,11 +108,11 @@ def test_a_bin_behind_the_arm_is_hidden(placed: Bench, hidden: slice) -> None:
 
 def test_a_bin_outside_of_the_searched_region_is_hidden(placed: Bench) -> None:
     placed.look()
-    assert placed.ledger.verify("cube-1", *placed.last_look).value == "hidden"
+    assert placed.ledger.update_presence("cube-1", *placed.last_look).value == "hidden"
 
 
 def test_a_doubtful_detection_of_its_class_at_its_slot_shows_the_item(placed: Bench) -> None:
-    assert placed.verify("cube-1", unsure=[SLOT_1]) == "there"
+    assert placed.verify("cube-1", unsure=[SLOT_1]) == "present"
 
 
 def test_two_doubtful_boxes_at_one_slot_show_one_item(placed: Bench) -> None:
@@ -120,7 +120,7 @@ def test_two_doubtful_boxes_at_one_slot_show_one_item(placed: Bench) -> None:
         placed.look(ELSEWHERE)
     placed.place("cube-2")
     assert [placed.verify(item, unsure=[SLOT_1, SLOT_1]) for item in ("cube-1", "cube-2")] == [
-        "there",
+        "present",
         "unsure",
     ]
 
@@ -138,8 +138,8 @@ def test_of_two_items_the_one_whose_slot_is_empty_is_gone(placed: Bench) -> None
     for _ in range(3):
         placed.look(ELSEWHERE)
     placed.place("cube-2")
-    assert [placed.verify(item, SLOT_1) for item in ("cube-1", "cube-2")] == ["there", "unsure"]
-    assert [placed.verify(item, SLOT_2) for item in ("cube-2", "cube-1")] == ["there", "unsure"]
+    assert [placed.verify(item, SLOT_1) for item in ("cube-1", "cube-2")] == ["present", "unsure"]
+    assert [placed.verify(item, SLOT_2) for item in ("cube-2", "cube-1")] == ["present", "unsure"]
 
 
 def test_the_slot_of_an_item_that_is_gone_stays_used_until_the_bin_is_empty(placed: Bench) -> None:
@@ -149,10 +149,16 @@ def test_the_slot_of_an_item_that_is_gone_stays_used_until_the_bin_is_empty(plac
     for _ in range(2):
         placed.verify("cube-1", SLOT_2)
     assert placed.states()["cube-1"] == ("dropped", "")
-    assert (placed.ledger.count_objects_in("red_bin"), placed.ledger.count_used_slots("red_bin")) == (1, 2)
+    assert (placed.ledger.count_objects_in("red_bin"), placed.ledger.find_next_slot_index("red_bin")) == (
+        1,
+        2,
+    )
     for _ in range(2):
         placed.verify("cube-2")
-    assert (placed.ledger.count_objects_in("red_bin"), placed.ledger.count_used_slots("red_bin")) == (0, 0)
+    assert (placed.ledger.count_objects_in("red_bin"), placed.ledger.find_next_slot_index("red_bin")) == (
+        0,
+        0,
+    )
 
 
 def test_an_item_that_was_taken_for_gone_and_is_shown_again_uses_no_second_slot(placed: Bench) -> None:
@@ -165,7 +171,7 @@ def test_an_item_that_was_taken_for_gone_and_is_shown_again_uses_no_second_slot(
     for _ in range(2):
         placed.look(SLOT_1, SLOT_2, view="full")
     assert placed.states()["cube-1"] == ("placed", "red_bin")
-    assert placed.ledger.count_used_slots("red_bin") == 2
+    assert placed.ledger.find_next_slot_index("red_bin") == 2
 
 
 def test_in_a_bin_with_two_layers_no_item_is_gone(bench: Bench) -> None:
@@ -180,7 +186,7 @@ def test_in_a_bin_with_two_layers_no_item_is_gone(bench: Bench) -> None:
 def test_an_item_on_the_table_is_there_unsure_or_gone(bench: Bench) -> None:
     for _ in range(3):
         bench.look(CUBE)
-    assert bench.verify("cube-1", CUBE) == "there"
+    assert bench.verify("cube-1", CUBE) == "present"
     assert [bench.verify("cube-1") for _ in range(2)] == ["unsure", "gone"]
     assert bench.states() == {"cube-1": ("dropped", "")}
 
@@ -262,7 +268,7 @@ def test_an_item_that_was_found_again_is_missing_no_more(gone: Bench, found_by: 
     if found_by == "grasp":
         gone.ledger.record_grasp("cube-1")
     elif found_by == "loss of track":
-        gone.ledger.lose_track()
+        gone.ledger.record_loss_of_track()
     for _ in range(2):
         if found_by.startswith("look"):
             gone.look(ELSEWHERE if found_by == "look on the table" else SLOT_1, view="full")

@@ -71,5 +71,5 @@ def test_what_slips_away_over_its_bin_is_believed_there_unless_it_was_thrown(
     monkeypatch.setattr(type(fake.arm), "tool_velocity", np.array((0.0, speed, 0.0)))
     fake.tool.break_seal()
     assert detect_and_record_drop(fake.cell, held)
-    fake.ledger.close(completed=True)
+    fake.ledger.set_final_states(completed=True)
     assert [row.state for row in fake.ledger.list_items()] == [state]

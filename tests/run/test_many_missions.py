@@ -59,7 +59,7 @@ class Interleaved:
         return True
 
     def story(self) -> Story:
-        self._fake.accounts.close(completed=self._root.status is Status.SUCCESS)
+        self._fake.accounts.set_final_states(completed=self._root.status is Status.SUCCESS)
         return (
             self._root.status.value, self._context.tick, self._trace.hexdigest(), variables(self._root),
             items_of(self._fake), self._fake.audit(),

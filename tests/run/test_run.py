@@ -124,7 +124,7 @@ def test_a_box_that_stays_in_doubt_ends_in_an_empty_table_and_not_in_a_failure(m
     fake_of(run).world.objects.clear()
     outcome = run.execute()
     assert (outcome.status, outcome.message) == (
-        "INCOMPLETE", "1 object(s) were not sorted: duck-1 (no look is certain of it)",
+        "INCOMPLETE", "1 object(s) were not sorted: duck-1 (it has no confident detection)",
     )  # fmt: skip
     ends = (one.event for one in events if isinstance(one.event, NodeEnded))
     assert sum((end.skill, end.reason) == ("Detect", "unsure") for end in ends) >= 6

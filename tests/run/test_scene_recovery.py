@@ -30,14 +30,14 @@ def test_items_are_recognized_in_their_bins_and_on_the_table(fake: FakeCell, tar
     move_into_bin(fake, "cube", "red_bin")
     recover(fake)
     assert states(fake) == {"cube-1": "placed", "duck-1": "seen"}
-    fake.ledger.close(completed=False)
+    fake.ledger.set_final_states(completed=False)
     assert fake.audit()["right"] == fake.ledger.count_states()["placed"] == 1
 
 
 def test_an_item_whose_place_stays_unknown_is_rejected(fake: FakeCell, targets: list[Target]) -> None:
     fake.world.remove(fake.world.objects[0])
     recover(fake)
-    fake.ledger.close(completed=True)
+    fake.ledger.set_final_states(completed=True)
     (cube,) = (one for one in fake.ledger.list_items() if one.item == "cube-1")
     assert (cube.state, cube.reason) == ("rejected", REASON_UNTRACKED)
 

@@ -61,7 +61,7 @@ def test_an_object_too_high_for_its_class_in_the_depth_image_contradicts_it(fake
     (row,) = fake.ledger.list_items()
     assert (row.state, row.reason) == (
         "rejected",
-        "no look is certain of it: its top is 80 mm above the table, "
+        "it has no confident detection: its top is 80 mm above the table, "
         "and the top of a cube is at 50, 100, 106 or 110 mm",
     )
 

@@ -105,6 +105,6 @@ def test_the_end_of_one_class_does_not_hide_another() -> None:
 def test_surplus_items_are_skipped_at_the_end_also_if_the_mission_failed() -> None:
     fake = make_cell({("red_bin", "sphere"): 1}, "sphere", "sphere")
     place_all(fake, look(fake))
-    fake.ledger.close(completed=False)
+    fake.ledger.set_final_states(completed=False)
     states = {event.item: (event.state, event.reason) for event in fake.ledger.list_items()}
     assert sorted(states.values()) == [("placed", ""), ("skipped", "the quota of red_bin is reached")]

@@ -71,7 +71,7 @@ def test_a_weight_of_another_class_that_looks_different_contradicts_the_look() -
     fake.tool.load_error = -0.15 * GRAVITY
     result = weigh(fake, item)
     assert (result.status, result.reason) == ("FAILURE", "contradicted")
-    expected = "jar-1 is of no certain class: it weighs 0.49 N, and a jar 1.96 N"
+    expected = "the class of jar-1 is uncertain: it weighs 0.49 N; expected: jar 1.96 N"
     assert (result.message, fake.ledger.get_label(item)) == (expected, "jar")
 
 
@@ -81,7 +81,7 @@ def test_a_weight_between_two_classes_contradicts_both() -> None:
     fake.tool.load_error = 0.07 * GRAVITY
     result = weigh(fake, item)
     assert result.reason == "contradicted"
-    assert "it weighs 1.18 N, and a bottle 0.49 N and a full_bottle 1.96 N" in result.message
+    assert "it weighs 1.18 N; expected: bottle 0.49 N or full_bottle 1.96 N" in result.message
 
 
 def test_an_item_that_was_contradicted_is_rejected_with_its_weight() -> None:
