@@ -243,7 +243,8 @@ class Skill:
         A `run` that returns the iterator of another function must declare this in its annotation.
         """
         has_steps = inspect.isgeneratorfunction(cls.run)
-        return cls.is_condition or (not has_steps and cls.run.__annotations__.get("return") in ("None", None))
+        annotation = cls.run.__annotations__.get("return", "")
+        return cls.is_condition or (not has_steps and annotation in ("None", None))
 
     @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:

@@ -58,7 +58,7 @@ def test_a_port_may_be_named_like_a_word_of_python() -> None:
     assert run.read_outputs() == {"in": "here!"}
 
 
-def test_a_skill_is_instantaneous_if_its_run_has_no_steps() -> None:
+def test_a_skill_is_instantaneous_if_its_run_has_no_steps_and_declares_it() -> None:
     class Plain(Skill):
         def run(self, cell: Cell) -> None:
             del cell
@@ -83,4 +83,4 @@ def test_a_skill_is_instantaneous_if_its_run_has_no_steps() -> None:
         is_condition: ClassVar = True
 
     skills = (Plain, Wrong, Bare, Steps, Delegating, Condition)
-    assert [skill.is_instantaneous() for skill in skills] == [True, False, True, False, False, True]
+    assert [skill.is_instantaneous() for skill in skills] == [True, False, False, False, False, True]

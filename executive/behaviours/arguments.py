@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
-from itertools import repeat
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeGuard, Union, cast, get_args, get_origin, get_type_hints
 
@@ -22,6 +21,8 @@ _CONTAINERS = {
     list: list, tuple: tuple, dict: dict, set: set, frozenset: frozenset, Sequence: list, Mapping: dict,
 }  # fmt: skip
 """Container in missions, by the origin of a declared generic type: a list for each `Sequence[int]`."""
+_MAPPINGS = (dict, Mapping)
+"""Origins of the declared types of mappings."""
 
 
 def list_arguments(behaviour: type[Behaviour]) -> dict[str, Param]:
@@ -75,13 +76,14 @@ def to_argument(value: object, declared_type: object) -> object:
         return declared_type.__members__.get(value, value)
     if origin in (Union, UnionType):
         candidates = (to_argument(value, part) for part in parts)
-        return next((candidate for candidate in candidates if candidate is not value), value)
-    if origin in _CONTAINERS and isinstance(value, list | tuple | set | frozenset):
+        return next((candidate for candidate in candidates if candidate != value), value)
+    if isinstance(value, dict) and origin in _MAPPINGS:
+        return {to_argument(key, parts[0]): to_argument(item, parts[1]) for key, item in value.items()}
+    if isinstance(value, list | tuple) and origin in _CONTAINERS and origin not in _MAPPINGS:
         has_one_type = len(parts) == 1 or ... in parts
-        item_types = repeat(parts[0]) if has_one_type else parts
-        return type(value)(map(to_argument, value, item_types))
-    if origin in _CONTAINERS and isinstance(value, dict):
-        return {key: to_argument(item, parts[1]) for key, item in value.items()}
+        item_types = [parts[0]] * len(value) if has_one_type else parts
+        if len(item_types) == len(value):
+            return type(value)(map(to_argument, value, item_types))
     return value
 
 

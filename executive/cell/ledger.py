@@ -96,7 +96,7 @@ class Ledger(Protocol):
         """Return the number of objects in a bin; `label` restricts the count to one class."""
 
     def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
-        """Return the number of known items in the state `placed` or `rejected` (`KnownItem.state`).
+        """Return the number of items in the state `placed` or `rejected` (`KnownItem.state`).
 
         `label` restricts the count to one class, `bin` to one bin.
         """

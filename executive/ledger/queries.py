@@ -150,9 +150,11 @@ class LedgerQueries:
         return self._bin_contents.count_objects_in(bin, label)
 
     def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
-        """Return the number of known items in a state; `label` and `bin` restrict it to one class and bin."""
-        items = (item for item in self.list_known_items() if item.state == state)
-        return sum(label in (None, item.label) and bin in (None, item.bin) for item in items)
+        """Return the number of items in a state; `label` and `bin` restrict it to one class and bin."""
+        items = (self.describe(record.item) for record in self._records)
+        return sum(
+            item.state == state and label in (None, item.label) and bin in (None, item.bin) for item in items
+        )
 
     def find_next_slot_index(self, bin: str) -> int:
         """Return the index of the next free slot of a bin."""

@@ -73,6 +73,9 @@ def test_a_mission_names_members_and_contains_plain_values(hint: object, expecte
         ({"edge": "RED"}, dict[str, Colour], {"edge": Colour.RED}),
         ({"edge": ["RED"]}, Mapping[str, Sequence[Colour]], {"edge": [Colour.RED]}),
         (3, Any, 3),
+        ([1, 2, 3], tuple[int, int] | list[int], [1, 2, 3]),
+        ({"a": 1}, list[int] | dict[str, int], {"a": 1}),
+        ({"RED": 1}, dict[Colour, int], {Colour.RED: 1}),
     ],
 )
 def test_names_become_members(value: object, hint: object, expected: object) -> None:

@@ -13,7 +13,7 @@ from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
-from executive.cells.ground_truth import UNKNOWN_LABEL, count_outcomes
+from executive.cells.ground_truth import UNKNOWN_LABEL, FinalObject, count_outcomes
 from executive.cells.sim.cell import SimCell, list_final_objects
 from executive.events import Emit, ItemChanged
 from executive.ledger.item import State
@@ -190,16 +190,16 @@ class AuditedCell(SimCell):
 
     def audit(self) -> dict[str, int]:
         """Return what really became of the objects, and keep it object by object."""
-        self.objects = tuple(map(self._find, self._initial_positions))
+        final_objects = list_final_objects(self._world, self._tool, self.cell.bins)
+        self.objects = tuple(map(self._find, self._world.rest_positions, final_objects))
         return super().audit()
 
-    def _find(self, body: int) -> FoundObject:
+    def _find(self, body: int, final_object: FinalObject) -> FoundObject:
         """Return the true end of a body."""
-        places = [self._initial_positions[body], *self._world.rest_positions.get(body, ())]
+        places = self._world.rest_positions[body]
         gate = self.config.ledger.gate
-        bins, tool = self.cell.bins, self._tool
-        objects = list_final_objects(self._world, {body: places}, bins, tool.held_body, tool.dropped_bodies)
-        counts = count_outcomes(objects, self.accounts.records, bins, self.routes, gate)
+        bins = self.cell.bins
+        counts = count_outcomes([final_object], self.accounts.records, bins, self.routes, gate)
         seen_there = tuple(
             record.item
             for record in self.accounts.records

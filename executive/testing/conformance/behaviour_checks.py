@@ -24,7 +24,7 @@ _ACTIONS = ("arm.start", "arm.stop", "tool.open", "tool.close", "camera.capture"
 """Commands to parts of the cell; the part must be in `uses` of the skill."""
 _MEASUREMENTS = ("camera.capture", "operator.ask")
 """Calls that return new information; they require `senses` of the skill."""
-_QUERY_PREFIXES = ("is_", "find_", "get_", "count_", "describe_", "sees_")
+_QUERY_PREFIXES = ("is_", "find_", "get_", "count_", "describe", "sees_")
 """First letters of the methods of the cell that change nothing, so that a condition may call them."""
 
 

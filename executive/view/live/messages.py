@@ -12,13 +12,34 @@ from executive.cell.visuals import Shape
 from executive.events import FrameSearched, TimedEvent
 from executive.geometry import Pose
 
-JsonObject = dict[str, object]
-"""Values of a JSON object, by key.
 
-As a message, changed values of the page that no event contains: `clock`, current time on the clock of the run
-[s]; `tree`, SVG document with the tree; `is_paused`; `note`, message about the record of the run; `result`,
-object with `status`, `message`, run directory `run`, and file of the report `report` ("" without a report).
-"""
+@dataclass(frozen=True)
+class RunOutcome:
+    """Outcome of a run: status, message, run directory, and file of the report or ""."""
+
+    status: str
+    message: str
+    run: str
+    report: str
+
+
+@dataclass(frozen=True)
+class PageChange:
+    """Change of the page that no event of the run describes; None for unchanged values.
+
+    Attributes:
+        clock: Current time on the clock of the run [s].
+        tree: Drawing of the tree as an SVG document.
+        is_paused: True if the run is paused.
+        note: Message about the record of the run.
+        result: Outcome of the run.
+    """
+
+    clock: float | None = None
+    tree: str | None = None
+    is_paused: bool | None = None
+    note: str | None = None
+    result: RunOutcome | None = None
 
 
 @dataclass(frozen=True)
@@ -41,7 +62,7 @@ class SceneChange:
     body_poses: BodyPoses | None = None
 
 
-Message = TimedEvent | JsonObject | CameraImage | SceneChange
+Message = TimedEvent | PageChange | CameraImage | SceneChange
 """Message from the run to the server of the page."""
 
 

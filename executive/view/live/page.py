@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import json
+import pickle
 import queue
 import secrets
 import socket
@@ -13,7 +15,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib.util import find_spec
-from multiprocessing import Pipe
 
 from executive.cell.frame import Frame, FrameCaptured
 from executive.cell.visuals import Visuals
@@ -63,15 +64,13 @@ class LivePage:
             )
         token = secrets.token_urlsafe(24)
         self._error_file = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the page)
-        self._connection, server_connection = Pipe()
-        with socket.create_server((LOOPBACK, 0)) as listener, server_connection:
+        with socket.create_server((LOOPBACK, 0)) as listener:
             port = listener.getsockname()[1]
             self.address = f"http://{LOOPBACK}:{port}/{token}/"
-            descriptors = [listener.fileno(), server_connection.fileno()]
             self._server = subprocess.Popen(
-                build_command("executive.view.live", *map(str, descriptors)),
-                stdin=subprocess.DEVNULL, stdout=self._error_file, stderr=self._error_file,
-                pass_fds=descriptors,
+                build_command("executive.view.live", str(listener.fileno())),
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._error_file,
+                pass_fds=[listener.fileno()],
                 # In a separate session the server gets no Ctrl-C, and can still show the result of the run.
                 start_new_session=True,
             )  # fmt: skip
@@ -87,7 +86,7 @@ class LivePage:
         self._last_camera_image: messages.CameraImage | None = None
         self.problem = ""
         """Description of the first error of the page, or ""."""
-        # The token is no process argument, because every user of the machine can read process arguments.
+        # The token is sent through the pipe, because every user of the machine can read process arguments.
         self._queue.put((token, port))
         self._threads = [
             threading.Thread(target=target, name="page", daemon=True)
@@ -106,7 +105,7 @@ class LivePage:
         empty_results = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._enqueue(messages.SceneChange(shapes=shapes))
-        self._enqueue({"tree": make_svg(nodes, run.mission, empty_results)})
+        self._enqueue(messages.PageChange(tree=make_svg(nodes, run.mission, empty_results)))
         run.control.call_between_ticks(self._send_state)
         self._send_state()
 
@@ -129,15 +128,15 @@ class LivePage:
 
     def show_message(self, message: str) -> None:
         """Show a message about the record of the run."""
-        self._enqueue({"note": message})
+        self._enqueue(messages.PageChange(note=message))
 
     def finish(self, result: Result | None = None, report_path: str = "") -> None:
         """Show the result of the run, and end the server; a second call does nothing."""
         if not self._threads:
             return
         if result is not None:
-            end = {"status": result.status, "message": result.verdict}
-            self._enqueue({"result": {**end, "run": result.run, "report": report_path}})
+            outcome = messages.RunOutcome(result.status, result.verdict, result.run, report_path)
+            self._enqueue(messages.PageChange(result=outcome))
         self._queue.put(None)
         try:
             if self._server.wait(SHUTDOWN_TIMEOUT) != 0:
@@ -148,7 +147,6 @@ class LivePage:
         for thread in self._threads:
             thread.join()
         self._threads = []
-        self._connection.close()
         self._error_file.close()
 
     def _send_state(self) -> None:
@@ -160,9 +158,9 @@ class LivePage:
         with self._catch_errors():
             if self._run.control.is_paused != self._was_paused:
                 self._was_paused = not self._was_paused
-                self._enqueue({"is_paused": self._was_paused})
+                self._enqueue(messages.PageChange(is_paused=self._was_paused))
             if self._can_send_images and self._visuals is not None:
-                self._enqueue({"clock": self._run.now})
+                self._enqueue(messages.PageChange(clock=self._run.now))
                 self._enqueue(messages.SceneChange(body_poses=messages.encode_poses(self._visuals.poses())))
 
     @property
@@ -184,18 +182,19 @@ class LivePage:
             self.problem = self.problem or f"the page is incomplete: {type(error).__name__}: {error}"
 
     def _send_messages(self) -> None:
-        """Send the queued messages in batches, up to the end marker None, and then the end marker."""
+        """Send the queued messages in batches, up to the end marker None."""
+        assert self._server.stdin is not None
         is_last_batch = False
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(BrokenPipeError), self._server.stdin as pipe:
             while not is_last_batch:
                 batch = [self._queue.get()]
                 while not self._queue.empty():
                     batch.append(self._queue.get())
                 is_last_batch = None in batch
-                self._connection.send(list(filter(None, batch)))
+                pickle.dump(list(filter(None, batch)), pipe, pickle.HIGHEST_PROTOCOL)
+                pipe.flush()
                 if not is_last_batch:
                     time.sleep(BATCH_PERIOD)
-            self._connection.send(None)
         self._has_server_ended = True
 
     def _read_last_error(self) -> str:
@@ -205,12 +204,11 @@ class LivePage:
         return lines[-1] if lines else f"exit status {self._server.returncode}"
 
     def _read_commands(self) -> None:
-        """Run the commands of the server until it ends."""
-        with contextlib.suppress(EOFError, OSError):
-            while True:
-                command = self._connection.recv()
-                with self._catch_errors():
-                    self._run_command(command)
+        """Run the commands that the server writes to stdout, until the server ends."""
+        assert self._server.stdout is not None
+        for line in self._server.stdout:
+            with self._catch_errors():
+                self._run_command(messages.PageCommand(**json.loads(line)))
         self._browser_count, self._has_server_ended = 0, True
 
     def _run_command(self, command: messages.PageCommand) -> None:

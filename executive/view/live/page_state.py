@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import base64
 from collections import Counter
+from dataclasses import asdict
 from typing import cast
 
 import numpy as np
 
 from executive import events
-from executive.record.timeline.activation import STATUS_TEXTS
 from executive.record.timeline.timeline import Timeline
-from executive.view.live.messages import CameraImage, JsonObject, Message
+from executive.view.live.messages import CameraImage, Message, PageChange
 
 JPEG_QUALITY = 80
 """JPEG quality of the camera image, 0 to 100."""
 OCCLUSION_DARKENING = 0.45
 """Fraction by which the brightness of pixels that the arm occludes is reduced: 0 not at all, 1 to black."""
+
+JsonObject = dict[str, object]
+"""Values of a JSON object, by key."""
 
 
 class PageState:
@@ -40,8 +43,10 @@ class PageState:
                 self._apply_event(message.event)
             case CameraImage():
                 self._set_values(look=_encode_camera_image(message))
-            case dict():
-                self._set_values(**message)
+            case PageChange():
+                self._set_values(
+                    **{key: value for key, value in asdict(message).items() if value is not None}
+                )
 
     def take_changes(self) -> JsonObject:
         """Return the values that changed since the last call, by key."""
@@ -69,8 +74,9 @@ class PageState:
         """Return the status, last failure and item of a node, and the number of times it ended by status."""
         activation = self._timeline.activation_by_path[path]
         end_counts = self._timeline.end_counts.get(path, Counter())
+        statuses = {"done": "SUCCESS", "failed": "FAILURE", "halted": "INVALID"}
         return {
-            **{text: end_counts[status] for status, text in STATUS_TEXTS.items() if status != "RUNNING"},
+            **{name: end_counts[status] for name, status in statuses.items()},
             "status": activation.status.lower(), "failure": activation.failure, "item": activation.item,
         }  # fmt: skip
 

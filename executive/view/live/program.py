@@ -1,39 +1,52 @@
-"""Server process of the live page: receives messages from the run, and sends commands to the run."""
+"""Server process of the live page: reads messages from stdin, and writes commands to stdout."""
 
 from __future__ import annotations
 
 import asyncio
+import json
 import os
+import pickle
 import socket
 import sys
 import tempfile
 import threading
-from multiprocessing.connection import Connection
+from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 
 from aiohttp import web
 
-from executive.view.live.messages import Message, SceneChange
+from executive.view.live.messages import Message, PageCommand, SceneChange
 from executive.view.live.page_state import PageState
 from executive.view.live.scene_proxy import SceneProxy
 from executive.view.live.server import Server
 
 
 def main() -> None:
-    """Serve the page until the run ends; the arguments are descriptors of a socket and of a connection."""
-    listener, connection = socket.socket(fileno=int(sys.argv[1])), Connection(int(sys.argv[2]))
+    """Serve the page on the socket whose descriptor is the command-line argument, until stdin ends."""
+    listener = socket.socket(fileno=int(sys.argv[1]))
+    # The run reads commands from stdout, so text that libraries print is redirected to stderr.
+    command_stream = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+
+    def write_command(command: PageCommand) -> None:
+        command_stream.write(json.dumps(asdict(command)) + "\n")
+        command_stream.flush()
+
     with tempfile.TemporaryDirectory(prefix="executive-") as folder:
-        asyncio.run(_serve(listener, Path(folder) / "scene", connection))
+        asyncio.run(_serve(listener, Path(folder) / "scene", write_command))
     # Exit without the clean-up of libraries, because the run waits for this process.
     os._exit(0)
 
 
-async def _serve(listener: socket.socket, scene_socket: Path, connection: Connection) -> None:
-    """Serve the page, and apply batches of messages from the run; the first batch has the token."""
+async def _serve(
+    listener: socket.socket, scene_socket: Path, write_command: Callable[[PageCommand], None]
+) -> None:
+    """Serve the page, and apply pickled batches of messages from stdin; the first batch has the token."""
     loop, input_ended = asyncio.get_running_loop(), asyncio.Event()
-    (token, port), *first_messages = connection.recv()
+    (token, port), *first_messages = pickle.load(sys.stdin.buffer)
     page_state, scene_proxy = PageState(), SceneProxy(scene_socket)
-    server = Server(page_state, scene_proxy, connection.send, token, port)
+    server = Server(page_state, scene_proxy, write_command, token, port)
 
     def apply_batch(batch: list[Message]) -> None:
         for message in batch:
@@ -46,9 +59,9 @@ async def _serve(listener: socket.socket, scene_socket: Path, connection: Connec
 
     def read_batches() -> None:
         try:
-            while (batch := connection.recv()) is not None:
-                loop.call_soon_threadsafe(apply_batch, batch)
-        except (EOFError, OSError):
+            while True:
+                loop.call_soon_threadsafe(apply_batch, pickle.load(sys.stdin.buffer))
+        except EOFError:
             pass
         finally:
             # If the run was killed, the input may end in the middle of a message.

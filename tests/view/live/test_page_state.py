@@ -21,7 +21,7 @@ from events import (
 
 from executive.events import Event, OperatorAsked, RequestGiven, RunResumed, TargetSelected
 from executive.geometry import Pose
-from executive.view.live.messages import CameraImage, encode_poses
+from executive.view.live.messages import CameraImage, PageChange, encode_poses
 from executive.view.live.page_state import PageState
 
 
@@ -72,7 +72,7 @@ def test_poses_are_places_and_quaternions_that_begin_with_w() -> None:
 def test_who_comes_late_is_shown_everything_and_then_only_news() -> None:
     page_state = PageState()
     for message in (
-        {"tree": "<svg/>"}, at(120, skill_started("a")), at(240, skill_started("b")),
+        PageChange(tree="<svg/>"), at(120, skill_started("a")), at(240, skill_started("b")),
         at(240, item_changed("cube-1", "held")),
     ):  # fmt: skip
         page_state.apply(message)

@@ -18,7 +18,7 @@ from events import at, run_started
 from executive.cell.visuals import Shape
 from executive.geometry import Pose
 from executive.view.live import live_scene
-from executive.view.live.messages import PageCommand
+from executive.view.live.messages import PageChange, PageCommand
 from executive.view.live.page_state import PageState
 from executive.view.live.scene_proxy import SceneProxy
 from executive.view.live.server import (
@@ -140,7 +140,7 @@ def test_a_watcher_receives_the_state_then_changes_and_may_send_commands() -> No
             assert (await socket.receive_json())["run"] == {"mission": "sort", "seed": 3}
             assert site.wishes == [PageCommand("browsers", browser_count=1)]
             site.page_state.take_changes()
-            site.page_state.apply({"is_paused": True})
+            site.page_state.apply(PageChange(is_paused=True))
             await site.server.send_changes()
             assert await socket.receive_json() == {"is_paused": True}
             wishes = (
@@ -153,7 +153,7 @@ def test_a_watcher_receives_the_state_then_changes_and_may_send_commands() -> No
                 await socket.send_str(said)
             while site.wishes[-1] != PageCommand("stop"):
                 await asyncio.sleep(0)
-            site.page_state.apply({"note": "over"})
+            site.page_state.apply(PageChange(note="over"))
             await site.server.close()
             assert await socket.receive_json() == {"note": "over"}
             assert (await socket.receive()).type is aiohttp.WSMsgType.CLOSE
