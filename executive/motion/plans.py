@@ -62,23 +62,24 @@ class PlanFactory(Generic[M]):
     ) -> None:
         self._plan_motion, self._planning_time = plan, planning_time
         self._clock, self._emit = clock, emit
-        self._stored_plans: dict[tuple[bytes, Goal | str, Task], Plan[M]] = {}
-        """At most one plan, by its query: start, goal and task."""
+        self._stored_query: tuple[bytes, Goal | str, Task] | None = None
+        self._stored_plan: Plan[M] | None = None
 
     def plan_ahead(self, start: Array, goal: Goal | str, task: Task) -> None:
         """Plan a motion from `start` `(n,)` [rad], and store the plan for a later call of `plan`."""
         query = start.tobytes(), goal, task
-        if query not in self._stored_plans:
-            self._stored_plans = {query: self._make_plan(start, goal, task)}
+        if query != self._stored_query:
+            self._stored_query, self._stored_plan = query, self._make_plan(start, goal, task)
 
     def plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
         """Return the plan of a motion from `start` `(n,)` [rad], if possible the plan of `plan_ahead`."""
-        stored_plan = self._stored_plans.get((start.tobytes(), goal, task))
+        is_stored = (start.tobytes(), goal, task) == self._stored_query
+        stored_plan = self._stored_plan if is_stored else None
         plan = stored_plan or self._make_plan(start, goal, task)
-        self._stored_plans = {}
+        self._stored_query = self._stored_plan = None
         duration = 0.0 if isinstance(plan.outcome, Exception) else plan.outcome.duration
         wait_time = max(0.0, plan.ready_time - self._clock.now)
-        self._emit(MotionPlanned(stored_plan is not None, round(wait_time, 4), round(duration, 4)))
+        self._emit(MotionPlanned(is_stored, round(wait_time, 4), round(duration, 4)))
         return plan
 
     def _make_plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:

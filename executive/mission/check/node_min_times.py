@@ -47,5 +47,5 @@ def _compute_min_time_of_skill(context: CheckContext, node: SkillNode) -> float:
     may_have_moved = tool_states is None or any(tool_state.has_arm_moved for tool_state in tool_states)
     if skill.tool_state[0] is HOLDING and may_have_moved:
         # A transport may start above its bin. The minimum time of a transport to an unknown bin is 0.
-        values |= {port.name: "" for port in skill.ports.values() if port.refers_to == "bin"}
+        values |= {name: "" for name, setting in declarations.items() if setting.refers_to == "bin"}
     return skill.min_time(context.min_times, values)
