@@ -55,6 +55,8 @@ class Belief:
         low_confidence_count: Number of looks with a doubtful detection since the last confident look.
         last_label_by_viewpoint: For each viewpoint key, the last detected class, or "" after a miss during a
             verification; empty after a possible move of the item.
+        miss_count_by_viewpoint: For each viewpoint key, number of misses during a verification; empty after a
+            detection at the place of the item.
         repeat_count: Number of looks that repeated the class of an earlier look from the same viewpoint.
         log_likelihoods: Log likelihood of each detected class, relative to a class that was never detected.
         label_counts: For each detected class, number of looks.
@@ -72,6 +74,7 @@ class Belief:
     miss_probability: float = 1.0
     low_confidence_count: int = 0
     last_label_by_viewpoint: dict[str, str] = field(default_factory=dict)
+    miss_count_by_viewpoint: Counter[str] = field(default_factory=Counter)
     repeat_count: int = 0
     log_likelihoods: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     label_counts: Counter[str] = field(default_factory=Counter)
@@ -164,15 +167,24 @@ class Belief:
         self.low_confidence_count = 0
         self.is_confirmed = self.is_confirmed or self.log_odds >= CONFIRMATION_LOG_ODDS
 
-    def add_miss(self, rates: ErrorRates, viewpoint: str | None = None) -> None:
+    def add_miss(
+        self, rates: ErrorRates, viewpoint: str | None = None, *, was_detected_here: bool = True
+    ) -> None:
         """Update the existence with a look that shows the item's position, but does not detect the item.
 
-        With a `viewpoint`, the miss is weak evidence if it repeats the last miss from this viewpoint.
+        With a `viewpoint`, a miss is weak evidence if it repeats an earlier miss from this viewpoint. If no
+        look has detected the item at this position (`was_detected_here`), the detector may be unable to do
+        so, for instance if a red cube lies in a red bin. With the probability `rates.repeated`, all later
+        looks from the viewpoint then repeat the first miss, so that no number of looks is a proof.
         """
-        is_repeated = viewpoint is not None and self.last_label_by_viewpoint.get(viewpoint) == ""
-        miss_rate = compute_repeat_probability(rates.miss_rate, rates.repeated if is_repeated else 0.0)
+        count = 0 if viewpoint is None else self.miss_count_by_viewpoint[viewpoint]
+        miss_rate = compute_repeat_probability(rates.miss_rate, rates.repeated if count else 0.0)
+        if count and not was_detected_here:
+            miss_rate = compute_repeat_probability(rates.miss_rate**count, rates.repeated)
+            miss_rate /= compute_repeat_probability(rates.miss_rate ** (count - 1), rates.repeated)
         if viewpoint is not None:
             self.last_label_by_viewpoint[viewpoint] = ""
+            self.miss_count_by_viewpoint[viewpoint] += 1
         self.miss_probability *= miss_rate
         self.log_odds += math.log(miss_rate)
 

@@ -126,7 +126,7 @@ class BinContents:
                 if is_visible or self.is_floor_visible(bin_name, detections):
                     update_bin_log_odds(record, bin_name, detections.error_rates, is_visible=is_visible)
                 if record.bin_log_odds[bin_name] >= -math.log(self.config.max_miss_probability):
-                    record.reason, record.stamp = "", detections.frame.stamp
+                    record.reason, record.stamp, record.was_detected_in_bin = "", detections.frame.stamp, True
                     self.records.set_placed(record, bin_name)
                     break
 
@@ -140,7 +140,7 @@ class BinContents:
         """Set the time of the last detection of each placed item that an image shows in its bin."""
         for record in self.records.filter_by_state(State.PLACED):
             if self.find_presence(record, detections, observations) is Presence.PRESENT:
-                record.stamp = detections.frame.stamp
+                record.stamp, record.was_detected_in_bin = detections.frame.stamp, True
 
     def find_presence(
         self, record: ItemRecord, detections: Detections, observations: Sequence[Observation]

@@ -91,6 +91,7 @@ class ItemRecord:
         deferral_count: Number of times that the item was deferred.
         turn: Rank among the deferred items; 0 if the item is not deferred.
         was_taken_away: True if the item is dropped because a person, not the tool, removed it.
+        was_detected_in_bin: True if a look has shown the placed item in its bin.
         slot: Index of the slot of the bin over which the item was released, or None.
     """
 
@@ -124,6 +125,7 @@ class ItemRecord:
     deferral_count: int = 0
     turn: int = 0
     was_taken_away: bool = False
+    was_detected_in_bin: bool = False
     slot: int | None = None
 
     def __post_init__(self) -> None:
@@ -187,6 +189,7 @@ class ItemRecord:
     def forget_viewpoints(self) -> None:
         """Forget earlier viewpoints, because looks at a moved item do not repeat earlier errors."""
         self.belief.last_label_by_viewpoint.clear()
+        self.belief.miss_count_by_viewpoint.clear()
         self.belief.repeat_count = self.contradiction_count = 0
 
     def update_position(self, position: Array, std: float, *, is_unmoved: bool) -> None:

@@ -74,9 +74,13 @@ class Tracker(LedgerQueries):
         if record.state is State.PLACED:
             presence = self._bin_contents.find_presence(record, detections, observations)
             if presence is Presence.GONE:
-                record.belief.add_miss(detections.error_rates, make_viewpoint_key(detections))
+                record.belief.add_miss(
+                    detections.error_rates, make_viewpoint_key(detections),
+                    was_detected_here=record.was_detected_in_bin,
+                )  # fmt: skip
             elif presence is Presence.PRESENT:
                 record.stamp, record.belief.miss_probability = frame.stamp, 1.0
+                record.was_detected_in_bin = True
                 record.forget_viewpoints()
         elif record.state not in ON_TABLE:
             return Presence.HIDDEN if record.state is State.HELD else Presence.GONE
@@ -170,6 +174,7 @@ class Tracker(LedgerQueries):
         # Objects in earlier images are not this item, which can leave the bin only after the placement.
         record.stamp, record.belief.miss_probability = self._last_stamp, 1.0
         record.forget_viewpoints()
+        record.was_detected_in_bin = False
         self._records.set_placed(record, bin)
 
     def record_put_down(self, item: Item, position: Array) -> None:

@@ -35,9 +35,18 @@ def test_an_item_that_a_look_shows_in_its_bin_is_there(placed: Bench) -> None:
 
 def test_an_item_is_gone_only_after_enough_looks(placed: Bench) -> None:
     rates = replace(EYE, repeated=0.6)
+    assert placed.verify("cube-1", SLOT_1, by=rates) == "present"
     answers = [placed.verify("cube-1", by=rates) for _ in range(8)]
     # 0.03 for the first miss, and 0.612 for each repeated one.
     assert answers == ["unsure"] * 7 + ["gone"]
+
+
+def test_no_number_of_misses_from_one_viewpoint_proves_that_an_item_is_gone_that_no_look_has_shown_there(
+    placed: Bench,
+) -> None:
+    rates = replace(EYE, repeated=0.6)
+    assert [placed.verify("cube-1", by=rates) for _ in range(100)] == ["unsure"] * 100
+    assert placed.states() == {"cube-1": ("placed", "red_bin")}
 
 
 def test_a_detection_between_two_misses_refutes_the_first_one(placed: Bench) -> None:
