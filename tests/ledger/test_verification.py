@@ -28,6 +28,18 @@ def gone(placed: Bench) -> Bench:
     return placed
 
 
+@pytest.fixture
+def half_gone(placed: Bench) -> Bench:
+    """A ledger whose items cube-1 and cube-2 were placed in the red bin; cube-1 is gone."""
+    for _ in range(3):
+        placed.look(ELSEWHERE)
+    placed.place("cube-2")
+    for _ in range(2):
+        placed.verify("cube-1", SLOT_2)
+    assert placed.states()["cube-1"] == ("dropped", "")
+    return placed
+
+
 def test_an_item_that_a_look_shows_in_its_bin_is_there(placed: Bench) -> None:
     assert placed.verify("cube-1", SLOT_1) == "present"
     assert placed.states() == {"cube-1": ("placed", "red_bin")}
@@ -151,36 +163,30 @@ def test_of_two_items_the_one_whose_slot_is_empty_is_gone(placed: Bench) -> None
     assert [placed.verify(item, SLOT_2) for item in ("cube-2", "cube-1")] == ["present", "unsure"]
 
 
-def test_the_slot_of_an_item_that_is_gone_stays_used_until_the_bin_is_empty(placed: Bench) -> None:
-    for _ in range(3):
-        placed.look(ELSEWHERE)
-    placed.place("cube-2")
-    for _ in range(2):
-        placed.verify("cube-1", SLOT_2)
-    assert placed.states()["cube-1"] == ("dropped", "")
-    assert (placed.ledger.count_objects_in("red_bin"), placed.ledger.find_next_slot_index("red_bin")) == (
+def test_the_slot_of_an_item_that_is_gone_stays_used_until_the_bin_is_empty(half_gone: Bench) -> None:
+    assert (
+        half_gone.ledger.count_objects_in("red_bin"),
+        half_gone.ledger.find_next_slot_index("red_bin"),
+    ) == (
         1,
         2,
     )
     for _ in range(2):
-        placed.verify("cube-2")
-    assert (placed.ledger.count_objects_in("red_bin"), placed.ledger.find_next_slot_index("red_bin")) == (
+        half_gone.verify("cube-2")
+    assert (
+        half_gone.ledger.count_objects_in("red_bin"),
+        half_gone.ledger.find_next_slot_index("red_bin"),
+    ) == (
         0,
         0,
     )
 
 
-def test_an_item_that_was_taken_for_gone_and_is_shown_again_uses_no_second_slot(placed: Bench) -> None:
-    for _ in range(3):
-        placed.look(ELSEWHERE)
-    placed.place("cube-2")
+def test_an_item_that_was_taken_for_gone_and_is_shown_again_uses_no_second_slot(half_gone: Bench) -> None:
     for _ in range(2):
-        placed.verify("cube-1", SLOT_2)
-    assert placed.states()["cube-1"] == ("dropped", "")
-    for _ in range(2):
-        placed.look(SLOT_1, SLOT_2, view="full")
-    assert placed.states()["cube-1"] == ("placed", "red_bin")
-    assert placed.ledger.find_next_slot_index("red_bin") == 2
+        half_gone.look(SLOT_1, SLOT_2, view="full")
+    assert half_gone.states()["cube-1"] == ("placed", "red_bin")
+    assert half_gone.ledger.find_next_slot_index("red_bin") == 2
 
 
 def test_in_a_bin_with_two_layers_no_item_is_gone(bench: Bench) -> None:
