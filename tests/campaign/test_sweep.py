@@ -52,6 +52,7 @@ def work(job: SweepJob) -> Result:
     return result(job.seed, ticks=os.getpid(), unknown_labels=dict(job.overrides))
 
 
+@pytest.mark.slow
 def test_every_seed_is_run_once_in_another_process():
     reported = []
     results = swept(range(1, 5), work, progress=lambda done, total: reported.append((done, total)))
@@ -87,6 +88,7 @@ def test_every_run_leaves_its_record_and_its_report(tmp_path):
     assert (Path(result.run) / "report.html").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sigint")
 def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
     reported = []
@@ -102,7 +104,8 @@ def die(job: SweepJob) -> Result:
     return result(job.seed)
 
 
-@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
 def test_a_run_that_takes_its_process_down_costs_only_what_runs_beside_it(workers):
     results = swept(range(4), die, workers=workers)
     assert [entry.seed for entry in results] == [0, 1, 2, 3]

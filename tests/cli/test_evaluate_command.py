@@ -33,6 +33,7 @@ def evaluate(*arguments, code=0):
     return result.stderr, json.loads(result.stdout) if code == 0 else None
 
 
+@pytest.mark.slow
 def test_a_cells_detector_is_measured_as_in_a_run_with_a_sheet_of_its_worst_misses(tmp_path):
     sheet = tmp_path / "sheet.png"
     stored = tmp_path / "overhead.measured.json"
@@ -55,6 +56,7 @@ def test_a_cells_detector_is_measured_as_in_a_run_with_a_sheet_of_its_worst_miss
     assert cv2.imread(str(sheet)) is not None
 
 
+@pytest.mark.slow
 def test_a_detector_is_measured_in_the_world_of_a_scene_file(tmp_path):
     scene = tmp_path / "moved.yaml"
     scene.write_text("scene: moved\ncamera: {shift: [0.0, 0.03, 0.0]}\ntable: {objects: [4, 4]}\n")
@@ -83,6 +85,7 @@ def test_a_dataset_is_measured_on_with_or_without_a_cell_or_a_model_file(dataset
     assert (printed["weights"], measured["threshold"]) == ((str(MODEL_PATH), 0.9) if model else (None, 0.5))
 
 
+@pytest.mark.slow
 def test_a_cell_with_other_values_is_measured_and_stored_in_a_named_file_only(missions, tmp_path):
     options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--seed", 2)
     changed = ("--set", "cell.detectors.embedded.threshold=0.7")
@@ -94,6 +97,7 @@ def test_a_cell_with_other_values_is_measured_and_stored_in_a_named_file_only(mi
     assert read_measurements(tmp_path / "o.json")[0].fingerprint["threshold"] == "0.7"
 
 
+@pytest.mark.slow
 def test_a_measurement_with_a_threshold_of_zero_is_not_stored(tmp_path):
     stored = tmp_path / "overhead.measured.json"
     options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--out", stored)

@@ -24,6 +24,7 @@ def runs(tmp_path: Path) -> Path:
     return tmp_path / "runs"
 
 
+@pytest.mark.slow
 def test_a_run_that_was_cut_off_is_taken_up_again_and_ends(runs: Path) -> None:
     assert invoke("run", "sort_fruit", "--seed", "4", "--quiet", "--runs", str(runs)).exit_code == 0
     path = (runs / "latest").resolve()
@@ -60,6 +61,7 @@ def test_while_it_goes_on_nobody_else_takes_it_up_and_once_killed_it_ends(runs: 
     assert invoke("run", "--resume", "latest", "--runs", str(runs)).exit_code == 0
 
 
+@pytest.mark.slow
 def test_a_replay_says_what_is_decided_otherwise(runs: Path, tmp_path: Path) -> None:
     assert invoke("run", "sort_fruit", "--seed", "4", "--quiet", "--runs", str(runs)).exit_code == 0
     path = (runs / "latest").resolve()

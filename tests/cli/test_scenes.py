@@ -40,6 +40,7 @@ def run_json(*words: str, runs: Path) -> dict[str, Any]:
     return result | {"said": done.stderr}
 
 
+@pytest.mark.slow
 def test_the_run_directory_has_a_copy_from_which_the_run_is_repeated_and_replayed(
     sort: str, scene: Path, tmp_path: Path
 ) -> None:
@@ -63,6 +64,7 @@ def test_the_run_directory_has_a_copy_from_which_the_run_is_repeated_and_replaye
     assert plain["audit"]["left"] > 1
 
 
+@pytest.mark.slow
 def test_a_sweep_runs_every_seed_in_the_scene(sort: str, scene: Path, tmp_path: Path) -> None:
     words = ("--seeds", "1-2", "--workers", "1", "--scene", str(scene), "--runs", str(tmp_path), "--json")
     done = invoke("sweep", sort, *words)

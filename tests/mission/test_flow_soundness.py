@@ -268,6 +268,7 @@ def run(case: CheckContext, seed: int) -> tuple[World, Any]:
     return world, root
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(tree=trees, seed=st.integers(0, 2**31))
 def test_what_happens_was_foreseen(tree: Tree, seed: int) -> None:
@@ -308,6 +309,7 @@ def hold_against_runs(tree: Tree, seed: int) -> None:
         )
 
 
+@pytest.mark.slow
 def test_a_good_part_of_the_random_trees_can_run() -> None:
     found = 0
 

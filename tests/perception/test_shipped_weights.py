@@ -25,12 +25,13 @@ def test_the_weights_fit_into_a_package_and_a_card_goes_with_them(missions):
         assert set(read_labels(labels)) == set(load_cell(missions / "cells" / f"{cell}.yaml").objects)
 
 
+@pytest.mark.slow
 # Seeds that no training image was drawn from; the cards' figures, less two mistakes.
 @pytest.mark.parametrize(
     ("name", "scenes", "randomized", "precision", "recall"),
     [
         ("overhead", range(1000, 1020), True, 0.90, 0.80),
-        pytest.param("wrist", range(1000, 1020), True, 0.90, 0.80, marks=pytest.mark.slow),
+        ("wrist", range(1000, 1020), True, 0.90, 0.80),
         ("fasteners", range(2000, 2008), False, 0.95, 0.94),
     ],
 )

@@ -141,6 +141,7 @@ def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name
     assert json.loads((path / "result.json").read_text()) == to_json(result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "setting"), [("sort_until_four", {"enough": "2"}), ("fill_by_quota", {"most": "1"})]
 )
@@ -161,6 +162,7 @@ def list_bins(path: Path) -> dict[str, str]:
     return {one.item: one.bin for one in changes if isinstance(one, ItemChanged) and one.state == "placed"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nth", [1, 2, 3, 10])
 def test_a_run_that_was_killed_in_its_first_control_step_starts_again(
     missions: Path, tmp_path: Path, nth: int
@@ -205,7 +207,8 @@ def moment(path: Path, skill: str) -> int:
     return (ticks[2] + ticks[3]) // 2
 
 
-@pytest.mark.parametrize("skill", [pytest.param("Grasp", marks=pytest.mark.slow), "Transit"])
+@pytest.mark.slow
+@pytest.mark.parametrize("skill", ["Grasp", "Transit"])
 def test_what_fell_from_the_tool_is_picked_again(missions: Path, tmp_path: Path, skill: str) -> None:
     fell: list[str] = []
 
@@ -286,8 +289,9 @@ def truncate(path: Path, share: float) -> None:
     (path / "journal.jsonl").write_bytes(content[: int(share * len(content))])
 
 
-@pytest.mark.parametrize("share", [0.15, 0.6, pytest.param(0.9, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", ["sort_overhead", pytest.param("sort_wrist", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.15, 0.6, 0.9])
+@pytest.mark.parametrize("name", ["sort_overhead", "sort_wrist"])
 def test_a_scene_is_observed_if_the_journal_lacks_actions_of_the_tool(
     missions: Path, tmp_path: Path, name: str, share: float
 ) -> None:
@@ -302,6 +306,7 @@ def test_a_scene_is_observed_if_the_journal_lacks_actions_of_the_tool(
     assert re.match(r"the journal ends \d+ control steps \([\d.]+ s\) before the log of the world", note)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [ToolCommanded, MotionPlanned])
 def test_a_scene_is_observed_if_the_journal_lacks_the_last_command(
     missions: Path, tmp_path: Path, kind: type
@@ -320,6 +325,7 @@ def test_a_scene_is_observed_if_the_journal_lacks_the_last_command(
     assert len(watcher.notes) == 1
 
 
+@pytest.mark.slow
 def test_a_scene_whose_observation_was_interrupted_is_observed_again(missions: Path, tmp_path: Path) -> None:
     path = Path(run_of(load(missions, "sort_overhead"), tmp_path, frames=True).run)
     truncate(path, 0.6)
@@ -332,6 +338,7 @@ def test_a_scene_whose_observation_was_interrupted_is_observed_again(missions: P
     assert redecided(path) == ""
 
 
+@pytest.mark.slow
 def test_the_result_of_a_run_that_was_killed_after_its_end_is_written(missions: Path, tmp_path: Path) -> None:
     result = run_of(load(missions, "sort_overhead"), tmp_path, frames=True)
     path = Path(result.run)
@@ -370,6 +377,7 @@ def unwilling(lets_go: bool) -> Any:
     return Unwilling
 
 
+@pytest.mark.slow
 def test_what_was_rejected_is_tried_again(missions: Path, tmp_path: Path) -> None:
     loaded = load_mission(missions / "sort_overhead.yaml", load_skills(), {"attempts": "1"})
     first = run_of(loaded, tmp_path, make_cell=unwilling(lets_go=False))
@@ -387,6 +395,7 @@ def test_what_was_rejected_is_tried_again(missions: Path, tmp_path: Path) -> Non
         resumed(path)
 
 
+@pytest.mark.slow
 def test_a_camera_that_was_moved_before_a_run_is_resumed_ends_it(missions: Path, tmp_path: Path) -> None:
     class Moved(FakeCell):
         def __init__(self, *args: Any, **options: Any) -> None:

@@ -28,6 +28,8 @@ from executive.skill import Skill
 from executive.tree.blackboard import Blackboard as Variables
 from executive.tree.skill_leaf import SkillLeaf
 
+pytestmark = pytest.mark.slow
+
 MISSIONS = Path(__file__).parents[2] / "missions"
 RUNS = [(name, seed) for seed in range(3) for name in ("sort_overhead", "sort_wrist")]
 """Missions and seeds."""
@@ -138,7 +140,6 @@ def test_side_by_side_each_goes_as_if_alone(alone: dict[tuple[str, int], Story])
     assert [run for run, mission in zip(runs, missions, strict=True) if mission.story() != alone[run]] == []
 
 
-@pytest.mark.slow
 def test_one_after_another_they_leave_less_than_a_block_of_memory_each() -> None:
     def blocks_after(runs: int) -> int:
         for number in range(runs):

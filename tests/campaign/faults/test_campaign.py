@@ -20,6 +20,8 @@ from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
 
+pytestmark = pytest.mark.slow
+
 MISSION = """\
 mission: small
 description: One object, if there is one.
@@ -106,7 +108,6 @@ def test_a_recovery_without_a_run_is_listed_with_its_position(
     ] == ["catch on Grasp.missed"]
 
 
-@pytest.mark.slow
 def test_pairs_are_drawn_by_the_seed_and_come_in_the_same_order_from_any_number_of_workers(
     small: MissionUnderTest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -130,7 +131,6 @@ def interrupt(*progress: int) -> None:
     os.kill(os.getpid(), signal.SIGINT)
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("sigint")
 def test_after_ctrl_c_the_finished_trials_are_reported(small: MissionUnderTest) -> None:
     messages: list[str] = []

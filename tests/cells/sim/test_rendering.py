@@ -56,6 +56,7 @@ def test_a_sample_depends_on_its_seed_alone(
     assert fresh.boxes[:2] == pytest.approx(np.array(boxes), abs=0.06)
 
 
+@pytest.mark.slow
 def test_samples_are_labelled_inside_the_image_and_localize_near_the_object(overhead: CellConfig) -> None:
     made, labels = samples(overhead, range(16)), set[str]()
     assert [len(sample.labels) for sample in made] == [19, 0, 11, 2, 3, 1, 5, 13, 6, 6, 1, 1, 2, 8, 4, 6]
@@ -74,6 +75,7 @@ def test_samples_are_labelled_inside_the_image_and_localize_near_the_object(over
     assert labels == set(overhead.objects)
 
 
+@pytest.mark.slow
 def test_an_arrangement_follows_from_its_generator(overhead: CellConfig) -> None:
     footprint, table, items = np.array([[0.3, -0.4], [0.8, 0.4]]), (0.9, 0.8, 0.7), []
     for seed in range(30):
@@ -147,7 +149,8 @@ class Here(ThreadPoolExecutor):
         return done
 
 
-@pytest.mark.parametrize("pool", [Here, pytest.param(WorkerPool, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("pool", [Here, WorkerPool])
 def test_data_sets_and_frames_are_the_same_for_any_number_of_workers(
     pool: type, overhead: CellConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -96,6 +96,7 @@ def test_a_scene_without_changes_is_the_declared_world(world: Build, overhead: C
     assert load_scene(None, overhead) == DECLARED_SCENE
 
 
+@pytest.mark.slow
 def test_the_lamp_changes_brightness_colour_and_shadows(cell: Callable[..., SimCell]) -> None:
     usual, dim, red = (
         capture(cell(light=light)).image[TABLE].astype(float).mean(axis=(0, 1))

@@ -106,8 +106,9 @@ def assert_unavailable(detector, *patterns):
         assert re.search(pattern, text), text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("view", ["table", "full"])
-@pytest.mark.parametrize("api", ["v1", pytest.param("v0", marks=pytest.mark.slow), "workflow"])
+@pytest.mark.parametrize("api", ["v1", "v0", "workflow"])
 def test_a_box_is_returned_in_the_frames_pixels_and_renamed(make, server, api, view):
     detector = make(**APIS[api])
     answer = search(detector, spot(channel=2), view)

@@ -76,6 +76,7 @@ def test_what_falls_or_is_put_down_is_not_taken_for_something_else(name: str) ->
     assert run_mission("sort_overhead", make_oracle_kind(), faults=script).agrees
 
 
+@pytest.mark.slow
 def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched) -> None:
     result = watched.run(during("*/Transit", effects.object_removed(), activations=2), holding)
     assert (watched.seen["FaultInjected"], watched.seen["dropped"]) == (True, False)
