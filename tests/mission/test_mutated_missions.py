@@ -143,12 +143,11 @@ def test_the_bases_of_the_mutants_use_every_control_node() -> None:
     assert {*load_control_nodes(), USE_KEYWORD} - words == set()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "seeds",
     [
-        range(40),
-        range(40, 600),
+        pytest.param(range(40), marks=pytest.mark.slow),
+        pytest.param(range(40, 600), marks=pytest.mark.slow),
         pytest.param(range(1000, 21_000), marks=pytest.mark.campaign),
     ],
     ids=len,
