@@ -77,6 +77,7 @@ def assert_does_its_work(loaded: LoadedMission) -> None:
         run.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MISSIONS)
 def test_every_mission_of_the_mission_guides_does_its_work(name: str, folder: Path) -> None:
     assert_does_its_work(load_mission(name, load_skills(), find_cell_kind=load_cell_kind))

@@ -130,6 +130,7 @@ def assert_ended_as_crowded(result: Mapping[str, Any], journal: str, count: int)
     assert not {"FrameSearched", "ItemChanged"} & set(entries)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moving", [False, True], ids=["fixed", "moving"])
 @pytest.mark.parametrize("overlapping", [False, True], ids=["disjoint", "overlapping"])
 @pytest.mark.parametrize("count", [101, 300, 1000, 3000])

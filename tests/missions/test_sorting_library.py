@@ -35,6 +35,7 @@ def test_the_waits_of_a_look_grow_and_outlast_a_restart() -> None:
     assert LONGEST_RESTART < waits.sum() < MAX_TOTAL_WAIT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [0.0, 4.0])
 @pytest.mark.parametrize("duration", [15.0, LONGEST_RESTART])
 def test_a_sort_outlasts_the_restart_of_a_server(start: float, duration: float) -> None:

@@ -76,6 +76,7 @@ def test_a_camera_in_its_place_is_believed_to_be_there(light: float) -> None:
     assert describe_displacement(frame, BINS) == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "shift",
     [(0.01, 0.0, 0.0), (0.0, -0.03, 0.0), (0.03, 0.04, 0.0), (0.0, 0.0, 0.12), (0.0, 0.0, -0.12)],
@@ -88,6 +89,7 @@ def test_a_shift_is_measured(shift: tuple[float, float, float]) -> None:
     assert offset.rotation_deg < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn_deg", [(2, 0, 0), (0, -6, 0), (0, 0, 2), (0, 0, -10), (5, 5, 3)])
 def test_a_rotation_is_measured(turn_deg: tuple[float, float, float]) -> None:
     offset = estimate_offset(draw(moved(turn_deg=turn_deg)), BINS)

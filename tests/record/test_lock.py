@@ -50,6 +50,7 @@ def test_where_nobody_tells_which_process_it_is_it_is_another(tmp_path, holder, 
     assert "is in use: another process writes its journal" in refusal(tmp_path / "journal.jsonl", resume=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "line",
     ["POSIX  ADVISORY  WRITE {pid} {file}", "FLOCK  ADVISORY  WRITE {pid} 00:00:1",

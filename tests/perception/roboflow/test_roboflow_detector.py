@@ -156,6 +156,7 @@ def test_one_deadline_covers_the_images_of_all_tiles(make, server):
     server.delay = 0.0
 
 
+@pytest.mark.slow
 def test_an_output_that_a_workflow_lacks_is_named_with_those_that_it_has(make, server):
     detector = make(**{**APIS["workflow"], "workflow_output": "circles"})
     assert_unavailable(
@@ -165,6 +166,7 @@ def test_an_output_that_a_workflow_lacks_is_named_with_those_that_it_has(make, s
     )
 
 
+@pytest.mark.slow
 def test_what_is_below_the_floor_is_left_out_and_a_class_nobody_asked_for_is_not(detector, server):
     server.faults = lambda look: "doubtful"
     assert search(detector, spot()).confident == ()
