@@ -44,24 +44,23 @@ class ForEach(Loop):
         return f"${self.each} in {elements}"
 
     def run(self) -> NodeRun:
-        """Read the list, then write each element to the variable `each` and run the body.
+        """Read the list, write each element to the variable `each` and run the body, then remove the variable.
 
         Raises:
             Fault: The variable with the list was never written, or its value is not a list.
         """
         elements = self._read_list()
-        for number, element in enumerate(elements, 1):
-            self.blackboard[self.each] = element
-            self.report_choice(f"element {number} of {len(elements)}: {_describe_element(element)}")
-            if number > 1:
-                yield from self.end_iteration()
-            if failure := (yield from self.run_child(self.do)):
-                return failure
-        return None
-
-    def clean_up(self) -> None:
-        """Remove the variable that holds the current element."""
-        self.blackboard.pop(self.each, None)
+        try:
+            for number, element in enumerate(elements, 1):
+                self.blackboard[self.each] = element
+                self.report_choice(f"element {number} of {len(elements)}: {_describe_element(element)}")
+                if number > 1:
+                    yield from self.end_iteration()
+                if failure := (yield from self.run_child(self.do)):
+                    return failure
+            return None
+        finally:
+            self.blackboard.pop(self.each, None)
 
     def _read_list(self) -> tuple[object, ...]:
         variable = self.in_

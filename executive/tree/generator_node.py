@@ -34,6 +34,10 @@ class GeneratorNode(ControlNode):
             return Status.SUCCESS if failure is None else self.fail(failure)
         return Status.RUNNING
 
+    def clean_up(self) -> None:
+        """Close the generator, so that its `finally` blocks are executed after a halt, too."""
+        self._run.close()
+
     def run(self) -> NodeRun:
         """Run the node from its start to its end."""
         raise NotImplementedError

@@ -9,7 +9,9 @@ from build_nodes import repeat, retry, sequence, while_loop
 from py_trees.common import Status
 
 from executive.errors import InputError
-from executive.events import BranchChosen
+from executive.events import BranchChosen, NodeEnded
+from executive.tree.generator_node import GeneratorNode, NodeRun
+from executive.tree.keys import Child, key
 
 
 def test_a_failed_condition_is_a_success_with_a_report(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
@@ -24,6 +26,25 @@ def test_a_loop_of_many_rounds_needs_no_deep_stack(leaf: Any, site: Any) -> None
     for _ in range(5001):
         node.tick_once()
     assert node.status is Status.SUCCESS
+
+
+def test_the_generator_of_a_halted_node_is_closed_before_the_node_ends(
+    leaf: Any, site: Any, events: Any
+) -> None:
+    class Lamp(GeneratorNode):
+        keyword = "lamp"
+        do: Child = key(doc="Body.")
+
+        def run(self) -> NodeRun:
+            try:
+                return (yield from self.run_child(self.do))
+            finally:
+                self.report_choice("lamp off")
+
+    node = Lamp(site("here"), do=leaf("A", "R"))
+    node.tick_once()
+    node.stop()
+    assert events[-2:] == [BranchChosen("here", "lamp off", "", ""), NodeEnded("here", "INVALID")]
 
 
 @pytest.mark.parametrize("attempts", [1, 4])
