@@ -44,7 +44,7 @@ class ForEach(Loop):
         return f"${self.each} in {elements}"
 
     def run(self) -> NodeRun:
-        """Read the list, write each element to the variable `each` and run the body, then remove the variable.
+        """Write each element of the list to the variable `each` and run the body; then remove the variable.
 
         Raises:
             Fault: The variable with the list was never written, or its value is not a list.
