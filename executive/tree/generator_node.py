@@ -11,8 +11,9 @@ from executive.tree.failure import Failure
 from executive.tree.keys import Child
 from executive.tree.node import ControlNode
 
-NodeRun: TypeAlias = Generator[None, None, Failure | None]
-"""Generator that yields once per tick, and returns a failure, or None for success."""
+NodeRun: TypeAlias = Generator[None, Status | None, Failure | None]
+"""Generator that returns a failure, or None for success. A `yield` ends the tick, or waits until the end of a
+running child, and then has the status of the child as its value."""
 
 
 class GeneratorNode(ControlNode):
@@ -23,12 +24,18 @@ class GeneratorNode(ControlNode):
 
     def start(self) -> None:
         """Begin a new generator."""
-        self._run = self.run()
+        self._run, self._running_child = self.run(), cast("Child | None", None)
 
     def step(self) -> Status:
-        """Continue the generator until the end of the tick, and return the status."""
+        """Tick the running child, continue the generator if the child has ended, and return the status."""
+        child, child_status = self._running_child, None
+        if child is not None:
+            child_status = self.tick_child(child)
+            if child_status is Status.RUNNING:
+                return child_status
+            self._running_child = None
         try:
-            next(self._run)
+            self._run.send(child_status)
         except StopIteration as end:
             failure = cast("Failure | None", end.value)
             return Status.SUCCESS if failure is None else self.fail(failure)
@@ -44,6 +51,8 @@ class GeneratorNode(ControlNode):
 
     def run_child(self, child: Child) -> NodeRun:
         """Tick a child once per tick until its end, and return its failure; None after success."""
-        while (status := self.tick_child(child)) is Status.RUNNING:
-            yield
+        status: Status | None = self.tick_child(child)
+        if status is Status.RUNNING:
+            self._running_child = child
+            status = yield
         return self.get_failure(child) if status is Status.FAILURE else None

@@ -76,8 +76,6 @@ class TreeNode(Behaviour):
         super().__init__(context.label or name)
         self.path, self.label, self.blackboard = context.path, context.label, context.blackboard
         self._failure: Failure | None = None
-        self._visited_nodes: list[Behaviour] | None = None
-        """Nodes below this node that the current call of `tick` has ticked; None outside of `tick`."""
         self._emit_without_parent = context.emit
 
     @property
@@ -101,13 +99,8 @@ class TreeNode(Behaviour):
         return self.status
 
     def tick(self) -> Iterator[Behaviour]:
-        """Continue by one tick, then yield the ticked nodes for visitors of py_trees, children first."""
-        visited_nodes = self._visited_nodes = []
-        try:
-            self.tick_once()
-        finally:
-            self._visited_nodes = None
-        yield from visited_nodes
+        """Continue by one tick, then yield this node for visitors of py_trees."""
+        self.tick_once()
         yield self
 
 
@@ -234,14 +227,14 @@ class ControlNode(KeyOwner, TreeNode):
 
     def tick_child(self, child: Child) -> Status:
         """Tick a child and return its status."""
-        if self._visited_nodes is None:
-            child.tick_once()
-        else:
-            self._visited_nodes.extend(child.tick())
+        child.tick_once()
         status = child.status
         if status is Status.INVALID:
-            raise Fault(f"{child.name} was ticked but has no status", self.path)
+            raise self._make_status_fault(child)
         return status
+
+    def _make_status_fault(self, child: Child) -> Fault:
+        return Fault(f"{child.name} was ticked but has no status", self.path)
 
     def halt_children(self, children: Iterable[Child]) -> None:
         """Halt the children and all running nodes below the children, one child after the other.
@@ -274,6 +267,25 @@ class ControlNode(KeyOwner, TreeNode):
         self.emit(BranchChosen(self.path, choice, reason, message))
 
     # Methods of the py_trees interface.
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Continue by one tick, then yield the ticked nodes for visitors of py_trees, children first."""
+        visited_nodes: list[Behaviour] = []
+
+        def tick_and_visit(child: Child) -> Status:
+            visited_nodes.extend(child.tick())
+            if child.status is Status.INVALID:
+                raise self._make_status_fault(child)
+            return child.status
+
+        # An attribute of the instance hides the method, so that a tick without visitors costs nothing more.
+        self.tick_child = tick_and_visit  # type: ignore[method-assign]
+        try:
+            self.tick_once()
+        finally:
+            del self.tick_child
+        yield from visited_nodes
+        yield self
 
     def tick_once(self) -> None:
         """Start the node, or continue the node by one tick."""

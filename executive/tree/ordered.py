@@ -38,15 +38,18 @@ class OrderedNode(ReactiveNode):
 
     def step(self) -> Status:
         """Tick the children in order until one of them decides the status of the tick."""
-        previous_index = index = self._child_index
-        status = self.continue_status
-        for index in range(previous_index if self.memory else 0, len(self.do)):
+        index = previous_index = self._child_index
+        tick = self.tick_child
+        if not self.memory:
+            index, tick = 0, self.tick_again
+        status = tick(self.do[index])
+        if status is Status.RUNNING and index == previous_index:
+            return status
+        while status is self.continue_status and index + 1 < len(self.do):
+            index += 1
             if index > previous_index:
                 self.report_next(index)
-            child = self.do[index]
-            status = self.tick_child(child) if self.memory else self.tick_again(child)
-            if status is not self.continue_status:
-                break
+            status = tick(self.do[index])
         if index < previous_index:
             self.halt_children([self.do[previous_index]])
             self.report_next(index)
