@@ -86,8 +86,8 @@ class Param:
         return self.default is ...
 
     @property
-    def is_name(self) -> bool:
-        """True if the value is a name in the cell or one of `choices`; a variable may then give the value."""
+    def accepts_variable(self) -> bool:
+        """True if a variable may give the value: a name in the cell, or one of `choices`."""
         return bool(self.refers_to or self.choices)
 
 
@@ -102,7 +102,8 @@ class Port:
         default: Value of an input whose variable is unwritten; `...` if the variable must be written.
         refers_to: Kind of the name (`item`, `bin`, `class`) if the value is a name; otherwise "".
         doc: Description of the port.
-        same_as: Name of another input; a constant must be a possible value of the variable of that input.
+        compared_with: Name of the input with which the skill compares this input, or "". A constant here must
+            be a possible value of that other input.
     """
 
     name: str
@@ -111,7 +112,7 @@ class Port:
     default: Any
     refers_to: str
     doc: str
-    same_as: str = ""
+    compared_with: str = ""
 
     @property
     def is_required(self) -> bool:
@@ -133,10 +134,10 @@ def param(
     return Param("", None, "", default, ge, le, choices, refers_to, doc)
 
 
-def port(*, default: Any = ..., refers_to: str = "", doc: str = "", same_as: str = "") -> Any:
+def port(*, default: Any = ..., refers_to: str = "", doc: str = "", compared_with: str = "") -> Any:
     """Declare a port of a skill; `Port` describes the arguments."""
     # `Skill.__init_subclass__` sets name, type and direction.
-    return Port("", None, Direction.IN, default, refers_to, doc, same_as)
+    return Port("", None, Direction.IN, default, refers_to, doc, compared_with)
 
 
 class SkillFailed(Exception):
@@ -150,7 +151,7 @@ class SkillFailed(Exception):
 class Skill:
     """Base class of skills; subclasses declare params and ports, and implement `run`.
 
-    A param or port whose name is a word of Python has an attribute with a final underscore: `not_` for `not`.
+    The attribute of a param or port named like a keyword of Python ends with `_`: `not_` for `not`.
 
     Attributes:
         params: Declared params by name.
@@ -162,13 +163,13 @@ class Skill:
         senses: True if the skill gets new information: an image, or a request of the operator.
         moves: True if the skill moves the arm.
         is_condition: True if the skill is a condition, which decides in one tick, writes no output, uses no
-            device, and changes nothing. Its `tool_state` then is a statement about the tool: the state in
-            which alone the condition can succeed.
+            device, and changes nothing. The `tool_state` of a condition is no requirement: the condition can
+            succeed only in this state.
         tool_state: Required state of the tool (ANY: no requirement); state after success (ANY: unchanged).
         tool_state_after_failure: State of the tool after a failure, by reason, and after a halt, by the key
             `halt`; ANY if unknown. A failure or halt without a key leaves the state unchanged.
-        is_replayable: False if the skill may read the world without its cell, so that a replay of a recorded
-            run may decide otherwise.
+        is_replayable: False if the skill may have inputs besides the cell, such as files or random numbers; a
+            replay of a recorded run may then differ.
         waits: Name of the param that contains the minimum time until success [s], or "".
     """
 
@@ -272,12 +273,12 @@ class Skill:
 
 
 def get_attribute_name(name: str) -> str:
-    """Return the attribute of a skill for a param or port: `name`, or `name_` if it is a word of Python."""
+    """Return the attribute of a skill for a param or port: `name`, or `name_` for a keyword of Python."""
     return f"{name}_" if keyword.iskeyword(name) else name
 
 
 def _get_mission_name(attribute: str) -> str:
-    """Return the name of a param or port in missions, of which `get_attribute_name` returns `attribute`."""
+    """Return the name of a param or port in missions; inverse of `get_attribute_name`."""
     name = attribute.removesuffix("_")
     return name if get_attribute_name(name) == attribute else attribute
 

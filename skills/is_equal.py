@@ -13,9 +13,11 @@ class IsEqual(Skill):
     """
 
     value: In[str | int | float | bool] = port(
-        same_as="to", doc="the value to compare, for example `$target.label`"
+        compared_with="to", doc="the value to compare, for example `$target.label`"
     )
-    to: In[str | int | float | bool] = port(same_as="value", doc="the expected value, for example `cube`")
+    to: In[str | int | float | bool] = port(
+        compared_with="value", doc="the expected value, for example `cube`"
+    )
     reasons = ("different",)
     is_condition = True
 

@@ -70,7 +70,8 @@ def expand(
     subtree_nodes = [node for subtree in mission.subtrees.values() for node in subtree.body.walk()]
     names_used_in_subtrees = {node.name for node in subtree_nodes if isinstance(node, SubtreeNode)}
     for subtree in mission.subtrees.values():
-        if subtree.name in expander.used_names or subtree.library or isinstance(subtree.body, InvalidNode):
+        is_used = subtree.name in expander.used_subtree_names
+        if is_used or subtree.library or isinstance(subtree.body, InvalidNode):
             continue
         if subtree.name not in names_used_in_subtrees:
             message = f'the subtree "{subtree.name}" is never used'
@@ -92,7 +93,7 @@ class _Expander:
     """Expander of the trees of one mission.
 
     Attributes:
-        used_names: Names of used subtrees; for a misspelt name, also the most similar name.
+        used_subtree_names: Names of used subtrees; for a misspelt name, also the most similar name.
     """
 
     def __init__(
@@ -104,7 +105,7 @@ class _Expander:
         self.mission, self.skills, self._predefined_lists = mission, skills, predefined_lists
         self.params: ValuesByName = {name: param.value for name, param in mission.params.items()}
         self.findings: list[Finding] = []
-        self.used_names: set[str] = set()
+        self.used_subtree_names: set[str] = set()
         # Referenced params and arguments, as (subtree, name); for a param, the subtree is "".
         self._referenced_names: set[tuple[str, str]] = set()
         self._node_count = 0
@@ -129,6 +130,7 @@ class _Expander:
     def find_unused_names(self) -> Iterator[Finding]:
         """Yield a finding for every param without reference, and every unused argument of a used subtree."""
         for name, param in self.mission.params.items() if self.mission.tree else ():
+            # The text also contains nodes that are not expanded, for example after an error.
             if ("", name) not in self._referenced_names and f"${name}" not in param.span.source.text:
                 yield make_warning(param.span, "unused-param", f'the param "{name}" is never used')
         for subtree in self.mission.subtrees.values():
@@ -213,11 +215,11 @@ class _Expander:
 
     def _expand_use(self, use: SubtreeNode, callers: tuple[str, ...], depth: int) -> Node:
         """Return `use` with the expanded body of the subtree; after an error, return `use` unchanged."""
-        self.used_names.add(use.name)
+        self.used_subtree_names.add(use.name)
         subtree = self.mission.subtrees.get(use.name)
         if subtree is None:
             if self.mission.is_complete:
-                self.used_names.add(find_similar_word(use.name, self.mission.subtrees) or "")
+                self.used_subtree_names.add(find_similar_word(use.name, self.mission.subtrees) or "")
                 hint = suggest_choice(use.name, self.mission.subtrees, "Subtrees of the mission")
                 self._add_error(use.span, "unknown-tree", f'there is no subtree "{use.name}"', hint)
             return use

@@ -49,7 +49,7 @@ class LoadedMission:
         unhandled_failures: Failures that can end the mission, because no node handles them.
         warnings: Findings that do not prevent a run.
         overrides: Values of `--set` as text, by name of a param or by `cell.<key>.<key>`.
-        behaviours: Behaviours of py_trees that the mission names, as skills, by the names of their classes.
+        behaviours: Skill classes made from the py_trees behaviours in the mission, by class name.
     """
 
     mission: Mission

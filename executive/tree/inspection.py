@@ -58,13 +58,10 @@ class NodeAnalysis(Protocol):
     def get_name(self, child: Child) -> str:
         """Return the last part of the path of a child: its label, or its skill, subtree or keyword."""
 
-    def describe_place(self, reason: Reason, reported_reason: Reason) -> str:
-        """Return the place of `reason`: `line 12`, or `x.yaml:12` if `reported_reason` is in another file.
+    def describe_place(self, reason: Reason, relative_to: Reason) -> str:
+        """Return the line of `reason` as a text, with the file if `relative_to` is in another file."""
 
-        The finding is reported at `reported_reason`.
-        """
-
-    def is_literal(self, key: str) -> bool:
+    def is_written_as_constant(self, key: str) -> bool:
         """Return True if the value of a key is written at the node itself, not in a param or an argument."""
 
     def get_min_time(self, child: Child) -> float:
@@ -106,7 +103,7 @@ class PropagatedFailure:
 
     def matches(self, reasons: Sequence[Reason]) -> bool:
         """Return True if one of `reasons` denotes the failure."""
-        # The checker passes `FailureName` objects, which have a position and never equal a plain `Reason`.
+        # A `LocatedReason` of the checker is a `Reason` with a position, and equals no plain `Reason`.
         return any(Reason(reason.source, reason.reason) in self.reasons for reason in reasons)
 
 

@@ -130,7 +130,7 @@ class Retry(Loop):
             hint = "Put a look or a motion into `do` or `recover`, or wait with `backoff`."
             yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
         # A param with the value 1 is no mistake, because the param may have another value in another run.
-        if self.attempts == 1 and analysis.is_literal("attempts"):
+        if self.attempts == 1 and analysis.is_written_as_constant("attempts"):
             message = "a retry with 1 attempt never runs its body again"
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 

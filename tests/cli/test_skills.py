@@ -75,7 +75,7 @@ def test_json_tells_everything_of_one_skill_as_one_object_and_of_all_as_one_arra
     ]  # fmt: skip
     assert ports[0] == {
         "name": "held", "type": "str", "direction": "in", "required": True, "default": None,
-        "refers": "item", "same_as": "", "doc": "what to put down",
+        "refers": "item", "compared_with": "", "doc": "what to put down",
     }  # fmt: skip
     assert [(port["name"], port["type"], port["direction"], port["required"]) for port in ports[1:]] == [
         ("beside", "list[str] | None", "in", False), ("placed", "str", "out", False),

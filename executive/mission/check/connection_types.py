@@ -56,7 +56,7 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
             writer = Writer(str(wire), node.span, wire.port.type, wire.port.refers_to)
             skill_writers.setdefault(wire.variable, []).append(writer)
 
-    def check_below(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
+    def check_node_and_children(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
         for key, variable in find_control_node_outputs(node):
             all_writers = {**skill_writers, **loop_writers}
             elements = node.values.get(key.list_key, ()) if isinstance(node, InnerNode) else ()
@@ -73,9 +73,9 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
                 yield from _check_connection(context, wire, writer)
                 yield from _check_compared_constants(context, node, wire, writer)
         for child in node.children:
-            yield from check_below(child, loop_writers)
+            yield from check_node_and_children(child, loop_writers)
 
-    yield from check_below(context.tree, {})
+    yield from check_node_and_children(context.tree, {})
 
 
 def _find_list_writers(node: Node, elements: KeyValue, writers: WritersByVariable) -> list[Writer]:
@@ -90,7 +90,7 @@ def _find_list_writers(node: Node, elements: KeyValue, writers: WritersByVariabl
 
 
 def _check_lists(name: str, reference: Reference, list_writers: Iterable[Writer]) -> Iterator[Finding]:
-    """Yield an error for each writer that writes another value than a list to the value of the key `name`."""
+    """Yield an error for each writer of `reference` that writes no list; the key `name` needs a list."""
     for writer in list_writers:
         for constant in writer.constants or ():
             if not isinstance(constant.value, list):
@@ -99,7 +99,7 @@ def _check_lists(name: str, reference: Reference, list_writers: Iterable[Writer]
                 yield make_error(constant.span, "port-type", message, hint)
         if writer.constants is None and find_element_type(writer.type) is None:
             message = f"{name} takes a list, but {reference} holds {describe_type(writer.type)}"
-            hint = f"It is written by {writer.describe(reference.span)}."
+            hint = f"${reference.local_name} is written by {writer.describe(reference.span)}."
             yield make_error(reference.span, "port-type", message, hint)
 
 
@@ -126,13 +126,15 @@ def _check_field(reader: str, reference: Reference, writers: Iterable[Writer]) -
             is_constant = writer.constants is not None
             values = "a constant" if is_constant else describe_values(writer.type, writer.refers_to)
             message = f"{reader} reads {reference}, but ${reference.local_name} holds {values}"
-            fields_hint = suggest_choice(reference.field, fields, "Fields") if fields else "It has no fields."
-            hint = f"{fields_hint} It is written by {writer.describe(reference.span)}."
+            fields_hint = (
+                suggest_choice(reference.field, fields, "Fields") if fields else "This value has no fields."
+            )
+            hint = f"{fields_hint} ${reference.local_name} is written by {writer.describe(reference.span)}."
             yield make_error(reference.span, "unknown-field", message, hint)
 
 
 def _select_field(writers: Iterable[Writer], field: str) -> Iterator[Writer]:
-    """Yield a writer of a field for each writer of values that have the field; "" for the whole value."""
+    """Yield a writer of `field` for each writer whose values have the field; "": the unchanged writers."""
     for writer in writers:
         if not field:
             yield writer
@@ -163,31 +165,33 @@ def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iter
     is_any_text = has_type and not writer.refers_to
     written_type = "any text" if is_any_text else describe_values(writer.type, writer.refers_to)
     message = f"{wire} takes {port_type}, but {wire.reference} holds {written_type}"
-    yield make_error(wire.span, "port-type", message, f"It is written by {writer.describe(wire.span)}.")
+    hint = f"${wire.reference.local_name} is written by {writer.describe(wire.span)}."
+    yield make_error(wire.span, "port-type", message, hint)
 
 
 def _check_compared_constants(
     context: CheckContext, node: Node, wire: Wire, writer: Writer
 ) -> Iterator[Finding]:
-    """Yield an error for each constant that a node compares with an input, and that can never be equal."""
+    """Yield an error for each constant that the skill compares with `wire`, but `writer` never writes."""
     for name, value in (
         find_literals(node) if isinstance(node, SkillNode) and writer.constants is None else ()
     ):
         port = context.skills[wire.skill].ports.get(name)
-        # `check_settings` reports a constant that fits no variable.
-        if port is None or port.same_as != wire.port.name or find_problem(value.value, port):
+        # `check_settings` reports a constant of the wrong type.
+        if port is None or port.compared_with != wire.port.name or find_problem(value.value, port):
             continue
-        # A field that names a bin may be empty.
+        # A field may contain "" for no bin; `find_unknown_names` accepts the default.
         expected = replace(port, type=writer.type, refers_to=writer.refers_to, default="")
         yield from find_unknown_names(context, wire.skill, expected, value)
         if not is_assignable(type(value.value), expected.type):
             kind = describe_values(expected.type, expected.refers_to)
-            message = f"{wire.reference} is {kind}, and never {describe_value(value.value)}"
-            yield make_error(value.span, "port-type", message, f"{wire.skill} compares both.")
+            message = f"{wire.reference} is {kind} and never equals {describe_value(value.value)}"
+            hint = f"{wire.skill} compares {wire.reference} with this constant."
+            yield make_error(value.span, "port-type", message, hint)
 
 
 def describe_values(declared_type: object, refers_to: str) -> str:
-    """Return a description of the values of a type, of which texts name things of the kind `refers_to`."""
+    """Return a description of the values of a type; strings are names of the kind `refers_to`, if any."""
     if not refers_to:
         return describe_type(declared_type)
     is_list = not is_assignable(str, declared_type)

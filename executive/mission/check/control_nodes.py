@@ -11,11 +11,11 @@ from executive.mission.check.node_min_times import compute_min_time
 from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, make_error, make_warning, suggest_word
 from executive.mission.flow_analysis import FlowAnalysis
-from executive.mission.model.conversion import WrongType, convert_constant
+from executive.mission.model.conversion import ValueProblem, convert_constant
 from executive.mission.model.instance import find_upper_bound, get_mission_node, make_inspection_instance
 from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import InnerNode, KeyValue, NodeSection, SkillNode, iterate_keys
-from executive.mission.model.values import FailureName, Literal, Reference
+from executive.mission.model.values import Literal, LocatedReason, Reference
 from executive.skill import Skill
 from executive.tree.failure import Reason
 from executive.tree.flow import Flow, FlowState
@@ -63,7 +63,7 @@ def check_constant(
     elif isinstance(value, Literal):
         try:
             convert_constant(key, value.value, max_value)
-        except WrongType as problem:
+        except ValueProblem as problem:
             is_param_name = isinstance(value.value, str) and value.value in context.mission.params
             is_missing_dollar = is_param_name and problem.code == "wrong-type"
             hint = f"For the param, write ${value.value}." if is_missing_dollar else ""
@@ -71,7 +71,10 @@ def check_constant(
 
 
 def run_node_checks(context: CheckContext) -> Iterator[Finding]:
-    """Yield the findings of every control node: children that are no conditions, else those of `check`."""
+    """For every control node, yield an error per child that must be a condition, but is none.
+
+    For a control node without such errors, yield the findings of its method `check`.
+    """
     halted_paths = _find_paths_below(context, lambda node: node.children_halted_by_sibling)
     concurrent_paths = _find_paths_below(context, lambda node: node.concurrent_children)
     for node in context.iterate_control_nodes():
@@ -80,7 +83,7 @@ def run_node_checks(context: CheckContext) -> Iterator[Finding]:
             continue
         analysis = CheckerAnalysis(context, node, node.path in halted_paths, node.path in concurrent_paths)
         for node_finding in make_inspection_instance(node).check(analysis):
-            yield _locate_finding(node, node_finding)
+            yield _convert_node_finding(node, node_finding)
 
 
 def _find_paths_below(
@@ -92,10 +95,10 @@ def _find_paths_below(
     return {node.path for root in roots for node in root.walk()}
 
 
-def _locate_finding(node: InnerNode, node_finding: NodeFinding) -> Finding:
-    """Return the finding of a control node with the position of its key or failure name in the file."""
+def _convert_node_finding(node: InnerNode, node_finding: NodeFinding) -> Finding:
+    """Return the finding at the position of the key, reason or child that it names, or else of `node`."""
     span, message = node.span, node_finding.message
-    if isinstance(node_finding.place, FailureName):
+    if isinstance(node_finding.place, LocatedReason):
         span = node_finding.place.span
     elif isinstance(node_finding.place, Child):
         span = get_mission_node(node_finding.place).span
@@ -115,11 +118,11 @@ class CheckerAnalysis:
         self.is_halted_by_sibling, self.is_concurrent = is_halted_by_sibling, is_concurrent
 
     def get_flow(self, child: Child) -> Flow | None:
-        """Return the possible ends of a child; None if the child can never run."""
+        """Return the possible outcomes of a child; None if the child never runs."""
         return self._context.flow_analysis.flows.get(get_mission_node(child).path)
 
     def compute_flow(self, child: Child, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
-        """Return the possible ends of a child from a state; with `is_first_tick`, those in the first tick."""
+        """Return the possible outcomes of a child that starts in `entry`; optionally, of its first tick."""
         node = get_mission_node(child)
         return FlowAnalysis(node, self._context.skills, entry, is_first_tick=is_first_tick).root_flow
 
@@ -127,13 +130,13 @@ class CheckerAnalysis:
         """Return the last part of the path of a child."""
         return get_path_name(get_mission_node(child))
 
-    def describe_place(self, reason: Reason, reported_reason: Reason) -> str:
-        """Return the line of `reason`, with the file if `reported_reason` is in another file."""
-        source = cast("FailureName", reported_reason).span.source
-        return cast("FailureName", reason).span.describe_place(source)
+    def describe_place(self, reason: Reason, relative_to: Reason) -> str:
+        """Return the line of `reason` as a text, with the file if `relative_to` is in another file."""
+        source = cast("LocatedReason", relative_to).span.source
+        return cast("LocatedReason", reason).span.describe_place(source)
 
-    def is_literal(self, key: str) -> bool:
-        """Return True if the node has a constant at a key, not a param or an argument."""
+    def is_written_as_constant(self, key: str) -> bool:
+        """Return True if the mission has a constant at a key of the node, not a param or an argument."""
         value = self._node.values.get(key)
         return isinstance(value, Literal) and not value.origin
 

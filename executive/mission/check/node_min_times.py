@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from executive.mission.check.context import CheckContext
-from executive.mission.model.conversion import WrongType, convert_value
+from executive.mission.model.conversion import ValueProblem, convert_value
 from executive.mission.model.instance import get_mission_node, has_valid_constants, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.wiring import find_literals
@@ -40,7 +40,7 @@ def _compute_min_time_of_skill(context: CheckContext, node: SkillNode) -> float:
         values |= {
             name: convert_value(value.value, declarations[name].type) for name, value in constants.items()
         }
-    except (KeyError, WrongType):
+    except (KeyError, ValueProblem):
         return 0.0  # `check_settings` reports unknown names and wrong types
     state = context.flow_analysis.entry_states.get(node.path)
     tool_states = state.tool_states if state else None

@@ -9,7 +9,7 @@ from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model import grammar
 from executive.mission.model.nodes import InnerNode, Node, NodeSection, SkillNode, iterate_keys, list_nodes
-from executive.mission.model.values import FailureName
+from executive.mission.model.values import LocatedReason
 from executive.mission.source import Span
 from executive.tree.flow import UNKNOWN_NAME, PossibleFailure
 from executive.tree.keys import Key, KeyKind
@@ -51,7 +51,7 @@ def check_failure_names(context: CheckContext) -> Iterator[Finding]:
                 yield unknown_reason
             elif not matching:
                 yield _make_impossible_error(context, name, keyword, body)
-            elif len(sources := _find_denoted_nodes(analysis, name, matching)) > 1:
+            elif len(sources := _find_named_nodes(analysis, name, matching)) > 1:
                 places = " and ".join(
                     f"{source.span.describe_place(name.span.source)}:{source.span.col}" for source in sources
                 )
@@ -60,7 +60,7 @@ def check_failure_names(context: CheckContext) -> Iterator[Finding]:
                 yield make_error(name.span, "ambiguous", message, hint)
 
 
-def _find_names_with_bodies(node: Node) -> Iterator[tuple[FailureName, str, Node]]:
+def _find_names_with_bodies(node: Node) -> Iterator[tuple[LocatedReason, str, Node]]:
     """Yield every failure name of a node, the keyword of the node, and the child that may fail."""
     if not isinstance(node, InnerNode):
         return
@@ -69,17 +69,17 @@ def _find_names_with_bodies(node: Node) -> Iterator[tuple[FailureName, str, Node
             yield name, node.declaring_class.keyword, body
 
 
-def _find_failure_names(owner: InnerNode | NodeSection) -> Iterator[tuple[Key, FailureName]]:
+def _find_failure_names(owner: InnerNode | NodeSection) -> Iterator[tuple[Key, LocatedReason]]:
     """Yield the names of failures in the keys of a node and of its sections."""
     for key, value in iterate_keys(owner):
         for item in value if isinstance(value, tuple) else (value,):
-            if isinstance(item, FailureName):
+            if isinstance(item, LocatedReason):
                 yield key, item
             elif isinstance(item, NodeSection):
                 yield from _find_failure_names(item)
 
 
-def _make_impossible_error(context: CheckContext, name: FailureName, keyword: str, body: Node) -> Finding:
+def _make_impossible_error(context: CheckContext, name: LocatedReason, keyword: str, body: Node) -> Finding:
     """Return the error if no failure of `body` has the name; `keyword` is the keyword of the parent."""
     reasons = _find_reasons(context.flow_analysis, body)
     if name.source in reasons:
@@ -98,7 +98,7 @@ def _make_impossible_error(context: CheckContext, name: FailureName, keyword: st
     return make_error(name.span, "unknown-skill", f'there is no skill or label "{name.source}"', hint)
 
 
-def _find_unknown_reason(context: CheckContext, name: FailureName, body: Node) -> Finding | None:
+def _find_unknown_reason(context: CheckContext, name: LocatedReason, body: Node) -> Finding | None:
     """Return an error if the skill or label exists, but never fails with the reason; otherwise None."""
     skill = context.skills.get(name.source)
     reasons = skill.reasons if skill else _find_reasons(context.flow_analysis, body).get(name.source)
@@ -123,7 +123,7 @@ def _find_reasons(flow: FlowAnalysis, body: Node) -> dict[str, list[str]]:
     return {source: list(dict.fromkeys(duplicates)) for source, duplicates in reasons.items()}
 
 
-def _find_denoted_nodes(flow: FlowAnalysis, name: FailureName, matching: list[PossibleFailure]) -> list[Node]:
+def _find_named_nodes(flow: FlowAnalysis, name: LocatedReason, matching: list[PossibleFailure]) -> list[Node]:
     """Return the nodes whose failures `name` denotes; none for a label, because labels are unambiguous."""
     if any(name.source in failure.labels for failure in matching):
         return []

@@ -12,7 +12,7 @@ from executive.mission.model.values import Literal, LocatedName
 from executive.tree.keys import Key
 
 _LIMIT_KEY = Key(doc="Maximum number of objects.", ge=1, value_type=int)
-"""Declaration that checks the limits of quotas."""
+"""Type and minimum of the limit of a quota, in the form that `check_constant` accepts."""
 
 
 def check_names(context: CheckContext) -> Iterator[Finding]:
@@ -41,14 +41,12 @@ def check_quotas(context: CheckContext) -> Iterator[Finding]:
         routes = [route for route in context.mission.routes if label is None or route.label == label.name]
         routed_bins = list(dict.fromkeys(routed_bin.name for route in routes for routed_bin in route.bins))
         if bin.name not in routed_bins and (label is None or label.name in context.cell.objects):
-            objects = label.name if label else "any class"
-            message = f"no route leads objects of {objects} to {bin.name}, so the quota has no effect"
-            hint = suggest_choice(bin.name, routed_bins, f"Bins in the routes of {objects}")
+            classes = f"the class {label.name}" if label else "any class"
+            message = f"no route assigns {classes} to {bin.name}, so the quota has no effect"
+            hint = suggest_choice(bin.name, routed_bins, f"Bins in the routes of {classes}")
             yield make_error((label or bin).span, "no-route", message, hint)
         slot_count = math.prod(context.cell.bins[bin.name].slots)
         if isinstance(limit, Literal) and isinstance(limit.value, int) and limit.value > slot_count:
-            message = (
-                f"the quota exceeds the {slot_count} slots of {bin.name}, so objects would lie on others"
-            )
+            message = f"the quota exceeds the {slot_count} slots of {bin.name}, so objects would be stacked"
             hint = f"Lower the quota to {slot_count} or less, or add slots to the bin in the cell file."
             yield make_warning(limit.span, "large-quota", message + limit.origin_note, hint)

@@ -31,7 +31,7 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
             if name not in declarations:
                 hint = suggest_choice(name, declarations, f"Params and ports of {node.skill}")
                 if writers := list_skills_with_output(context, name) if skill.is_condition else "":
-                    hint = f"A condition writes no output. ${name} is written by: {writers}."
+                    hint = f"A condition writes no output. Skills that write ${name}: {writers}."
                 message = f'{node.skill} has no param or port "{name}"'
                 yield make_error(setting.name_span, "unknown-param", message, hint)
             elif isinstance(setting.value, Literal):
@@ -55,25 +55,25 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
 def _check_reference(
     context: CheckContext, skill: str, declaration: Param | Port, reference: Reference
 ) -> Iterator[Finding]:
-    """Yield an error for a variable that gives the value of a constant, and for an output to a field."""
+    """Yield an error for a variable in place of a constant, and for an output that writes a field."""
     name = f"{skill}.{declaration.name}"
     if isinstance(declaration, Port):
         if declaration.direction is Direction.OUT and reference.field:
             message = f"{name} is an output: it writes a whole variable, not the field {reference.field}"
             yield make_error(reference.span, "wrong-type", message, f"Write ${reference.local_name}.")
-    elif not declaration.is_name or reference.name not in context.written_variables:
+    elif not declaration.accepts_variable or reference.name not in context.written_variables:
         message = f"{name} must be a constant, but ${reference.name} is neither a param nor an argument"
         yield make_error(reference.span, "unknown-param", message, context.make_unknown_param_hint(reference))
 
 
 def find_unreplayable_skills(context: CheckContext) -> Iterator[Finding]:
-    """Yield a warning for every skill that may read the world without the cell, unrecorded."""
+    """Yield a warning for every skill that may have inputs besides the cell, because no run records them."""
     for node, skill in context.iterate_installed_skills():
         if not skill.is_replayable:
-            message = f"{node.skill} may read the world by itself, and a run does not record what it reads"
-            hint = "A replay or a resumed run executes it again."
+            message = f"{node.skill} may have inputs that no run records, such as a clock"
+            hint = f"A replay or a resumed run executes {node.skill} again."
             if not skill.__module__.startswith("py_trees."):
-                hint += " If it reads nothing, set is_replayable = True."
+                hint += f" If {node.skill} has no such inputs, set is_replayable = True."
             yield make_warning(node.span, "not-recorded", message, hint)
 
 
@@ -110,7 +110,7 @@ def find_unknown_names(
 def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every class whose bin depends on the weight of the object, if no node weighs it.
 
-    A skill that requires and leaves a held object, and writes a bin, weighs the object.
+    A skill counts as weighing if the tool holds an object before and after it, and an output names a bin.
     """
     objects = {} if context.cell is None else context.cell.objects
     routes = {route.label: route for route in context.mission.routes}

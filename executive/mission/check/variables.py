@@ -21,7 +21,7 @@ def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
         name_in_file = read.variable.rpartition(".")[2]
         if read.variable in context.written_variables:
             problem = "is not written on every path to this node"
-            hint = f"It is written by {_describe_writers(context, read.variable, read.span)}."
+            hint = f"${name_in_file} is written by {_describe_writers(context, read.variable, read.span)}."
         else:
             problem, hint = "no node writes", _make_unwritten_hint(context, read)
         message = f"{read.input_name} reads ${name_in_file}, which {problem}"
@@ -79,11 +79,11 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
 
 
 def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every loop variable that another node writes; the loop deletes it when it ends."""
+    """Yield an error for every loop variable that another node writes; at its end, the loop deletes it."""
     wires = [wire for node in context.tree.walk() for wire in context.find_wires(node, Direction.OUT)]
     skill_writes = {wire.variable: (str(wire), wire.span) for wire in wires}
 
-    def check_below(node: Node, loop_writes: Mapping[str, tuple[str, Span]]) -> Iterator[Finding]:
+    def check_node_and_children(node: Node, loop_writes: Mapping[str, tuple[str, Span]]) -> Iterator[Finding]:
         keyword = get_type_name(node)
         for _, variable in find_control_node_outputs(node):
             if write := skill_writes.get(variable.name, loop_writes.get(variable.name)):
@@ -93,9 +93,9 @@ def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
                 yield make_error(variable.span, "shadowed-variable", message, "Rename the loop variable.")
             loop_writes = {**loop_writes, variable.name: (f"another {keyword}", variable.span)}
         for child in node.children:
-            yield from check_below(child, loop_writes)
+            yield from check_node_and_children(child, loop_writes)
 
-    yield from check_below(context.tree, {})
+    yield from check_node_and_children(context.tree, {})
 
 
 def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
@@ -111,12 +111,12 @@ def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
         returns = (subtree.returns or {}).items()
         for (name, span), variable in zip(returns, use.written_variables, strict=True):
             if variable not in written:
-                problem = "no node in it writes"
+                problem = "no node of the subtree writes"
                 names = sorted(full_name.rpartition(".")[2] for full_name in written)
-                hint = suggest_choice(name, names, "Variables that it writes")
+                hint = suggest_choice(name, names, "Variables that the subtree writes")
             elif variable not in end_state.written_variables:
-                problem = "it does not write on every path"
-                hint = f"It is written by {_describe_writers(context, variable, span)}."
+                problem = "is not written on every path"
+                hint = f"${name} is written by {_describe_writers(context, variable, span)}."
             else:
                 continue
             message = f'the subtree "{use.name}" returns ${name}, which {problem}'
@@ -153,7 +153,7 @@ def _make_unwritten_hint(context: CheckContext, read: VariableRead) -> str:
         subtree = min(name.rpartition(".")[0] for name in local_names)
         return f'The subtree "{subtree}" writes a local variable {variable}: add {variable} to its returns.'
     if skills := list_skills_with_output(context, variable):
-        return f"It is written by: {skills}."
+        return f"Skills that write ${variable}: {skills}."
     if not read.is_explicit:
         return f"Set {read.input_name}."
     global_names = sorted(f"${name}" for name in context.written_variables if "." not in name)

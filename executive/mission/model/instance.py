@@ -10,9 +10,9 @@ from typing import get_args
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.mission.model.conversion import WrongType, convert_constant
+from executive.mission.model.conversion import ValueProblem, convert_constant
 from executive.mission.model.nodes import InnerNode, KeyValue, Node, NodeOrSection, NodeSection, list_nodes
-from executive.mission.model.values import FailureName, Literal, LocatedName, Reference
+from executive.mission.model.values import Literal, LocatedName, LocatedReason, Reference
 from executive.tree.keys import Child, Key, KeyKind, VariableName
 from executive.tree.node import ControlNode, NodeContext, make_inspection_context
 
@@ -58,7 +58,7 @@ def has_valid_constants(node: InnerNode) -> bool:
         for key in keys:
             if key.is_required or key.name in node.values:
                 _convert_constant(node, key, node.values.get(key.name))
-    except WrongType:
+    except ValueProblem:
         return False
     return True
 
@@ -82,7 +82,7 @@ def _make_value(owner: NodeOrSection, key: Key, value: KeyValue | None, build_ch
         return value.declaring_class(**_make_attributes(value, build_child))
     if isinstance(value, tuple):
         return tuple(
-            item if isinstance(item, FailureName) else _make_value(owner, key, item, build_child)
+            item if isinstance(item, LocatedReason) else _make_value(owner, key, item, build_child)
             for item in value
         )
     if isinstance(value, LocatedName):
@@ -97,12 +97,12 @@ def _make_value(owner: NodeOrSection, key: Key, value: KeyValue | None, build_ch
         return ()
     try:
         return _convert_constant(owner, key, value)
-    except WrongType:
+    except ValueProblem:
         return _make_valid_constant(key)
 
 
 def _convert_constant(owner: NodeOrSection, key: Key, value: KeyValue | None) -> object:
-    """Return the converted value of a constant, or raise WrongType."""
+    """Return the converted value of a constant, or raise ValueProblem."""
     constant = value.value if isinstance(value, Literal) else None
     return convert_constant(key, constant, find_upper_bound(owner, key))
 

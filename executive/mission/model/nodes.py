@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TypeAlias, TypeVar, cast
 
-from executive.mission.model.values import FailureName, LocatedName, Setting, Value
+from executive.mission.model.values import LocatedName, LocatedReason, Setting, Value
 from executive.mission.source import Span
 from executive.tree.keys import Key, KeyOwner
 from executive.tree.node import ControlNode
@@ -127,7 +127,7 @@ class SubtreeNode(Node):
         return () if self.body is None else (self.body,)
 
 
-KeyValue: TypeAlias = Value | LocatedName | Node | NodeSection | tuple[Node | FailureName | NodeSection, ...]
+KeyValue = Value | LocatedName | Node | NodeSection | tuple[Node | LocatedReason | NodeSection, ...]
 """Value of a key of a control node."""
 
 PartT = TypeVar("PartT")
@@ -149,7 +149,7 @@ def list_nodes(value: KeyValue) -> list[Node]:
     if isinstance(value, NodeSection):
         return [node for _, inner_value in iterate_keys(value) for node in list_nodes(inner_value)]
     if isinstance(value, tuple):
-        return [node for item in value if not isinstance(item, FailureName) for node in list_nodes(item)]
+        return [node for item in value if not isinstance(item, LocatedReason) for node in list_nodes(item)]
     return [value] if isinstance(value, Node) else []
 
 

@@ -79,14 +79,14 @@ class LocatedName:
 
 @dataclass(frozen=True)
 class Setting:
-    """`name: value` below a skill, `with` or `returns`: the value, and the position of `name`."""
+    """Value of an entry `name: value` of a skill, `with` or `returns`, and the position of `name`."""
 
     name_span: Span
     value: Value
 
 
 @dataclass(frozen=True)
-class FailureName(Reason):
+class LocatedReason(Reason):
     """`Skill.reason` or `label.reason` below `on` or `until`, with its position."""
 
     span: Span

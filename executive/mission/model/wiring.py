@@ -47,9 +47,9 @@ def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Ite
     A param with a name as its value counts as an input if the mission gives a variable. An input in `one_of`
     of the skill is connected only if the mission sets it.
     """
-    params = [param for param in skill.params.values() if direction is Direction.IN and param.is_name]
+    params = skill.params.values() if direction is Direction.IN else ()
     ports = [port for port in skill.ports.values() if port.direction is direction]
-    declarations: list[Param | Port] = [*params, *ports]
+    declarations: list[Param | Port] = [*(param for param in params if param.accepts_variable), *ports]
     for declaration in declarations:
         setting = node.settings.get(declaration.name)
         value = setting.value if setting else None

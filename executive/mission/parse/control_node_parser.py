@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from executive.mission.model.nodes import InnerNode, InvalidNode, KeyValue, Node, NodeSection, list_nodes
 from executive.mission.model.values import InvalidValue, LocatedName
@@ -18,34 +18,31 @@ from executive.mission.text.yaml_text import (
     YamlSequence,
     describe_node,
 )
-from executive.tree.keys import Key, KeyKind, KeySection
+from executive.tree.keys import Key, KeyKind, KeyOwner
 from executive.tree.node import ControlNode
 
 if TYPE_CHECKING:
     from executive.mission.parse.node_parser import NodeParser
 
-KeyClass: TypeAlias = type[ControlNode] | type[KeySection]
-"""Class that declares the keys of a control node or of a section."""
 
-
-def find_shorthand_key(owner: KeyClass) -> Key | None:
+def find_shorthand_key(owner: type[KeyOwner]) -> Key | None:
     """Return the key whose value may directly follow the keyword of a node or section, or None."""
     return next((key for key in owner.keys.values() if key.shorthand), None)
 
 
-def has_optional_body(node_class: KeyClass) -> bool:
+def has_optional_body(node_class: type[KeyOwner]) -> bool:
     """Return True if the keyword of a node may stand alone, without a value."""
     shorthand_key = find_shorthand_key(node_class)
     return shorthand_key is not None and not shorthand_key.is_required
 
 
-def find_inner_keys(owner: KeyClass) -> Mapping[str, Key]:
+def find_inner_keys(owner: type[KeyOwner]) -> Mapping[str, Key]:
     """Return the keys of the mapping below a keyword; no keys if the value must not be a mapping."""
     inner_keys = {name: key for name, key in owner.keys.items() if not key.sibling}
     return {} if all(key.shorthand for key in inner_keys.values()) else inner_keys
 
 
-def find_sibling_keys(owner: KeyClass) -> Mapping[str, Key]:
+def find_sibling_keys(owner: type[KeyOwner]) -> Mapping[str, Key]:
     """Return the keys at the level of the keyword."""
     return {name: key for name, key in owner.keys.items() if key.sibling}
 
@@ -79,30 +76,33 @@ def read_control_node(
 
 
 def _read_inner_keys(
-    parser: NodeParser, name: str, span: Span, value: YamlNode, owner: KeyClass
+    parser: NodeParser, name: str, span: Span, yaml_node: YamlNode, owner: type[KeyOwner]
 ) -> dict[str, KeyValue]:
-    """Return the values of the keys of `owner`; `value` is the YAML node below the keyword `name`."""
+    """Return the values of the keys of `owner`; `yaml_node` is below the keyword `name`."""
     shorthand_key, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
     is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
-    # A mapping could also be a node in the shorthand form, but is always read as inner keys.
-    is_scalar_for_list = is_list_required and isinstance(value, YamlScalar)
-    reads_inner_keys = isinstance(value, YamlMapping) or is_scalar_for_list  # an error names the keys
+    # If the owner has inner keys, a mapping is read as these keys, never as a node in shorthand form.
+    is_scalar_for_list = is_list_required and isinstance(yaml_node, YamlScalar)
+    reads_inner_keys = isinstance(yaml_node, YamlMapping) or is_scalar_for_list  # an error lists the keys
     if shorthand_key is not None and not (reads_inner_keys and inner_keys):
         key_node = YamlScalar(span, name, shorthand_key.name)
-        value = YamlMapping(span, (YamlEntry(key_node, value),))
+        yaml_node = YamlMapping(span, (YamlEntry(key_node, yaml_node),))
         inner_keys = {shorthand_key.name: shorthand_key}
-    return _read_keys(parser, name, span, value, inner_keys)
+    return _read_keys(parser, name, span, yaml_node, inner_keys)
 
 
 def _read_keys(
-    parser: NodeParser, name: str, span: Span, mapping: YamlNode, keys: Mapping[str, Key]
+    parser: NodeParser, name: str, span: Span, yaml_node: YamlNode, keys: Mapping[str, Key]
 ) -> dict[str, KeyValue]:
-    """Return the valid values of `keys` in a mapping; a missing required node or constant is invalid."""
-    reader = MappingReader(name, span, mapping, keys, parser.findings)
+    """Return the valid values of `keys` in a mapping.
+
+    `InvalidNode` or `InvalidValue` stands for a required node or constant that the mapping lacks.
+    """
+    reader = MappingReader(name, span, yaml_node, keys, parser.findings)
     values: dict[str, KeyValue] = {}
     for key in keys.values():
-        if (node := reader.get(key.name)) is not None:
-            value = _read_value(parser, reader, key, node)
+        if (value_node := reader.get(key.name)) is not None:
+            value = _read_value(parser, reader, key, value_node)
             values |= {} if value is None else {key.name: value}
         elif key.is_required and key.kind is KeyKind.NODE:
             values[key.name] = InvalidNode(span, "")
@@ -111,15 +111,15 @@ def _read_keys(
     return values
 
 
-def _read_value(parser: NodeParser, reader: MappingReader, key: Key, node: YamlNode) -> KeyValue | None:
+def _read_value(parser: NodeParser, reader: MappingReader, key: Key, yaml_node: YamlNode) -> KeyValue | None:
     """Return the value of a key, or None after an error and for an omitted optional child."""
     span = reader.get_key_span(key.name)
     match key.kind:
         case KeyKind.NODE:
-            is_omitted = is_empty(node) and key.shorthand and not key.is_required
-            return None if is_omitted else parser.read_node(node, span)
+            is_omitted = is_empty(yaml_node) and key.shorthand and not key.is_required
+            return None if is_omitted else parser.read_node(yaml_node, span)
         case KeyKind.NODES:
-            nodes = parser.read_nodes(node, reader.owner)
+            nodes = parser.read_nodes(yaml_node, reader.owner)
             if key.max_count is None or len(nodes) <= key.max_count:
                 return nodes or None
             message = f"{reader.owner} has {len(nodes)} branches, but may have at most {key.max_count}"
@@ -134,10 +134,10 @@ def _read_value(parser: NodeParser, reader: MappingReader, key: Key, node: YamlN
         case KeyKind.VARIABLE:
             return _read_variable(parser, reader, key.name)
         case KeyKind.SECTION:
-            return _read_section(parser, key, node, span)
+            return _read_section(parser, key, yaml_node, span)
         case KeyKind.SECTIONS:
-            return tuple(_read_sections(parser, key, node))
-    return read_value(node, parser.findings)
+            return tuple(_read_sections(parser, key, yaml_node))
+    return read_value(yaml_node, parser.findings)
 
 
 def _read_variable(parser: NodeParser, reader: MappingReader, key: str) -> LocatedName | None:
@@ -152,23 +152,23 @@ def _read_variable(parser: NodeParser, reader: MappingReader, key: str) -> Locat
     return LocatedName(name, variable.span) if NAME_PATTERN.fullmatch(name) else None
 
 
-def _read_section(parser: NodeParser, key: Key, value: YamlNode, span: Span) -> NodeSection:
+def _read_section(parser: NodeParser, key: Key, yaml_node: YamlNode, span: Span) -> NodeSection:
     """Return the section below a key."""
-    values = _read_inner_keys(parser, key.name, span, value, key.section)
-    if key.section.any_of and isinstance(value, YamlMapping) and not value.entries:
+    values = _read_inner_keys(parser, key.name, span, yaml_node, key.section)
+    if key.section.any_of and isinstance(yaml_node, YamlMapping) and not yaml_node.entries:
         alternatives = " or ".join(f'"{name}"' for name in key.section.any_of)
         parser.add_error(span, "missing-key", f"{key.name} needs {alternatives}")
     return NodeSection(key.section, span, values)
 
 
-def _read_sections(parser: NodeParser, key: Key, value: YamlNode) -> Iterable[NodeSection]:
+def _read_sections(parser: NodeParser, key: Key, yaml_node: YamlNode) -> Iterable[NodeSection]:
     """Yield the sections of a list, or a single section."""
-    section_kind = "mapping with " + " and ".join(f'"{name}"' for name in key.section.keys)
-    if not isinstance(value, YamlSequence | YamlMapping):
-        message = f"{key.name} must be a {section_kind}, or a list of those, not {describe_node(value)}"
-        parser.add_error(value.span, "wrong-type", message)
+    kind = "mapping with " + " and ".join(f'"{name}"' for name in key.section.keys)
+    if not isinstance(yaml_node, YamlSequence | YamlMapping):
+        message = f"{key.name} must be a {kind}, or a list of such mappings, not {describe_node(yaml_node)}"
+        parser.add_error(yaml_node.span, "wrong-type", message)
         return
-    if isinstance(value, YamlSequence) and not value.items:
-        parser.add_error(value.span, "empty-list", f"{key.name} needs at least one {section_kind}")
-    for item in value.items if isinstance(value, YamlSequence) else (value,):
+    if isinstance(yaml_node, YamlSequence) and not yaml_node.items:
+        parser.add_error(yaml_node.span, "empty-list", f"{key.name} needs at least one {kind}")
+    for item in yaml_node.items if isinstance(yaml_node, YamlSequence) else (yaml_node,):
         yield _read_section(parser, key, item, item.span)

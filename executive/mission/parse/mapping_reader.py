@@ -10,7 +10,7 @@ from pydantic import JsonValue
 
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model.grammar import AllowedKeys
-from executive.mission.model.values import FailureName, InvalidValue, Literal, Reference, Setting, Value
+from executive.mission.model.values import InvalidValue, Literal, LocatedReason, Reference, Setting, Value
 from executive.mission.source import Span
 from executive.mission.text.yaml_text import (
     YamlMapping,
@@ -82,7 +82,7 @@ class MappingReader:
         self.add_error(node.span, "wrong-type", message)
         return ""
 
-    def read_failure_names(self, key: str, section_keys: Sequence[str] = ()) -> tuple[FailureName, ...]:
+    def read_failure_names(self, key: str, section_keys: Sequence[str] = ()) -> tuple[LocatedReason, ...]:
         """Return the failure names in the list or single value of `key`; add an error for invalid items.
 
         If the value may also contain sections with keys `section_keys`, mappings are ignored.
@@ -97,7 +97,7 @@ class MappingReader:
             if section_keys and isinstance(item, YamlMapping):
                 continue
             if match := _FAILURE_PATTERN.fullmatch(text):
-                names.append(FailureName(match[1], match[2], item.span))
+                names.append(LocatedReason(match[1], match[2], item.span))
             else:
                 rule = f"{self._describe_key(key)} must name failures as Skill.reason or label.reason"
                 if section_keys:

@@ -41,7 +41,7 @@ class NodeParser:
     """Parser of nodes, which adds errors to `findings` and returns `InvalidNode`s for invalid YAML nodes.
 
     Attributes:
-        behaviours: Behaviours of py_trees that the nodes name, as skills, by the names of their classes.
+        behaviours: Skill classes made from the py_trees behaviours in the tree, by class name.
     """
 
     def __init__(self, findings: list[Finding], skills: Skills, node_classes: ControlNodes) -> None:
@@ -55,64 +55,66 @@ class NodeParser:
         parser.behaviours = self.behaviours
         return parser
 
-    def read_node(self, node: YamlNode | None, span: Span) -> Node:
-        """Return the mission node for a YAML node; for a missing or empty node, an invalid node at `span`."""
-        if node is None or is_empty(node):
-            if node is not None:
+    def read_node(self, yaml_node: YamlNode | None, span: Span) -> Node:
+        """Return the mission node for `yaml_node`; if it is missing or empty, an invalid node at `span`."""
+        if yaml_node is None or is_empty(yaml_node):
+            if yaml_node is not None:
                 self.add_error(span, "missing-node", "a node is missing here")
             return InvalidNode(span, "")
-        if isinstance(node, YamlSequence):
-            return self._read_list(node)
-        if isinstance(node, YamlScalar):
-            return self._read_word(node)
-        return self._read_mapping(node)
+        if isinstance(yaml_node, YamlSequence):
+            return self._read_list(yaml_node)
+        if isinstance(yaml_node, YamlScalar):
+            return self._read_scalar(yaml_node)
+        return self._read_mapping(yaml_node)
 
-    def read_nodes(self, node: YamlNode, owner: str) -> tuple[Node, ...]:
+    def read_nodes(self, yaml_node: YamlNode, owner: str) -> tuple[Node, ...]:
         """Return the nodes of a list; for other values, add an error with the name `owner` and return ()."""
-        if not isinstance(node, YamlSequence):
-            message = f"{owner} must be a list of nodes, not {describe_node(node)}"
-            self.add_error(node.span, "wrong-type", message)
+        if not isinstance(yaml_node, YamlSequence):
+            message = f"{owner} must be a list of nodes, not {describe_node(yaml_node)}"
+            self.add_error(yaml_node.span, "wrong-type", message)
             return ()
-        if not node.items:
-            self.add_error(node.span, "empty-list", f"{owner} needs at least one node")
-        return tuple(self.read_node(item, item.span) for item in node.items)
+        if not yaml_node.items:
+            self.add_error(yaml_node.span, "empty-list", f"{owner} needs at least one node")
+        return tuple(self.read_node(item, item.span) for item in yaml_node.items)
 
     def add_error(self, span: Span, code: str, message: str, hint: str = "") -> None:
         """Add an error to the findings."""
         self.findings.append(make_error(span, code, message, hint))
 
-    def _read_list(self, node: YamlSequence) -> Node:
-        nodes = self.read_nodes(node, "a list of nodes")
+    def _read_list(self, sequence: YamlSequence) -> Node:
+        nodes = self.read_nodes(sequence, "a list of nodes")
         if not nodes:
-            return InvalidNode(node.span, "")
+            return InvalidNode(sequence.span, "")
         node_class = self._node_classes[grammar.SEQUENCE_KEYWORD]
-        return InnerNode(node.span, "", node_class, {"do": nodes}, is_list=True)
+        return InnerNode(sequence.span, "", node_class, {"do": nodes}, is_list=True)
 
-    def _read_word(self, node: YamlScalar) -> Node:
+    def _read_scalar(self, scalar: YamlScalar) -> Node:
         """Return the mission node for a YAML scalar: a skill, or a keyword that needs no body."""
-        word = node.text
+        word = scalar.text
         node_class = self._node_classes.get(word)
         if node_class is not None and has_optional_body(node_class):
-            return InnerNode(node.span, "", node_class, {})
+            return InnerNode(scalar.span, "", node_class, {})
         if word in self._keywords:
-            self.add_error(node.span, "missing-node", f'"{word}" needs a body: write {word}: ...')
-        elif isinstance(node.value, str) and _SKILL_PATTERN.fullmatch(word):
-            return SkillNode(node.span, "", word, {})
+            self.add_error(scalar.span, "missing-node", f'"{word}" needs a body: write {word}: ...')
+        elif isinstance(scalar.value, str) and _SKILL_PATTERN.fullmatch(word):
+            return SkillNode(scalar.span, "", word, {})
         else:
-            self._add_keyword_error(node.span, word)
-        return InvalidNode(node.span, "")
+            self._add_keyword_error(scalar.span, word)
+        return InvalidNode(scalar.span, "")
 
-    def _read_mapping(self, node: YamlMapping) -> Node:
+    def _read_mapping(self, mapping: YamlMapping) -> Node:
         """Return the node of a mapping, which has one entry with a keyword or skill, and sibling entries."""
-        label = self._read_label(node)
-        node_entries = [entry for entry in node.entries if self._is_node_name(entry.key.text)]
-        siblings = [entry for entry in node.entries if entry.key.text != "as" and entry not in node_entries]
+        label = self._read_label(mapping)
+        entries = [entry for entry in mapping.entries if entry.key.text != "as"]
+        node_entries = [entry for entry in entries if self._is_node_name(entry.key.text)]
+        siblings = [entry for entry in entries if entry not in node_entries]
         if not node_entries:
             for entry in siblings:
                 self._add_keyword_error(entry.key.span, entry.key.text)
             if not siblings:
-                self.add_error(node.span, "missing-node", "a node is missing here: the mapping names no node")
-            return InvalidNode(node.span, "")
+                message = "a node is missing here: the mapping names no node"
+                self.add_error(mapping.span, "missing-node", message)
+            return InvalidNode(mapping.span, "")
         node_entry, *surplus_entries = node_entries
         name, span = node_entry.key.text, node_entry.key.span
         for entry in surplus_entries:
@@ -120,8 +122,8 @@ class NodeParser:
             self.add_error(entry.key.span, "two-nodes", message, "Write a list to run one after the other.")
         if surplus_entries:
             # Errors in surplus nodes are discarded, because the author must correct the mapping first.
-            parts = [self.make_silent_parser()._read_entry(node, entry, "") for entry in surplus_entries]
-            return InvalidNode(span, label, (self._read_entry(node, node_entry, ""), *parts))
+            parts = [self.make_silent_parser()._read_entry(mapping, entry, "") for entry in surplus_entries]
+            return InvalidNode(span, label, (self._read_entry(mapping, node_entry, ""), *parts))
         node_class = self._node_classes.get(name)
         sibling_keys = find_sibling_keys(node_class) if node_class else {}
         allowed_keys = ("as", *(grammar.USE_SIBLINGS if name == grammar.USE_KEYWORD else sibling_keys))
@@ -133,30 +135,30 @@ class NodeParser:
                 hint = hint or suggest_choice(key, allowed_keys, f"Keys at the level of {name}")
                 message = f'"{key}" is not allowed at the level of "{name}"'
                 self.add_error(entry.key.span, "unknown-key", message, hint)
-        mission_node = self._read_entry(node, node_entry, label)
-        label_node = node.get("as")
-        return replace(mission_node, label_span=label_node.span) if label_node else mission_node
+        node = self._read_entry(mapping, node_entry, label)
+        label_node = mapping.get("as")
+        return replace(node, label_span=label_node.span) if label_node else node
 
     def _is_node_name(self, word: str) -> bool:
         """Return True for a keyword, and for a word that is written like the name of a skill."""
         return word in self._keywords or _SKILL_PATTERN.fullmatch(word) is not None
 
-    def _read_entry(self, node: YamlMapping, entry: YamlEntry, label: str) -> Node:
+    def _read_entry(self, mapping: YamlMapping, entry: YamlEntry, label: str) -> Node:
         """Return the node of a mapping; `entry` is the entry with the keyword or skill."""
         name = entry.key.text
         if name == grammar.USE_KEYWORD:
-            return self._read_use(node, entry, label)
+            return self._read_use(mapping, entry, label)
         if name == grammar.BEHAVIOUR_KEYWORD:
             return self._read_behaviour(entry, label)
         if name in self._node_classes:
-            return read_control_node(self, node, entry, label, self._node_classes[name])
+            return read_control_node(self, mapping, entry, label, self._node_classes[name])
         params = self._skills[name].params if name in self._skills else {}
         settings = read_settings(entry.value, name, self.findings, next(iter(params), "name"))
         return SkillNode(entry.key.span, label, name, settings)
 
-    def _read_use(self, node: YamlMapping, entry: YamlEntry, label: str) -> Node:
+    def _read_use(self, mapping: YamlMapping, entry: YamlEntry, label: str) -> Node:
         """Return the use of a subtree, or an invalid node if the name of the subtree is no text."""
-        siblings = [(key, value) for key in grammar.USE_SIBLINGS if (value := node.get(key)) is not None]
+        siblings = [(key, value) for key in grammar.USE_SIBLINGS if (value := mapping.get(key)) is not None]
         settings = {key: read_settings(value, key, self.findings) for key, value in siblings}
         if not (isinstance(entry.value, YamlScalar) and isinstance(entry.value.value, str)):
             message = f"use must be the name of a subtree, not {describe_node(entry.value)}"
@@ -191,8 +193,8 @@ class NodeParser:
             self.add_error(span, "missing-key", f'{keyword} needs the key "{class_key}"')
         return InvalidNode(span, label)
 
-    def _read_label(self, node: YamlMapping) -> str:
-        value = node.get("as")
+    def _read_label(self, mapping: YamlMapping) -> str:
+        value = mapping.get("as")
         if value is None:
             return ""
         description = describe_node(value)

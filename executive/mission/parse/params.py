@@ -10,7 +10,7 @@ from pydantic import JsonValue
 
 from executive.mission.findings import suggest_choice
 from executive.mission.model import grammar
-from executive.mission.model.conversion import WrongType, convert_setting, convert_value
+from executive.mission.model.conversion import ValueProblem, convert_setting, convert_value
 from executive.mission.model.mission import MissionParam
 from executive.mission.model.values import InvalidValue, Literal
 from executive.mission.parse.mapping_reader import MappingReader, make_literal
@@ -39,7 +39,7 @@ def parse_params(reader: MappingReader, overrides: Mapping[str, str]) -> dict[st
             override, findings = parse_override(name, text, is_text=params[name].declaration.type is str)
             reader.findings += findings
             if override:
-                params[name] = _set_value(name, params[name], make_literal(override), reader)
+                params[name] = _replace_value(name, params[name], make_literal(override), reader)
         elif not name.startswith(CELL_PREFIX):
             span = make_override_source(name, text).make_span(1, 1, max(1, len(name)))
             hint = suggest_choice(name, params, "Params of the mission")
@@ -59,14 +59,14 @@ def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> 
     default_type = _infer_type(None if default is None else to_python_value(default))
     declaration = replace(declaration, type=_read_type(reader) or default_type)
     without_value = MissionParam(reader.span, InvalidValue(reader.span), declaration)
-    problem = f"no value is allowed for {name}"
+    problem = f"{name} cannot have any value"
     if declaration.choices == ():
         reader.add_error(reader.get_value_span("choices"), "empty-list", f"{problem}: choices is empty")
     elif declaration.ge is not None and declaration.le is not None and declaration.ge > declaration.le:
         problem = f"{problem}: min {declaration.ge:g} is greater than max {declaration.le:g}"
         reader.add_error(reader.get_value_span("min"), "out-of-range", problem)
     elif default is not None:
-        return _set_value(name, without_value, make_literal(default), reader)
+        return _replace_value(name, without_value, make_literal(default), reader)
     elif not is_overridden:
         message = f'the param "{name}" has neither a default nor a value'
         reader.add_error(reader.span, "missing-param", message, f"Set it with --set {name}=...")
@@ -94,16 +94,16 @@ def _read_bound(reader: MappingReader, key: str) -> float | None:
         return None
     try:
         return cast("float", convert_value(to_python_value(node), float))
-    except WrongType as problem:
+    except ValueProblem as problem:
         reader.add_error(node.span, "wrong-type", f"{key} of {reader.owner} {problem}")
     return None
 
 
-def _set_value(name: str, param: MissionParam, value: Literal, reader: MappingReader) -> MissionParam:
+def _replace_value(name: str, param: MissionParam, value: Literal, reader: MappingReader) -> MissionParam:
     """Return the param with a value; if the value is not allowed, add an error and return the old param."""
     try:
         converted = cast("JsonValue", convert_setting(value.value, param.declaration))
-    except WrongType as problem:
+    except ValueProblem as problem:
         reader.add_error(value.span, problem.code, f"{name} {problem}")
         return param
     return replace(param, value=replace(value, value=converted))
