@@ -49,6 +49,7 @@ def test_streams_that_fail_in_36_ways(output: str, errors: str, tmp_path: Path) 
     assert run_with(f"{output} {errors}", tmp_path) == run_with(">/dev/null 2>/dev/null", tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "streams, error", [(">&-", "it is closed"), (">/dev/full", "No space left on device")]
 )
@@ -58,6 +59,7 @@ def test_output_that_cannot_be_written_is_reported_once(streams: str, error: str
     assert done.stderr == f"note: standard output could not be written: {error}\n"
 
 
+@pytest.mark.slow
 def test_an_error_is_an_error_although_nobody_can_read_it(tmp_path: Path) -> None:
     assert shell(f"{EXECUTIVE} run nowhere 2>&-", tmp_path).returncode == 2
 

@@ -52,6 +52,7 @@ COLLISION = during("*second*/do/MoveToScan", arm_collides(), activations=1)
 COLLISION_OF_RECOVERY = during("*second*/recover/*/MoveToScan", arm_collides(), activations=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pose", ["next", "aside"])
 @pytest.mark.parametrize(
     "faults",

@@ -173,6 +173,7 @@ def test_a_run_that_was_killed_in_its_first_control_step_starts_again(
     assert redecided(path) == ""
 
 
+@pytest.mark.slow
 def test_the_world_of_a_scene_is_rebuilt(missions: Path, tmp_path: Path) -> None:
     loaded, scene = load(missions, "sort_overhead"), tmp_path / "scene.yaml"
     scene.write_text("scene: two objects\ntable: {objects: [2, 2]}\nunknown: {count: [1, 1], scale: 0.4}\n")
@@ -226,6 +227,7 @@ def test_what_fell_from_the_tool_is_picked_again(missions: Path, tmp_path: Path,
     assert set(placed(path).values()) == {1}
 
 
+@pytest.mark.slow
 def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
     class Stopper(Cutter):
         def __call__(self, timed: TimedEvent) -> None:

@@ -35,6 +35,7 @@ def tried(campaign: Campaign, *numbers: int) -> Trial:
 SLOW = pytest.mark.slow
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "what", "when", "verdict"),
     [

@@ -38,6 +38,7 @@ def samples(config: CellConfig, seeds: range, *, is_random: bool = True) -> list
         renderer.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("cell", "objects", "boxes"),
     [

@@ -198,6 +198,7 @@ def turned(axis: str, angle: float) -> np.ndarray:
     return np.asarray(cv2.Rodrigues(vector)[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("error", "zoom", "moved"),
     [
@@ -252,6 +253,7 @@ def test_the_noise_is_that_of_the_scene(cell: Callable[..., SimCell]) -> None:
     assert (noisy[TABLE].astype(float) - clean[TABLE]).std() == pytest.approx(16, abs=0.5)
 
 
+@pytest.mark.slow
 def test_evaluated_frames_are_of_the_scene_and_say_what_the_cell_declares(overhead: CellConfig) -> None:
     changed = scene(
         camera={"shift": [0.02, 0.0, 0.0]}, unknown={"count": [1, 1]}, objects={"any": {"colours": [BLACK]}}

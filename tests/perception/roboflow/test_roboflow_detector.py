@@ -214,6 +214,7 @@ QUICK = ("401", "404", "html", "deep", "nan")
 """Faults of every kind; the others are slow tests, and unit tests in test_answers.py."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", QUICK)
 @pytest.mark.parametrize("api", ["v1", "workflow"])
 def test_a_fault_of_the_server_is_unavailable_with_what_to_do(make, server, fault, api):

@@ -127,9 +127,10 @@ MORE: list[tuple[ScheduledFault, str, list[str], str, int]] = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("one", "pattern", "reasons", "status", "rejected"),
-    [*MISSIONS, *(pytest.param(*more, marks=pytest.mark.slow) for more in MORE)],
+    [*MISSIONS, *MORE],
     ids=lambda one: getattr(one, "effect", None),
 )
 def test_a_mission_deals_with_it_and_its_books_are_right(

@@ -137,6 +137,7 @@ def test_the_file_of_every_shipped_mission_satisfies_the_rules_of_xml_parsing(na
     assert list_violations(format_btcpp(read_shipped(name), SKILLS)) == []
 
 
+@pytest.mark.slow
 def test_the_file_of_every_mission_of_the_guides_satisfies_the_rules(tmp_path: Path) -> None:
     for file in guide_blocks.files().values():
         path = tmp_path / file.name
