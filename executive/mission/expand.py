@@ -130,7 +130,7 @@ class _Expander:
     def find_unused_names(self) -> Iterator[Finding]:
         """Yield a finding for every param without reference, and every unused argument of a used subtree."""
         for name, param in self.mission.params.items() if self.mission.tree else ():
-            # The text also contains nodes that are not expanded, for example after an error.
+            # References in nodes that are not expanded, for example after an error, are only in the text.
             if ("", name) not in self._referenced_names and f"${name}" not in param.span.source.text:
                 yield make_warning(param.span, "unused-param", f'the param "{name}" is never used')
         for subtree in self.mission.subtrees.values():
@@ -269,7 +269,7 @@ class _Expander:
         return cast("Node", rename_part(body))
 
     def _map_returned_variables(self, use: SubtreeNode, subtree: Subtree) -> dict[str, str]:
-        """Return the variables of the caller by the names of the returned variables in the subtree."""
+        """Return the variable of the caller for each name in `returns` of the subtree."""
         returned_names = subtree.returns or {}
         variables = {name: name for name in returned_names}
         for name, setting in use.returns.items():

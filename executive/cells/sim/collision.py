@@ -111,7 +111,7 @@ class ClearanceChecker:
         x, y, z = self.world.get_tool_pose().position
         return (
             f"the motion would bring {approach}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m; "
-            f"{self._margin:.3f} m must stay free"
+            f"the minimum clearance is {self._margin:.3f} m"
         )
 
     def _find_approaches(self, q: Array, load: Load | None) -> Iterator[ClosestApproach]:

@@ -23,8 +23,8 @@ from executive.motion.arms import build_kinematics, build_planner
 
 POINTS_PER_SIDE = 9
 """Number of positions of the flattest object along each side of the workspace for the check of occlusion."""
-GRID_PITCH = 0.02
-"""Maximum distance of the points of the workspace that a scan pose of a partial view must show [m]."""
+MAX_GRID_SPACING = 0.02
+"""Maximum spacing of the points at which partial views must show the workspace [m]."""
 
 
 def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
@@ -59,7 +59,8 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     with contextlib.closing(ClearanceChecker(config)) as checker:
         for name, pose in config.arm.poses_deg.items():
             if violation := checker.find_violation(np.radians(pose)):
-                message = f'the pose "{name}" brings {violation}; {config.motion.margin:.3f} m must stay free'
+                margin = f"the minimum clearance is {config.motion.margin:.3f} m"
+                message = f'the pose "{name}" brings {violation}; {margin}'
                 yield ("arm", "poses_deg", name), message
         yield from _find_occluding_poses_and_bins(config, checker.world)
 
@@ -85,12 +86,12 @@ def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator
 def _find_uncovered_areas(
     config: CellConfig, world: World, camera: SimCamera
 ) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each scan pose of a camera that shows nothing, and each area without a pose.
+    """Yield key and message for each scan pose without a view of the workspace, and each area without pose.
 
     A pose shows a point if the image contains a whole object at the point that neither arm nor bin hides.
     """
     sides = config.table.x, config.table.y
-    xs, ys = (np.linspace(*side, 1 + math.ceil((side[1] - side[0]) / GRID_PITCH)) for side in sides)
+    xs, ys = (np.linspace(*side, 1 + math.ceil((side[1] - side[0]) / MAX_GRID_SPACING)) for side in sides)
     points = _list_object_centres(config, xs, ys)
     uncovered_mask = np.ones(len(points), dtype=bool)
     for index, pose in _visit_scan_poses(config, world, camera):

@@ -36,7 +36,7 @@ def _find_problem(context: CheckContext, node: Node) -> str:
 
 
 def list_effects(skill: type[Skill]) -> list[str]:
-    """Return what makes a skill more than a condition, as ends of a message: `moves the arm`."""
+    """Return the reasons why a skill is not a condition, as ends of a message: `moves the arm`."""
     effects = ["moves the arm"] if skill.moves else []
     effects += [f"writes ${name}" for name, port in skill.ports.items() if port.direction is Direction.OUT]
     effects += [f"uses the {device}" for device in skill.uses]

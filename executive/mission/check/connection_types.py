@@ -134,7 +134,7 @@ def _check_field(reader: str, reference: Reference, writers: Iterable[Writer]) -
 
 
 def _select_field(writers: Iterable[Writer], field: str) -> Iterator[Writer]:
-    """Yield a writer of `field` for each writer whose values have the field; "": the unchanged writers."""
+    """For each writer whose values have `field`, yield a writer of the field; "" yields all writers."""
     for writer in writers:
         if not field:
             yield writer
@@ -159,10 +159,10 @@ def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iter
             yield from find_unknown_names(context, wire.skill, port, constant)
     if writer.constants is not None:
         return
-    has_type = is_assignable(writer.type, port.type)
-    if has_type and (writer.refers_to == port.refers_to if port.refers_to else not choices):
+    is_type_accepted = is_assignable(writer.type, port.type)
+    if is_type_accepted and (writer.refers_to == port.refers_to if port.refers_to else not choices):
         return
-    is_any_text = has_type and not writer.refers_to
+    is_any_text = is_type_accepted and not writer.refers_to
     written_type = "any text" if is_any_text else describe_values(writer.type, writer.refers_to)
     message = f"{wire} takes {port_type}, but {wire.reference} holds {written_type}"
     hint = f"${wire.reference.local_name} is written by {writer.describe(wire.span)}."
@@ -172,7 +172,7 @@ def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iter
 def _check_compared_constants(
     context: CheckContext, node: Node, wire: Wire, writer: Writer
 ) -> Iterator[Finding]:
-    """Yield an error for each constant that the skill compares with `wire`, but `writer` never writes."""
+    """Yield an error for each constant that is compared with `wire`, if `writer` can never write it."""
     for name, value in (
         find_literals(node) if isinstance(node, SkillNode) and writer.constants is None else ()
     ):
@@ -180,7 +180,7 @@ def _check_compared_constants(
         # `check_settings` reports a constant of the wrong type.
         if port is None or port.compared_with != wire.port.name or find_problem(value.value, port):
             continue
-        # A field may contain "" for no bin; `find_unknown_names` accepts the default.
+        # A field without a bin contains "". `find_unknown_names` accepts this value if it is the default.
         expected = replace(port, type=writer.type, refers_to=writer.refers_to, default="")
         yield from find_unknown_names(context, wire.skill, expected, value)
         if not is_assignable(type(value.value), expected.type):

@@ -48,8 +48,8 @@ def _check_keys(context: CheckContext, owner: InnerNode | NodeSection, name: str
             description = f"{describe_value(value.value)}{suggestion}{value.origin_note}"
             names = ", ".join(PREDEFINED_LISTS)
             message = f"{name}.{key.name} must be a list, a variable, or one of {names}, not {description}"
-            is_text_at_key = isinstance(value.value, str) and not value.origin
-            hint = f"Write a list: [{value.value}]." if is_text_at_key else ""
+            is_text_in_mission = isinstance(value.value, str) and not value.origin
+            hint = f"Write a list: [{value.value}]." if is_text_in_mission else ""
             yield make_error(value.span, "wrong-type", message, hint)
 
 

@@ -117,17 +117,21 @@ def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:
     bins = {label: {bin.name for bin in route.bins} for label, route in routes.items()}
     weighing_skills = [name for name, skill in context.skills.items() if _is_weighing(skill)]
     is_weighed = any(node.skill in weighing_skills for node, _ in context.iterate_installed_skills())
-    looks = {label: section.looks_like for label, section in objects.items() if section.looks_like in objects}
-    for label, look in looks.items():
-        if label in routes and look not in routes:
+    for label, section in objects.items():
+        detected = section.looks_like  # The detector reports this class for objects of the class `label`.
+        if detected not in objects:
+            continue
+        if label in routes and detected not in routes:
             message = (
-                f"{label} looks like {look}, which has no route, so no object of either class is selected"
+                f"{label} looks like {detected}, which has no route, so no object of either class is selected"
             )
-            yield make_error(routes[label].label_span, "unweighed", message, f"Add a route for {look}.")
-        elif look in routes and bins.get(label) != bins[look] and not is_weighed:
-            message = f"{label} looks like {look}, their routes differ, and no node weighs the held object"
+            yield make_error(routes[label].label_span, "unweighed", message, f"Add a route for {detected}.")
+        elif detected in routes and bins.get(label) != bins[detected] and not is_weighed:
+            message = (
+                f"{label} looks like {detected}, their routes differ, and no node weighs the held object"
+            )
             hint = f"Before the transport, insert {' or '.join(weighing_skills)}."
-            yield make_error(routes.get(label, routes[look]).label_span, "unweighed", message, hint)
+            yield make_error(routes.get(label, routes[detected]).label_span, "unweighed", message, hint)
 
 
 def _is_weighing(skill: type[Skill]) -> bool:
@@ -145,8 +149,8 @@ def find_undetectable_classes(context: CheckContext) -> Iterator[Finding]:
         return
     for label, span in _find_named_classes(context):
         section = context.cell.objects.get(label)
-        look = label if section is None else section.looks_like or label
-        if section is not None and not any(look in classes for classes in detectors.values()):
+        detected = label if section is None else section.looks_like or label
+        if section is not None and not any(detected in classes for classes in detectors.values()):
             descriptions = "; ".join(f"{name}: {', '.join(classes)}" for name, classes in detectors.items())
             message = f'no detector of the cell can detect the class "{label}"'
             hint = f"Classes by detector: {descriptions}. Train another detector with `executive train`."

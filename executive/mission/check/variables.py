@@ -79,7 +79,7 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
 
 
 def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every loop variable that another node writes; at its end, the loop deletes it."""
+    """Yield an error for every loop variable that another node writes: the loop deletes it when it ends."""
     wires = [wire for node in context.tree.walk() for wire in context.find_wires(node, Direction.OUT)]
     skill_writes = {wire.variable: (str(wire), wire.span) for wire in wires}
 
@@ -139,7 +139,7 @@ def _list_writers(context: CheckContext, variable: str, span: Span) -> list[str]
 
 
 def _suggest_writers(context: CheckContext, variable: str, span: Span) -> str:
-    """Return the skills that write a variable in the file of `span`, otherwise all skills that can."""
+    """Return the nodes in the file of `span` that write a variable, or else all skills with this output."""
     all_writers = _list_writers(context, variable, span)
     writers_in_file = [writer for writer in all_writers if " in line " in writer]
     return " and ".join(writers_in_file) or list_skills_with_output(context, variable) or "no skill"

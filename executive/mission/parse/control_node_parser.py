@@ -62,9 +62,9 @@ def read_control_node(
     }
     any_of = node_class.any_of
     inner_keys = entry.value.keys if isinstance(entry.value, YamlMapping) else ()
-    # If the value has no keys, but must have keys, another error reports this.
-    may_have_keys = isinstance(entry.value, YamlMapping) or find_shorthand_key(node_class) is not None
-    if any_of and may_have_keys and not {*mapping.keys, *inner_keys} & {*any_of}:
+    # `MappingReader` reports a value that is not a mapping although it must be one.
+    is_form_valid = isinstance(entry.value, YamlMapping) or find_shorthand_key(node_class) is not None
+    if any_of and is_form_valid and not {*mapping.keys, *inner_keys} & {*any_of}:
         level = f" at the level of {keyword}" if set(any_of) <= set(sibling_keys) else ""
         alternatives = " or ".join(f'"{name}"' for name in any_of)
         parser.add_error(span, "missing-key", f"{keyword} needs {alternatives}{level}")
@@ -82,8 +82,9 @@ def _read_inner_keys(
     shorthand_key, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
     is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
     # If the owner has inner keys, a mapping is read as these keys, never as a node in shorthand form.
+    # A scalar is read in the same way if a list is required, so that an error lists the allowed keys.
     is_scalar_for_list = is_list_required and isinstance(yaml_node, YamlScalar)
-    reads_inner_keys = isinstance(yaml_node, YamlMapping) or is_scalar_for_list  # an error lists the keys
+    reads_inner_keys = isinstance(yaml_node, YamlMapping) or is_scalar_for_list
     if shorthand_key is not None and not (reads_inner_keys and inner_keys):
         key_node = YamlScalar(span, name, shorthand_key.name)
         yaml_node = YamlMapping(span, (YamlEntry(key_node, yaml_node),))

@@ -123,11 +123,11 @@ class MappingReader:
             message = f"{self._describe_key(key)} must be a mapping, not {describe_node(node)}"
             self.add_error(node.span, "wrong-type", message)
 
-    def check_name(self, name: str, span: Span, owner: str, hint: str = "") -> None:
-        """Add an error if `name` is no valid name of `owner`: `a param`."""
+    def check_name(self, name: str, span: Span, kind: str, hint: str = "") -> None:
+        """Add an error if `name` is not a valid name; `kind` is the kind of name, such as `a param`."""
         if not NAME_PATTERN.fullmatch(name):
             hint = hint or 'Use letters, digits and "_", and begin with no digit.'
-            self.add_error(span, "bad-name", f'"{name}" is no valid name of {owner}', hint)
+            self.add_error(span, "bad-name", f'"{name}" is no valid name of {kind}', hint)
 
     def add_error(self, span: Span, code: str, message: str, hint: str = "") -> None:
         """Add an error to the findings."""

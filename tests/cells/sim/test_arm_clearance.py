@@ -41,7 +41,7 @@ def at(overhead: CellConfig, kinematics: Iiwa14):
 
 NAMED = re.escape(
     "the motion would bring the tool 0.036 m into cube-3, with the tool at (0.500, 0.100, 0.150) m; "
-    "0.005 m must stay free"
+    "the minimum clearance is 0.005 m"
 )
 RED_BIN = 0.24, -0.48, 0.15
 """Centre of a bin and the distance of its wall along y [m]."""

@@ -104,7 +104,7 @@ def test_a_pose_too_near_to_something_is_named_with_the_distance(overhead: CellC
     near, inside, fit = (reaching(overhead, 0.5, 0.0, z) for z in (0.003, -0.01, 0.0055))
     folded = (0, -40, 0, -120, 0, -120, 0)
     found = dict(find_pose_errors(posed(overhead, near=near, inside=inside, fit=fit, folded=folded)))
-    free = "0.005 m must stay free"
+    free = "the minimum clearance is 0.005 m"
     assert found == {
         ("arm", "poses_deg", "near"): f'the pose "near" brings the tool 0.003 m from the table; {free}',
         ("arm", "poses_deg", "inside"): f'the pose "inside" brings the tool 0.010 m into the table; {free}',
