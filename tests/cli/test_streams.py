@@ -69,9 +69,8 @@ def test_an_error_is_an_error_although_nobody_can_read_it(tmp_path: Path) -> Non
 def test_a_hangup_halts_a_run_unless_it_was_ignored_at_the_start(ignored: bool, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "executive.cli.main", "run", "sort_overhead", "--runs", str(tmp_path)]
     options = ["--set", "cell.kind=fake", "--realtime", "--quiet"]
-    with subprocess.Popen(
-        [*(["nohup"] if ignored else []), *command, *options], stderr=subprocess.PIPE
-    ) as run:
+    prefix = ["nohup"] if ignored else ["env", "--default-signal=HUP"]
+    with subprocess.Popen([*prefix, *command, *options], stderr=subprocess.PIPE) as run:
         while not (journal := tmp_path / "latest/journal.jsonl").is_file() or len(journal.read_text()) < 5000:
             assert run.poll() is None
             time.sleep(0.05)
