@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 from typing import Any
+from unittest.mock import patch
 
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -113,3 +115,18 @@ def test_half_a_surrogate_pair_is_refused() -> None:
         (1, 4, "a surrogate (U+D800 to U+DFFF) is no character")
     ]
     assert to_python_value(root) == {"a": "x?"}
+
+
+FRAGMENTS = [
+    "a", "b1", "0.5", "~", "'c d'", '"e"', ": ", ":", "- ", "-", "{", "}", "[", "]", ", ", "\n", "\n  ", "\n    ",
+    "&x ", "*x", "!t ", "|\n", ">-\n", "# f", "<<: ", "? ", "\t", "\r", "\ufeff", "\x85", "²", "\U0001f600", "%", "@",
+    "---\n", "...\n", "\x00", '"\\ud800"',
+]  # fmt: skip
+
+
+@given(st.lists(st.sampled_from(FRAGMENTS), max_size=20).map("".join))
+def test_the_parser_of_libyaml_changes_no_node_and_no_finding(text: str) -> None:
+    source = Source("a.yaml", text)
+    with patch("executive.mission.text.yaml_text._FAST_LOADER", yaml.SafeLoader):
+        expected = parse_yaml(source)
+    assert parse_yaml(source) == expected

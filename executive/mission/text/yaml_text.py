@@ -36,6 +36,11 @@ _ADVICE_BY_MESSAGE = {
 """Advice on syntax errors, by the start of PyYAML's message."""
 _DEPTH_MESSAGE = f"lists and mappings are nested more than {_MAX_DEPTH} levels deep"
 """Message of a finding about nesting deeper than `_MAX_DEPTH`."""
+_FAST_LOADER: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""Parser of libyaml, which takes a quarter of the time; the Python parser if PyYAML lacks libyaml."""
+_LIBYAML_DIFFERENCE = re.compile(r"[^\n\x20-\x7e\xa1-\u1fff]|[?]|---|:\s*[,}\]]")
+"""Text that libyaml may read in another way than the Python parser, or at another position: tabs and other
+special characters, question marks, document markers, and keys without a value in brackets."""
 _LINE_LENGTH = 1000
 """Length of a span [characters] that reaches the end of the line."""
 
@@ -124,9 +129,15 @@ def parse_yaml(source: Source, text: str | None = None) -> tuple[YamlNode | None
 
     `text` is the YAML text at the same positions as in the source; by default the text of the source.
     """
-    composer = _Composer(source, source.text if text is None else text)
+    text = source.text if text is None else text
+    composer = _Composer(source, text, yaml.SafeLoader if _LIBYAML_DIFFERENCE.search(text) else _FAST_LOADER)
     try:
-        root = composer.read_document()
+        try:
+            root = composer.read_document()
+        except (yaml.YAMLError, UnicodeEncodeError):
+            # Unlike libyaml, the Python parser has the same error messages in every installation.
+            composer = _Composer(source, text, yaml.SafeLoader)
+            root = composer.read_document()
     except yaml.MarkedYAMLError as error:
         return None, [*composer.findings, _make_syntax_error(source, error)]
     except yaml.reader.ReaderError as error:
@@ -143,11 +154,10 @@ class _IncompleteTree(Exception):
 class _Composer:
     """Composer of the tree of nodes from PyYAML's events, which collects findings."""
 
-    def __init__(self, source: Source, text: str) -> None:
+    def __init__(self, source: Source, text: str, loader: type[yaml.SafeLoader]) -> None:
         self.source = source
         self.findings: list[Finding] = []
-        # Unlike the parser of libyaml, the Python parser has the same messages in every installation.
-        self._events: Iterator[yaml.Event] = yaml.parse(text, Loader=yaml.SafeLoader)
+        self._events: Iterator[yaml.Event] = yaml.parse(text, Loader=loader)
         # Node of each anchor, and number of keys and values in the node.
         self._anchors: dict[str, tuple[YamlNode, int]] = {}
         self._node_count = 0
