@@ -80,8 +80,17 @@ class FlowState:
 
     def with_handled_failure(self, failure: PossibleFailure) -> FlowState:
         """Return the state after a control node has handled a failure."""
-        states = [replace(state, handled_failure=str(failure)) for state in self.tool_states or ()]
-        return self if self.tool_states is None else self.with_tool_states(frozenset(states))
+        if self.tool_states is None:
+            return self
+        failure_name = str(failure)
+        # States that differ only in the failure handled before become equal; a set of tuples is fast.
+        histories = {(state.state, state.cause, state.has_arm_moved) for state in self.tool_states}
+        return self.with_tool_states(
+            frozenset(
+                PossibleToolState(state, cause, failure_name, has_arm_moved)
+                for state, cause, has_arm_moved in histories
+            )
+        )
 
     def with_arm_moved(self) -> FlowState:
         """Return the state after a motion of the arm."""
