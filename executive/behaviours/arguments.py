@@ -20,7 +20,7 @@ _PLAIN_TYPES = (str, int, float, bool, NoneType, list, tuple, dict, set, frozens
 _CONTAINERS = {
     list: list, tuple: tuple, dict: dict, set: set, frozenset: frozenset, Sequence: list, Mapping: dict,
 }  # fmt: skip
-"""Container in missions, by the origin of a declared generic type: a list for each `Sequence[int]`."""
+"""Type of the value in missions, by the origin of the declared type: `Sequence[int]` takes a list."""
 _MAPPINGS = (dict, Mapping)
 """Origins of the declared types of mappings."""
 

@@ -135,7 +135,7 @@ def _make_params(arguments: Mapping[str, Param]) -> Iterator[tuple[str, Param]]:
     for name, argument in arguments.items():
         mission_type, default = find_mission_type(argument.type), argument.default
         if name != NAME_ARGUMENT and mission_type is not None:
-            # The default is documentation: the constructor applies the real default.
+            # The default is only shown to authors; without a value, the constructor applies its own default.
             default = default.name if isinstance(default, Enum) else default
             default = default if default is ... or isinstance(default, str | int | float) else None
             yield name, replace(argument, type=mission_type, default=default)

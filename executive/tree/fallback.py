@@ -33,7 +33,7 @@ class Fallback(OrderedNode):
 
     do: Children = key(shorthand=True, doc="Alternatives, in order.")
 
-    def report_next(self, index: int) -> None:
+    def on_child_change(self, index: int) -> None:
         """Report the number of the next child, and the failure of the child before it."""
         if index > 0:
             failure = self.get_failure(self.do[index - 1])

@@ -19,8 +19,8 @@ class ForEach(Loop):
     The node reads the list at its start; with an empty list, the node succeeds at once. A failure of the body
     ends the loop and is passed on. At its end, the node removes the variable `each`.
 
-    * BehaviorTree.CPP: custom node `for_each`. `LoopString` and the other loops begin each element in a new
-      tick, need one more tick at the end, and keep the variable.
+    * BehaviorTree.CPP: custom node `for_each`. Its loops over queues (`LoopString`, `LoopDouble`, ...) start
+      the iteration of each element in a new tick, need one more tick at the end, and keep the variable.
     * py_trees: `decorators.ForEach`. It runs the body once for an empty list, and stops at the first element
       that is None.
     """
@@ -31,7 +31,7 @@ class ForEach(Loop):
     unreachable_reason = "the body runs 0 times"
 
     each: VariableName = key(list_key="in", doc="Variable that holds the current element.")
-    in_: Elements = key(doc="List, variable that holds a list, or `poses`, `bins`, `classes` or `items`.")
+    in_: Elements = key(doc="List, variable that holds a list, or all `poses`, `bins`, `classes` or `items`.")
     do: Child = key(doc="Body of the loop.")
 
     @property

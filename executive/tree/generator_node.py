@@ -12,8 +12,8 @@ from executive.tree.keys import Child
 from executive.tree.node import ControlNode
 
 NodeRun: TypeAlias = Generator[None, Status | None, Failure | None]
-"""Generator that returns a failure, or None for success. A `yield` ends the tick, or waits until the end of a
-running child, and then has the status of the child as its value."""
+"""Generator that returns a failure, or None for success. A `yield` ends the tick. If a child is running, the
+generator continues after the end of the child, and the value of the `yield` is the status of the child."""
 
 
 class GeneratorNode(ControlNode):
@@ -27,7 +27,7 @@ class GeneratorNode(ControlNode):
         self._run, self._running_child = self.run(), cast("Child | None", None)
 
     def step(self) -> Status:
-        """Tick the running child, continue the generator if the child has ended, and return the status."""
+        """Tick the running child, if any; unless it is still running, continue the generator."""
         child, child_status = self._running_child, None
         if child is not None:
             child_status = self.tick_child(child)

@@ -48,21 +48,22 @@ class OrderedNode(ReactiveNode):
         while status is self.continue_status and index + 1 < len(self.do):
             index += 1
             if index > previous_index:
-                self.report_next(index)
+                self.on_child_change(index)
             status = tick(self.do[index])
         if index < previous_index:
             self.halt_children([self.do[previous_index]])
-            self.report_next(index)
+            self.on_child_change(index)
         self._child_index = index
         return self.fail(self.get_failure(self.do[index])) if status is Status.FAILURE else status
 
-    def report_next(self, index: int) -> None:
-        """Called when the node goes on or back to the child at `index`; a fallback reports this decision."""
+    def on_child_change(self, index: int) -> None:
+        """Called when the node moves to a later or earlier child; a fallback reports this decision."""
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes.
 
-        Without memory, each tick begins a new pass, also from the states in which a child is running.
+        Without memory, each tick begins with the first child, even while a later child is running. Therefore,
+        the states in which a child is running are entry states, too; the iteration ends at a fixed point.
         """
         while True:
             flow = self._compute_pass(get_flow, state)
@@ -94,7 +95,7 @@ class OrderedNode(ReactiveNode):
         return join_states(end.with_handled_failure(failure) for failure, end in flow.failures.items())
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
-        """Yield a warning for each use of `memory: false` without effect or with a wrong effect."""
+        """Yield a warning if `memory: false` has no effect, halts a child, or repeats an action."""
         if self.memory:
             return
         flows = {child: analysis.get_flow(child) for child in self.do}
@@ -103,7 +104,8 @@ class OrderedNode(ReactiveNode):
             message = "`memory: false` has no effect: no child after the first takes time"
             yield NodeFinding("memory", "useless-reactive", message, is_warning=True)
             return
-        # Each tick runs `blocker` again, which does not pass at once: a running child after it is halted.
+        # `blocker` is the first child that cannot end with `continue_status` in its first tick, or the last
+        # slow child. Each tick runs `blocker` again and thereby halts a running child after `blocker`.
         blocker = next((child for child in slow if not self._may_continue_at_once(child, analysis)), slow[-1])
         name = analysis.get_name(blocker)
         for child in slow[slow.index(blocker) + 1 :]:
@@ -127,6 +129,6 @@ class OrderedNode(ReactiveNode):
 
     @property
     def counterpart(self) -> Counterpart | None:
-        """`Sequence` or `Fallback`; without memory `ReactiveSequence` or `ReactiveFallback`."""
+        """`Sequence` or `Fallback` of BehaviorTree.CPP; without memory, their reactive variants."""
         name = "Sequence" if self.continue_status is Status.SUCCESS else "Fallback"
         return Counterpart(name if self.memory else f"Reactive{name}")

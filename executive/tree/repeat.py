@@ -44,7 +44,7 @@ class Repeat(Loop):
     iteration, and does not interrupt an iteration. Any other failure of the body ends the loop and is passed
     on.
 
-    * BehaviorTree.CPP: `Repeat`; with `until`, a custom node `repeat`, because failures have no reasons.
+    * BehaviorTree.CPP: `Repeat`; with `until`, a custom node `repeat`, because failures have no reasons there.
     * py_trees: `decorators.Repeat`. Each iteration begins in a new tick, and there is no `until`.
     """
 
@@ -103,7 +103,7 @@ class Repeat(Loop):
         return iteration_count == self.times or bool(self._find_reached_limit())
 
     def _find_reached_limit(self) -> str:
-        """Return the first limit that a counter has reached, as a text: `placed: 4`; "" without one."""
+        """Return the first limit that a counter has reached, as a text: `placed: 4`; "" if none."""
         limits = (f"{name}: {limit:g}" for name, limit in self._limits if self._read_counter(name) >= limit)
         return next(limits, "")
 
@@ -144,7 +144,7 @@ class Repeat(Loop):
     def explain(self, failure: PropagatedFailure) -> str:
         """Return why the loop passed on a failure of its body."""
         if self.until:
-            return f"succeeds only with {format_reasons(self.until)}"
+            return f"this failure is not in until ({format_reasons(self.until)})"
         return f"a failure ends the loop before its {self.times} iterations are complete"
 
     @property

@@ -69,7 +69,7 @@ class Retry(Loop):
 
     @property
     def detail(self) -> str:
-        """The number of attempts, the failures before further attempts, and the delays, as a text."""
+        """Maximum number of attempts, failures that cause further attempts, and delays, as a text."""
         reasons = format_reasons(self.on) or "any failure"
         backoff_text = "" if self.backoff is None else f", backoff {self.backoff}"
         return f"up to {self.attempts} attempts, on {reasons}{backoff_text}"
@@ -137,6 +137,7 @@ class Retry(Loop):
     @property
     def unreachable_reason(self) -> str:
         """Reason why the recovery never runs; "" if another finding explains this."""
+        # `check_failure_names` reports failures in `on` that the body cannot have.
         if self.on and self.attempts > 1:
             return ""
         return "there is only one attempt" if self.attempts == 1 else "the body never fails"
@@ -159,9 +160,11 @@ class Retry(Loop):
     def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int]:
         """Return the number of the failed attempt and the number of allowed attempts."""
         handled_count = sum(failure.handled_counts.values())
-        # `handled_counts` lacks only the failure of the last attempt. After a failed recovery, however, it
-        # contains the failures of all attempts, and also the failure of the recovery.
-        return handled_count + (-1 if failure.last_choice == _GIVE_UP else 1), self.attempts
+        if failure.last_choice == _GIVE_UP:
+            # The node has handled the failures of all attempts and the failure of the recovery.
+            return handled_count - 1, self.attempts
+        # The node passed on the failure of the last attempt without handling it.
+        return handled_count + 1, self.attempts
 
     def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
         """Yield the advice to handle a failure in the recovery, or to allow more attempts."""
@@ -172,7 +175,7 @@ class Retry(Loop):
             yield Advice(f"allow more than {attempts} attempt{'s' if attempts > 1 else ''}", "attempts")
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield `recover` as the name and the node of the recovery, if there is a recovery."""
+        """Yield the key `recover` and the node at this key, if the node has a recovery."""
         if self.recover is not None:
             yield "recover", self.recover
 

@@ -49,7 +49,7 @@ def test_a_success_has_no_story() -> None:
         ("  try: IsHolding\n  catch: [{on: [IsHolding.empty], do: {invert: succeed}}]\n",
          "try: caught IsHolding.empty (the sensor detects no seal), but the handler failed"),
         ("  - MoveToScan\n  - repeat: {until: [Detect.hidden], do: [Detect, IsHolding]}\n",
-         "repeat: succeeds only with Detect.hidden"),
+         "repeat: this failure is not in until (Detect.hidden)"),
         ("  repeat: {times: 3, do: IsHolding}\n",
          "repeat: a failure ends the loop before its 3 iterations are complete"),
         ("  - MoveToScan\n  - while: {condition: Detect, do: IsHolding}\n",

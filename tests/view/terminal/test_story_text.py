@@ -167,7 +167,7 @@ def test_an_arm_whose_way_is_barred_whenever_it_carries(at_home) -> None:
         == """\
 FAILURE after 2.11 s: PutDown of cube-1 failed (blocked): link 5 met a wrench
 why no node in missions/sort_overhead.yaml handled the failure, from the root down:
-  repeat                succeeds only with choice.no_candidate (line N)
+  repeat                this failure is not in until (choice.no_candidate) (line N)
   carry_and_watch: try  caught Transit.blocked (link 5 met a wrench), but the handler failed
                         (missions/library/sorting.yaml:N)
   put_aside: try        catches only PutDown.dropped (missions/library/sorting.yaml:N)
