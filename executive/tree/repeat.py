@@ -44,7 +44,7 @@ class Repeat(Loop):
     iteration, and does not interrupt an iteration. Any other failure of the body ends the loop and is passed
     on.
 
-    * BehaviorTree.CPP: `Repeat`; with `until`, a custom node `repeat`, because failures have no reasons there.
+    * BehaviorTree.CPP: `Repeat`; with `until`, a custom node `repeat`, as failures have no reasons there.
     * py_trees: `decorators.Repeat`. Each iteration begins in a new tick, and there is no `until`.
     """
 
