@@ -87,7 +87,7 @@ class Param:
 
     @property
     def accepts_variable(self) -> bool:
-        """True if a variable may give the value: a name in the cell, or one of `choices`."""
+        """True if a mission may set the param to a variable that contains a name or one of `choices`."""
         return bool(self.refers_to or self.choices)
 
 
@@ -102,8 +102,8 @@ class Port:
         default: Value of an input whose variable is unwritten; `...` if the variable must be written.
         refers_to: Kind of the name (`item`, `bin`, `class`) if the value is a name; otherwise "".
         doc: Description of the port.
-        compared_with: Name of the input with which the skill compares this input, or "". A constant here must
-            be a possible value of that other input.
+        compared_with: Name of the input with which the skill compares this input, or "". If a mission sets
+            this input to a constant, the compared input must be able to have this value.
     """
 
     name: str
@@ -156,15 +156,15 @@ class Skill:
     Attributes:
         params: Declared params by name.
         ports: Declared ports by name.
-        one_of: Names of optional inputs of which a mission sets exactly one. Such an input reads a variable
-            only if the mission names the variable.
+        one_of: Names of optional inputs of which a mission sets exactly one. Unlike other inputs, an input
+            that the mission does not set reads no variable of the same name.
         reasons: Reasons with which the skill may fail.
         uses: Devices that no concurrent branch may use at the same time: `arm`, `tool`, `camera`.
         senses: True if the skill gets new information: an image, or a request of the operator.
         moves: True if the skill moves the arm.
         is_condition: True if the skill is a condition, which decides in one tick, writes no output, uses no
-            device, and changes nothing. The `tool_state` of a condition is no requirement: the condition can
-            succeed only in this state.
+            device, and changes nothing. The `tool_state` of a condition is not checked before the start: a
+            success shows that the tool is in this state.
         tool_state: Required state of the tool (ANY: no requirement); state after success (ANY: unchanged).
         tool_state_after_failure: State of the tool after a failure, by reason, and after a halt, by the key
             `halt`; ANY if unknown. A failure or halt without a key leaves the state unchanged.

@@ -70,7 +70,7 @@ class Approach(Skill):
         height, start_height = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded_length
         expectation = f"was expected at {(start_height - cell.descent) * 1000:.0f} mm"
         if not tool.touching:
-            cell.ledger.record_miss(item, found_table=_proves_absence(goal, self.target, object_class))
+            cell.ledger.record_failed_pick(item, found_table=_proves_absence(goal, self.target, object_class))
             message = f"no contact down to {height * 1000:.0f} mm, {item} {expectation}"
             raise self.failure("no_contact", message)
         if height > start_height + EARLY_CONTACT_MARGIN:
@@ -83,7 +83,7 @@ class Approach(Skill):
         if not cell.ledger.record_touch(item, contradiction, may_have_missed_top=is_top_missed):
             raise self.failure("contradicted", f"{item} may be no {label}: {contradiction}")
         if contradiction and not is_near_top:
-            cell.ledger.record_miss(item)
+            cell.ledger.record_failed_pick(item)
             raise self.failure("no_contact", f"the top of {item} {expectation}; {contradiction}")
 
 

@@ -33,7 +33,7 @@ class Grasp(Skill):
             if not is_sealed:
                 cell.tool.open()
         if not is_sealed:
-            cell.ledger.record_miss(self.target.item)
+            cell.ledger.record_failed_pick(self.target.item)
             raise self.failure("missed", f"no seal on {self.target.item} {self.settle:.2f} s after contact")
         cell.ledger.record_grasp(self.target.item)
         self.held = self.target.item

@@ -10,8 +10,8 @@ from executive.manipulation.tool_goals import choose_bin, sort_pickable_targets
 from executive.perception.evidence import describe_unknown_labels
 from executive.skill import In, Out, Skill, SkillFailed, param, port
 
-NOT_OPEN = ("held", "placed", "rejected", "skipped")
-"""States of an item that cannot be selected."""
+UNSELECTABLE_STATES = ("held", "placed", "rejected", "skipped")
+"""States of an item that cannot be selected; not `lost`, because a look may find a lost item."""
 
 
 class SelectTarget(Skill):
@@ -53,7 +53,7 @@ class SelectTarget(Skill):
             raise self._make_failure_without_candidate(cell)
         # The candidates are sorted by distance, and `min` returns the first of equal ones.
         best = min(candidates, key=lambda target: self._make_sort_key(cell, target))
-        if names := self._format_uncertain_items(cell, cell.ledger.describe(best.item).turn):
+        if names := self._format_uncertain_items(cell, cell.ledger.describe(best.item).deferral_rank):
             message = f"{best.item} is deferred, and not enough looks agree on {names} yet; look again"
             raise self.failure("doubtful", message)
         self.target, self.item, self.bin = best, best.item, choose_bin(cell, best.item)
@@ -63,8 +63,8 @@ class SelectTarget(Skill):
         """Return the sort key of a candidate; the smallest key comes first."""
         known = cell.ledger.describe(target.item)
         if self.prefer == "surest":
-            return known.turn, -target.confidence, target.item
-        return known.turn, known.attempts if self.prefer == "least_tried" else 0
+            return known.deferral_rank, -target.confidence, target.item
+        return known.deferral_rank, known.attempts if self.prefer == "least_tried" else 0
 
     def _is_permitted(self, cell: Cell, item: Item) -> bool:
         """Return True if a bin for an item is free, and `same`, `among` and `not` permit the item."""
@@ -72,12 +72,13 @@ class SelectTarget(Skill):
         return not is_excluded and self.same in (None, item) and choose_bin(cell, item) != ""
 
     def _is_requested(self, cell: Cell, item: Item) -> bool:
+        """Return True if an item is permitted, and its most probable class is `wanted`."""
         return self.wanted in (None, cell.ledger.get_label(item)) and self._is_permitted(cell, item)
 
-    def _format_uncertain_items(self, cell: Cell, turn_limit: float = math.inf) -> str:
-        """Return the names of the uncertain requested items whose `turn` is below `turn_limit`."""
+    def _format_uncertain_items(self, cell: Cell, rank_limit: float = math.inf) -> str:
+        """Return the names of the uncertain requested items whose deferral rank is below `rank_limit`."""
         items = (item for item in cell.ledger.find_uncertain_items() if self._is_requested(cell, item))
-        return ", ".join(item for item in items if cell.ledger.describe(item).turn < turn_limit)
+        return ", ".join(item for item in items if cell.ledger.describe(item).deferral_rank < rank_limit)
 
     def _is_nothing_left(self, cell: Cell) -> bool:
         """Return True if no requested item is left, or if none of the items in `among` is open or lost.
@@ -96,7 +97,7 @@ class SelectTarget(Skill):
 
     def _make_failure_without_candidate(self, cell: Cell) -> SkillFailed:
         """Return the failure with the reason why there is no candidate."""
-        if self.same and (state := cell.ledger.describe(self.same).state) in NOT_OPEN:
+        if self.same and (state := cell.ledger.describe(self.same).state) in UNSELECTABLE_STATES:
             skip_reason = cell.ledger.explain_skipped_class(cell.ledger.get_label(self.same))
             cause = f": {skip_reason}" if state == "skipped" else ""
             return self.failure("no_candidate", f"{self.same} is {state}{cause}")

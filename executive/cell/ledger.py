@@ -96,7 +96,7 @@ class Ledger(Protocol):
         """Return the number of objects in a bin; `label` restricts the count to one class."""
 
     def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
-        """Return the number of items in the state `placed` or `rejected` (`KnownItem.state`).
+        """Return the number of items in `state`, which is `placed` or `rejected` (`KnownItem.state`).
 
         `label` restricts the count to one class, `bin` to one bin.
         """
@@ -117,16 +117,16 @@ class Ledger(Protocol):
     def update_presence(
         self, item: Item, detections: Detections, observations: Sequence[Observation]
     ) -> Presence:
-        """Record whether a frame shows an item at its place, and return the answer of all frames so far.
+        """Record whether a frame shows an item at its place, and return its presence.
 
-        The item is gone if the probability that all frames missed the item by chance is small enough, given
-        the miss rates of the detectors. The position of the item is then unknown: the item counts as dropped
-        until a frame shows an object of its class at a new place.
+        All frames so far decide whether the item is gone: the probability that they missed the item by chance
+        is then small enough, given the miss rates of the detectors. The position of the item is then unknown:
+        the item counts as dropped until a frame shows an object of its class at a new place.
 
         Args:
             item: The item.
-            detections: Detections in a frame, for which `observe` was called before. Their view is `full`, or
-                contains the place of the item.
+            detections: Detections in a frame, for which `observe` was called before. The searched region is
+                the full image, or contains the place of the item.
             observations: The same detections, localized in the world.
         """
 
@@ -136,7 +136,7 @@ class Ledger(Protocol):
         Args:
             item: The item.
             contradiction: Sentence that states how the height of the touch contradicts the class, or "".
-            may_have_missed_top: True if the cup may have missed the top, and touched the object below it.
+            may_have_missed_top: True if the cup may have touched the item below its top.
         """
 
     def record_weight(self, item: Item, weight: float, std: float) -> str:
@@ -150,7 +150,7 @@ class Ledger(Protocol):
             std: Standard deviation of the error of the measurement [N].
         """
 
-    def record_miss(self, item: Item, *, found_table: bool = False) -> None:
+    def record_failed_pick(self, item: Item, *, found_table: bool = False) -> None:
         """Record a failed attempt to pick an item, which may have moved any object on the table.
 
         `found_table` is True if the descent to the item touched nothing above the table.
@@ -180,18 +180,18 @@ class Ledger(Protocol):
     def invalidate_positions(self) -> None:
         """Record that the robot may have moved any object on the table."""
 
-    def record_loss_of_track(self) -> None:
-        """Record a loss of track: the tool may have moved any item that is not in a bin."""
+    def record_interruption(self) -> None:
+        """Record an interruption of the run: the tool may have moved any item that is not in a bin."""
 
     def mark_unseen_as_dropped(self) -> None:
-        """Record as dropped every item that no frame has shown since `record_loss_of_track`.
+        """Record as dropped every item that no frame has shown since `record_interruption`.
 
         Later frames are searched for these items on the table and in the bins. An item without a detection
         until the end of the run is rejected, because its position is unknown.
         """
 
     def record_bin_contents(self) -> None:
-        """Record an item for each unknown object that the frames since `record_loss_of_track` show in a bin.
+        """Record an item for each unknown object that the frames since `record_interruption` show in a bin.
 
         An unknown object is assigned to a dropped item of its class, or becomes a new item.
         """

@@ -60,7 +60,7 @@ class KnownItem:
         position: Last known position of the centre `(3,)` [m] in the world.
         attempts: Number of failed attempts to pick the item.
         deferrals: Number of times that the item was deferred.
-        turn: Rank among the deferred items, in the order of deferral; 0 if the item is not deferred.
+        deferral_rank: Rank among the deferred items, in the order of deferral; 0 if the item is not deferred.
     """
 
     item: ItemName
@@ -70,7 +70,7 @@ class KnownItem:
     position: Array
     attempts: int
     deferrals: int
-    turn: int
+    deferral_rank: int
 
     @property
     def is_open(self) -> bool:

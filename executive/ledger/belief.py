@@ -34,11 +34,12 @@ def make_viewpoint_key(look: Detections) -> str:
 
 
 def compute_repeat_probability(independent_probability: float, error_correlation: float) -> float:
-    """Return the probability that a detector repeats its answer to an earlier look from the same viewpoint.
+    """Return the probability that a detector repeats, also by chance, an earlier answer from a viewpoint.
 
     Args:
         independent_probability: Probability of the answer (a class, or no detection) in an independent look.
-        error_correlation: Probability that the detector repeats its earlier answer.
+        error_correlation: Probability that the answer is a copy of the earlier answer; otherwise, both
+            answers are independent.
     """
     return error_correlation + (1.0 - error_correlation) * independent_probability
 
@@ -52,16 +53,16 @@ class Belief:
         log_odds: Posterior log odds that the item exists.
         is_confirmed: True if the item certainly exists, by the log odds or by a touch of the tool.
         miss_probability: Probability that all looks since the last detection missed the item by chance.
-        low_confidence_count: Number of looks with a doubtful detection since the last confident look.
-        last_label_by_viewpoint: For each viewpoint key, the last detected class, or "" after a miss during a
-            verification; empty after a possible move of the item.
-        miss_count_by_viewpoint: For each viewpoint key, number of misses during a verification; empty after a
-            detection at the place of the item.
+        low_confidence_count: Number of looks with a doubtful detection since the last confident detection.
+        last_label_by_viewpoint: For each viewpoint key, the last detected class, or "" after a miss that
+            `add_miss` received with the key; empty after a possible move of the item.
+        miss_count_by_viewpoint: For each viewpoint key, number of these misses; empty after a detection at
+            the place of the item.
         repeat_count: Number of looks that repeated the class of an earlier look from the same viewpoint.
         log_likelihoods: Log likelihood of each detected class, relative to a class that was never detected.
         label_counts: For each detected class, number of looks.
         max_confusion_rate: Largest confusion rate of the detectors that detected the item, 0 to 1.
-        detected_labels: Map from each class of the cell to the class that the detectors report for it; empty
+        label_map: For each class of the cell, the class that the detectors report for it; empty
             before the first weighing. Until then, a key of `log_likelihoods` stands for all classes with the
             same appearance.
         weight_log_ratios: For each class, log likelihood ratio of the last weighing, which `log_likelihoods`
@@ -79,12 +80,12 @@ class Belief:
     log_likelihoods: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     label_counts: Counter[str] = field(default_factory=Counter)
     max_confusion_rate: float = 0.0
-    detected_labels: Mapping[str, str] = field(default_factory=dict)
+    label_map: Mapping[str, str] = field(default_factory=dict)
     weight_log_ratios: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def look_count(self) -> int:
-        """Number of looks that detected the item."""
+        """Number of looks with a confident detection of the item."""
         return self.label_counts.total()
 
     @property
@@ -97,7 +98,7 @@ class Belief:
     @property
     def detected_label(self) -> str:
         """Class that the detectors report for an object of the class `label`."""
-        return self.detected_labels.get(self.label, self.label)
+        return self.label_map.get(self.label, self.label)
 
     @property
     def class_error(self) -> float:
@@ -159,7 +160,7 @@ class Belief:
         self.max_confusion_rate = max(self.max_confusion_rate, confusion_rate)
         if is_ambiguous and not self.look_count:
             self.log_odds = min(self.log_odds, MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM)
-        # The prior odds of a new item contain the evidence of its first confident detection.
+        # The prior odds of an item whose first detection is confident contain the evidence of this detection.
         elif not is_ambiguous and (self.look_count or self.low_confidence_count):
             false_positive_rate = min(rates.false_detections * ITEM_AREA_FRACTION, 1.0)
             self.log_odds += _compute_log_ratio(1.0 - rates.miss_rate, false_positive_rate, error_correlation)
@@ -172,14 +173,15 @@ class Belief:
     ) -> None:
         """Update the existence with a look that shows the item's position, but does not detect the item.
 
-        With a `viewpoint`, a miss is weak evidence if it repeats an earlier miss from this viewpoint. If no
-        look has detected the item at this position (`was_detected_here`), the detector may be unable to do
-        so, for instance if a red cube lies in a red bin. With the probability `rates.repeated`, all later
-        looks from the viewpoint then repeat the first miss, so that no number of looks is a proof.
+        With a `viewpoint`, a miss is weak evidence if it repeats an earlier miss from this viewpoint.
+        `was_detected_here` is False if no look has detected the item at this position: the detector may then
+        be unable to detect the item, such as a red cube in a red bin. With the probability `rates.repeated`,
+        all later looks from the viewpoint repeat the first miss, so that no number of looks is a proof.
         """
         count = 0 if viewpoint is None else self.miss_count_by_viewpoint[viewpoint]
         miss_rate = compute_repeat_probability(rates.miss_rate, rates.repeated if count else 0.0)
         if count and not was_detected_here:
+            # Probability of one more miss after `count` misses.
             miss_rate = compute_repeat_probability(rates.miss_rate**count, rates.repeated)
             miss_rate /= compute_repeat_probability(rates.miss_rate ** (count - 1), rates.repeated)
         if viewpoint is not None:
@@ -188,7 +190,7 @@ class Belief:
         self.miss_probability *= miss_rate
         self.log_odds += math.log(miss_rate)
 
-    def add_weighing(self, log_ratios: Mapping[str, float], detected_labels: Mapping[str, str]) -> None:
+    def add_weighing(self, log_ratios: Mapping[str, float], label_map: Mapping[str, str]) -> None:
         """Update the class with a weighing, which distinguishes classes that look alike.
 
         A weighing replaces the previous one, because both share the same systematic error.
@@ -196,12 +198,12 @@ class Belief:
         Args:
             log_ratios: For each class, log likelihood ratio of the measured weight: an object of the class
                 against an object of no declared class.
-            detected_labels: Map from each class of the cell to the class that the detectors report for it.
+            label_map: For each class of the cell, the class that the detectors report for it.
         """
-        if not self.detected_labels:
-            old, pairs = self.log_likelihoods, detected_labels.items()
+        if not self.label_map:
+            old, pairs = self.log_likelihoods, label_map.items()
             new = {label: old[detected_label] for label, detected_label in pairs if detected_label in old}
-            self.log_likelihoods, self.detected_labels = defaultdict(float, new), detected_labels
+            self.log_likelihoods, self.label_map = defaultdict(float, new), label_map
         for label in self.log_likelihoods:
             self.log_likelihoods[label] += log_ratios[label] - self.weight_log_ratios.get(label, 0.0)
         self.weight_log_ratios = {label: log_ratios[label] for label in self.log_likelihoods}
@@ -215,7 +217,7 @@ class Belief:
 
     def _add_class_evidence(self, detected_label: str, log_ratio: float) -> None:
         """Add the log likelihood ratio of a detected class to each class that looks like it."""
-        alike = [label for label, other in self.detected_labels.items() if other == detected_label]
+        alike = [label for label, other in self.label_map.items() if other == detected_label]
         for label in alike or [detected_label]:
             self.log_likelihoods[label] += log_ratio
 

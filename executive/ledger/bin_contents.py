@@ -122,9 +122,11 @@ class BinContents:
             for bin_name in self.routes.get(record.label, ()):
                 key = (record.detected_label, bin_name)
                 known_count = sum((item.detected_label, item.bin) == key for item in self.records)
-                is_visible = visible_counts[key] > known_count
-                if is_visible or self.is_floor_visible(bin_name, detections):
-                    update_bin_log_odds(record, bin_name, detections.error_rates, is_visible=is_visible)
+                has_additional_object = visible_counts[key] > known_count
+                if has_additional_object or self.is_floor_visible(bin_name, detections):
+                    update_bin_log_odds(
+                        record, bin_name, detections.error_rates, has_additional_object=has_additional_object
+                    )
                 if record.bin_log_odds[bin_name] >= -math.log(self.config.max_miss_probability):
                     record.reason, record.stamp, record.was_detected_in_bin = "", detections.frame.stamp, True
                     self.records.set_placed(record, bin_name)
@@ -150,9 +152,9 @@ class BinContents:
         `GONE` means only that the image does not show the item; the detector may have missed the item. A
         doubtful detection shows an item if the detection has the class of the item and lies at the slot of
         the item. If the image shows fewer objects of the class than the bin contains, the missing items are
-        those whose slots are farthest from the shown objects. The result is `UNSURE` if another detection in
-        the bin may be the item, or if the bin has more than one layer of objects, because a layer hides the
-        layer below.
+        those whose slots are farthest from the shown objects. There are two cases of `UNSURE`: a detection of
+        another class in the bin may be the item, or the bin has several layers of objects, and an upper layer
+        may hide the item.
         """
         if not self.is_floor_visible(record.bin, detections):
             return Presence.HIDDEN
@@ -184,12 +186,15 @@ def find_probable_bin(record: ItemRecord) -> str | None:
     return next(probable_bins, None) if record.state is State.DROPPED else None
 
 
-def update_bin_log_odds(record: ItemRecord, bin_name: str, rates: ErrorRates, *, is_visible: bool) -> None:
+def update_bin_log_odds(
+    record: ItemRecord, bin_name: str, rates: ErrorRates, *, has_additional_object: bool
+) -> None:
     """Update, by one look, the log odds that a dropped item lies in a bin; negative log odds become 0.
 
-    `is_visible` is True if the look shows more objects of the item's class in the bin than known items.
+    `has_additional_object` is True if the look shows more objects of the item's class in the bin than the
+    ledger knows.
     """
     miss_rate, false_positive_rate = rates.miss_rate, rates.false_detections * BIN_AREA_FRACTION
-    likelihood_ratio = (1.0 - miss_rate) / false_positive_rate if is_visible else miss_rate
+    likelihood_ratio = (1.0 - miss_rate) / false_positive_rate if has_additional_object else miss_rate
     log_odds = record.bin_log_odds[bin_name] + math.log(likelihood_ratio)
     record.bin_log_odds[bin_name] = max(0.0, log_odds)

@@ -89,8 +89,8 @@ class ItemRecord:
         is_untracked: True if the run was interrupted before the journal recorded whether the tool moved the
             item.
         deferral_count: Number of times that the item was deferred.
-        turn: Rank among the deferred items; 0 if the item is not deferred.
-        was_taken_away: True if the item is dropped because a person, not the tool, removed it.
+        deferral_rank: Rank among the deferred items; 0 if the item is not deferred.
+        was_taken_away: True if images showed the place of the item empty, because a person removed it.
         was_detected_in_bin: True if a look has shown the placed item in its bin.
         slot: Index of the slot of the bin over which the item was released, or None.
     """
@@ -123,7 +123,7 @@ class ItemRecord:
     bin_log_odds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     is_untracked: bool = False
     deferral_count: int = 0
-    turn: int = 0
+    deferral_rank: int = 0
     was_taken_away: bool = False
     was_detected_in_bin: bool = False
     slot: int | None = None
@@ -163,10 +163,10 @@ class ItemRecord:
         if self.state is State.DROPPED:
             state = State.REJECTED.value if self.reason else State.LOST.value
         elif self.state is State.SEEN:
-            state = State.SKIPPED.value if is_skipped else "deferred" if self.turn else "open"
+            state = State.SKIPPED.value if is_skipped else "deferred" if self.deferral_rank else "open"
         return KnownItem(
             self.item, self.label, state, self.bin, self.position, self.failed_pick_count,
-            self.deferral_count, self.turn,
+            self.deferral_count, self.deferral_rank,
         )  # fmt: skip
 
     def distance_to(self, position: Array) -> float:
@@ -184,10 +184,10 @@ class ItemRecord:
         self.state, self.was_taken_away, self.change_count = State.DROPPED, True, change_count
         self.bin_log_odds.clear()
         self.belief.miss_probability = 1.0
-        self.forget_viewpoints()
+        self.clear_viewpoints()
 
-    def forget_viewpoints(self) -> None:
-        """Forget earlier viewpoints, because looks at a moved item do not repeat earlier errors."""
+    def clear_viewpoints(self) -> None:
+        """Clear the looks by viewpoint, and the counts of repeats and contradictions, which are obsolete."""
         self.belief.last_label_by_viewpoint.clear()
         self.belief.miss_count_by_viewpoint.clear()
         self.belief.repeat_count = self.contradiction_count = 0

@@ -101,7 +101,7 @@ class LookUpdate:
                 record.set_state(State.SEEN, "")
             is_unmoved = staleness.is_unmoved(record)
             if not is_unmoved:
-                record.forget_viewpoints()
+                record.clear_viewpoints()
             label = observation.detection.label
             is_ambiguous = self._may_show_any_item(observation, unmatched_items)
             record.belief.add_detection(label, rates, viewpoint, is_ambiguous=is_ambiguous)

@@ -39,7 +39,7 @@ class Tracker(LedgerQueries):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._bin_recovery: BinRecovery | None = None
-        """Recovery of the bin contents between `record_loss_of_track` and `record_bin_contents`, or None."""
+        """Recovery of the bin contents between `record_interruption` and `record_bin_contents`, or None."""
         self._last_frame_id = self._deferral_count = 0
         self._last_stamp = 0.0
         """Capture time of the last look [s]."""
@@ -65,10 +65,10 @@ class Tracker(LedgerQueries):
     def update_presence(
         self, item: Item, detections: Detections, observations: Sequence[Observation]
     ) -> Presence:
-        """Record whether an image shows an item at its place, and return the answer of all images so far.
+        """Record whether an image shows an item at its place, and return its presence.
 
-        The item is gone if the probability that all images missed the item by chance is at most
-        `max_miss_probability`; its position then becomes unknown.
+        All images so far decide whether the item is gone: the probability that they missed the item by chance
+        is then at most `max_miss_probability`, and the position of the item becomes unknown.
         """
         record, frame = self._records.find(item), detections.frame
         if record.state is State.PLACED:
@@ -81,7 +81,7 @@ class Tracker(LedgerQueries):
             elif presence is Presence.PRESENT:
                 record.stamp, record.belief.miss_probability = frame.stamp, 1.0
                 record.was_detected_in_bin = True
-                record.forget_viewpoints()
+                record.clear_viewpoints()
         elif record.state not in ON_TABLE:
             return Presence.HIDDEN if record.state is State.HELD else Presence.GONE
         elif record.frame_id == frame.id:
@@ -101,7 +101,8 @@ class Tracker(LedgerQueries):
         """Record a touch, and return False if the touch contradicts the class of the item.
 
         A touch proves that the item exists. After a touch at the height of the class, other heights are no
-        contradiction: the item may have fallen. If `may_have_missed_top`, the touch may be below the top.
+        contradiction, because the item may have tipped over. If `may_have_missed_top`, the first touch below
+        the top is no contradiction if the looks prove the class.
         """
         record = self._records.find(item)
         record.belief.is_confirmed, record.had_contact, record.empty_probe_count = True, True, 0
@@ -129,7 +130,7 @@ class Tracker(LedgerQueries):
         self._records.emit(record)
         return contradiction
 
-    def record_miss(self, item: Item, *, found_table: bool = False) -> None:
+    def record_failed_pick(self, item: Item, *, found_table: bool = False) -> None:
         """Record a failed attempt to pick an item, which may have moved any object.
 
         `found_table` is True if the descent to the item touched nothing above the table.
@@ -171,9 +172,9 @@ class Tracker(LedgerQueries):
         record = self._records.find(item)
         if record.state is State.HELD:
             record.reason, record.slot = "", self._bin_contents.find_next_slot_index(bin)
-        # Objects in earlier images are not this item, which can leave the bin only after the placement.
+        # An object that an earlier look showed on the table is not this item after it has left the bin.
         record.stamp, record.belief.miss_probability = self._last_stamp, 1.0
-        record.forget_viewpoints()
+        record.clear_viewpoints()
         record.was_detected_in_bin = False
         self._records.set_placed(record, bin)
 
@@ -196,27 +197,27 @@ class Tracker(LedgerQueries):
         """Defer an item: the item stays open, and skills select it after all others."""
         record = self._records.find(item)
         self._deferral_count += 1
-        record.turn = self._deferral_count
+        record.deferral_rank = self._deferral_count
         record.deferral_count += 1
 
     def invalidate_positions(self) -> None:
         """Record that any object on the table may have been moved."""
         self._invalidate_near(np.zeros(3), math.inf)
 
-    def record_loss_of_track(self) -> None:
-        """Record a loss of track: the tool may have moved any item that is not in a bin."""
+    def record_interruption(self) -> None:
+        """Record an interruption of the run: the tool may have moved any item that is not in a bin."""
         self._bin_recovery = BinRecovery(self._bin_contents)
         self._mark_as_dropped(self._records.filter_by_state(State.HELD, State.DROPPED))
 
     def mark_unseen_as_dropped(self) -> None:
-        """Set each item on the table that no look has detected since `record_loss_of_track` to DROPPED."""
+        """Set each item on the table that no look has detected since `record_interruption` to DROPPED."""
         items = [record for record in self._records.filter_by_state(State.SEEN) if record.belief.is_probable]
         self._mark_as_dropped([item for item in items if not self._staleness.is_unmoved(item)])
 
     def record_bin_contents(self) -> None:
-        """Record an item for each unknown object that looks since `record_loss_of_track` showed in a bin."""
+        """Record an item for each unknown object that a look after `record_interruption` showed in a bin."""
         recovery, self._bin_recovery = self._bin_recovery, None
-        assert recovery is not None, "the contents of bins are recorded after `record_loss_of_track`"
+        assert recovery is not None, "the contents of bins are recorded after `record_interruption`"
         recovery.record_bin_contents(self.change_count)
 
     def set_final_states(self, *, completed: bool) -> None:
@@ -268,7 +269,7 @@ class Tracker(LedgerQueries):
 
     def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
         """Set items to DROPPED, so that later looks search for them on the table and in the bins."""
-        assert self._bin_recovery is not None, "items are marked as dropped after `record_loss_of_track`"
+        assert self._bin_recovery is not None, "items are marked as dropped after `record_interruption`"
         for record in records:
             record.change_count, record.is_untracked, record.was_taken_away = self.change_count, True, False
             record.bin_log_odds.clear()

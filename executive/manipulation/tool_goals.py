@@ -167,19 +167,19 @@ def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DR
 
 
 def make_slot_goal(
-    bin: Bin, object_count: int, height: float, max_object_height: float, drop_height: float = DROP_HEIGHT
+    bin: Bin, slot_index: int, height: float, max_object_height: float, drop_height: float = DROP_HEIGHT
 ) -> Goal:
     """Return the goal of a transit to a position above the next slot of a bin.
 
     Args:
         bin: The bin.
-        object_count: Number of objects in the bin; a new layer begins if all slots are used.
+        slot_index: Index of the next slot; a new layer begins after the last slot of the bin.
         height: Height of the object in the tool [m].
         max_object_height: Height of the tallest class of objects, and thickness of each layer [m].
         drop_height: Height of the object's underside above the layer below, or above the floor [m].
     """
-    layer, slot_index = divmod(object_count, len(bin.slots))
-    x, y = map(float, bin.slots[slot_index])
+    layer, index_in_layer = divmod(slot_index, len(bin.slots))
+    x, y = map(float, bin.slots[index_in_layer])
     return Goal((x, y, compute_layer_height(bin, layer, max_object_height) + height + drop_height))
 
 

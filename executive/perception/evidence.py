@@ -23,8 +23,8 @@ MAX_TOUCH_HEIGHT_ERROR = 0.003
 """Maximum difference between the height of a touch and the height of a class [m]; 52 touches of the mission
 `sort_overhead` had errors of at most 0.4 mm."""
 OTHER_CLASS_TOLERANCE = 0.0025
-"""Maximum difference between the height of a touch and of a class that the touch may show instead of the
-assumed class [m]."""
+"""Maximum difference between the height of a touch and the height of another class to which the object may
+belong [m]."""
 TOP_TOLERANCE = 0.012
 """Maximum difference between the height of an object's top in the depth image and an expected height [m].
 
@@ -116,7 +116,7 @@ def may_have_missed_top(label: str, height: float, classes: Mapping[str, ObjectC
 
 
 def _compute_height_error(label: str, height: float, classes: Mapping[str, ObjectClass]) -> float:
-    """Return the signed distance [m] from the nearest possible top of a class up to a height."""
+    """Return `height` [m] minus the nearest possible height of the top of an object of a class."""
     return min((height - top for top in _list_top_heights(label, classes)), key=abs)
 
 

@@ -33,7 +33,7 @@ def recover_scene(cell: Cell) -> Steps:
     Raises:
         Fault: The tool holds an object that cannot be put down.
     """
-    cell.ledger.record_loss_of_track()
+    cell.ledger.record_interruption()
     if cell.tool.holding:
         yield from _put_down(cell)
     cell.tool.open()

@@ -22,7 +22,7 @@ from executive.tree.skill_run import SkillRun
 _INTERCEPTED_ROLES = ("arm", "tool", "camera", "detector", "ledger", "operator")
 _LOGGED_CALLS = COMMANDS | {
     "camera.capture", "camera.next_pose", "operator.ask", "ledger.observe", "ledger.record_touch",
-    "ledger.record_miss", "ledger.record_grasp", "ledger.record_drop", "ledger.record_placement",
+    "ledger.record_failed_pick", "ledger.record_grasp", "ledger.record_drop", "ledger.record_placement",
     "ledger.record_put_down", "ledger.reject", "ledger.defer", "ledger.invalidate_positions",
 }  # fmt: skip
 

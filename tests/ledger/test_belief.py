@@ -68,9 +68,9 @@ def test_what_looks_say_of_existence_adds_up() -> None:
 
 def test_looks_into_a_bin_add_up_from_nothing() -> None:
     fallen = record()
-    update_bin_log_odds(fallen, "red_bin", GOOD, is_visible=False)
+    update_bin_log_odds(fallen, "red_bin", GOOD, has_additional_object=False)
     assert fallen.bin_log_odds == {"red_bin": 0.0}
-    update_bin_log_odds(fallen, "red_bin", GOOD, is_visible=True)
+    update_bin_log_odds(fallen, "red_bin", GOOD, has_additional_object=True)
     assert fallen.bin_log_odds == {"red_bin": pytest.approx(math.log(0.98 / (0.02 * 0.04)))}
 
 

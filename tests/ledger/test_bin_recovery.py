@@ -8,7 +8,7 @@ from ledger_bench import Bench
 def test_each_object_in_a_forbidden_bin_is_an_item(bench: Bench) -> None:
     bench.look(("sphere", 0.5, 0.0))
     bench.ledger.record_grasp("sphere-1")
-    bench.ledger.record_loss_of_track()
+    bench.ledger.record_interruption()
     bench.look(("sphere", 0.2, -0.44), ("sphere", 0.22, -0.39), view="full")
     bench.ledger.record_bin_contents()
     reason = "found in red_bin when the run was resumed"

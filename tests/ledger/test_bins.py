@@ -113,7 +113,7 @@ def test_an_item_dropped_is_recognized_after_further_changes(bench: Bench) -> No
     bench.look(CUBE, ("cube", 0.60, 0.1))
     bench.drop("cube-1")
     bench.look(("cube", 0.60, 0.1), ("duck", 0.45, 0.15))
-    bench.ledger.record_miss("cube-2")
+    bench.ledger.record_failed_pick("cube-2")
     found = bench.look(("cube", 0.60, 0.1), ("cube", 0.45, -0.15), ("duck", 0.45, 0.15))
     assert {t.item for t in found} == {"cube-1", "cube-2", "duck-1"}
 

@@ -97,7 +97,7 @@ def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) ->
 
 def test_given_up_after_a_failed_grasp_it_stays_so(bench: Bench) -> None:
     bench.look(THERE)
-    bench.ledger.record_miss("cube-1")
+    bench.ledger.record_failed_pick("cube-1")
     for _ in range(MIN_UNCERTAIN_LOOKS_TO_REJECT):
         bench.look(unsure=[THERE])
     bench.look(THERE)

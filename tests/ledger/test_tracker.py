@@ -41,13 +41,13 @@ def test_the_class_is_evidence_and_not_identity(bench: Bench) -> None:
     bench.look(CUBE)
     target = bench.look(("duck", 0.5, 0.0))[0]
     assert (target.item, target.label) == ("cube-1", "cube"), "two votes against one"
-    bench.ledger.record_miss("cube-1")
+    bench.ledger.record_failed_pick("cube-1")
     assert names(bench.look(("duck", 0.505, 0.0))) == ["cube-1"]
 
 
 @pytest.mark.parametrize(
     ("event", "far_is_fresh"),
-    [("record_grasp", True), ("record_miss", False), ("invalidate_positions", False)],
+    [("record_grasp", True), ("record_failed_pick", False), ("invalidate_positions", False)],
 )
 def test_what_the_robot_does_puts_places_in_doubt(bench: Bench, event: str, far_is_fresh: bool) -> None:
     near, far = bench.look(CUBE, FAR)
@@ -55,7 +55,7 @@ def test_what_the_robot_does_puts_places_in_doubt(bench: Bench, event: str, far_
     getattr(bench.ledger, event)(*(() if event == "invalidate_positions" else ("cube-1",)))
     assert not bench.ledger.is_fresh(near)
     assert bench.ledger.is_fresh(far) is far_is_fresh
-    assert bench.ledger.describe("cube-1").attempts == (event == "record_miss")
+    assert bench.ledger.describe("cube-1").attempts == (event == "record_failed_pick")
 
 
 def test_a_pick_puts_in_doubt_what_is_nearer_than_seven_centimetres(bench: Bench) -> None:
@@ -66,7 +66,7 @@ def test_a_pick_puts_in_doubt_what_is_nearer_than_seven_centimetres(bench: Bench
 
 def test_an_object_pushed_away_by_a_missed_grasp_is_still_the_same_item(bench: Bench) -> None:
     bench.look(CUBE, ("duck", 0.6, 0.1))
-    bench.ledger.record_miss("cube-1")
+    bench.ledger.record_failed_pick("cube-1")
     assert names(bench.look(("cube", 0.60, -0.1), ("duck", 0.6, 0.1))) == ["cube-1", "duck-1"]
     assert list(bench.states()) == ["cube-1", "duck-1"]
 
@@ -107,7 +107,7 @@ def test_an_item_is_skipped_only_if_the_mission_was_completed_without_an_attempt
     for _ in range(2):
         bench.look(CUBE)
     for _ in range(attempts):
-        bench.ledger.record_miss("cube-1")
+        bench.ledger.record_failed_pick("cube-1")
     assert bench.end(completed=completed) == {"cube-1": final}
 
 
@@ -391,7 +391,7 @@ def test_an_item_is_a_phantom_if_the_tool_found_only_the_table_there_three_times
 ) -> None:
     for number in range(probes):
         bench.look(("cube", 0.5 + (moved if number == probes - 1 else 0.0), 0.0), FAR)
-        bench.ledger.record_miss("cube-1", found_table=True)
+        bench.ledger.record_failed_pick("cube-1", found_table=True)
     bench.look(("cube", 0.5 + moved, 0.0), FAR)
     if touches_other:
         bench.ledger.record_touch("cube-2")
@@ -409,7 +409,7 @@ def test_an_item_that_was_touched_exists_although_the_tool_finds_only_the_table_
     bench.look(CUBE, FAR)
     assert bench.ledger.record_touch("cube-1", contradiction, may_have_missed_top=True)
     for _ in range(3):
-        bench.ledger.record_miss("cube-1", found_table=True)
+        bench.ledger.record_failed_pick("cube-1", found_table=True)
         bench.look(CUBE)
     bench.ledger.reject("cube-1", "could not be picked")
     assert bench.end()["cube-1"] == ("rejected", "could not be picked")
@@ -417,7 +417,7 @@ def test_an_item_that_was_touched_exists_although_the_tool_finds_only_the_table_
 
 def test_a_phantom_that_the_tool_tried_to_pick_may_turn_up_elsewhere(bench: Bench) -> None:
     bench.look(CUBE)
-    bench.ledger.record_miss("cube-1")
+    bench.ledger.record_failed_pick("cube-1")
     for _ in range(4):
         bench.look()
     assert bench.states() == {"cube-1": PHANTOM}

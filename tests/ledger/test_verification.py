@@ -276,14 +276,14 @@ def test_looks_before_the_placement_are_no_evidence_that_the_item_left_the_bin(b
     assert bench.verify("cube-1") == "unsure"
 
 
-@pytest.mark.parametrize("found_by", ["look on the table", "look in the bin", "grasp", "loss of track"])
+@pytest.mark.parametrize("found_by", ["look on the table", "look in the bin", "grasp", "interruption"])
 def test_an_item_that_was_found_again_is_missing_no_more(gone: Bench, found_by: str) -> None:
     record = gone.ledger._records.find("cube-1")
     assert record.was_taken_away
     if found_by == "grasp":
         gone.ledger.record_grasp("cube-1")
-    elif found_by == "loss of track":
-        gone.ledger.record_loss_of_track()
+    elif found_by == "interruption":
+        gone.ledger.record_interruption()
     for _ in range(2):
         if found_by.startswith("look"):
             gone.look(ELSEWHERE if found_by == "look on the table" else SLOT_1, view="full")

@@ -29,8 +29,8 @@ def seen_belief() -> Belief:
 
 
 def weigh(belief: Belief, weight: float) -> None:
-    detected_labels = {label: each.detected_label for label, each in CLASSES.items()}
-    belief.add_weighing(compute_weight_log_ratios(weight, STD, CLASSES), detected_labels)
+    label_map = {label: each.detected_label for label, each in CLASSES.items()}
+    belief.add_weighing(compute_weight_log_ratios(weight, STD, CLASSES), label_map)
 
 
 def seen_bench(classes: dict[str, ObjectClass] = CLASSES) -> Bench:

@@ -37,7 +37,7 @@ def test_a_probe_far_beside_the_middle_proves_nothing(
     fake.world.objects.clear()
     for offset, empty_probe_count in ((0.02, 0), (0.0025, 1)):
         for _ in range(3):
-            fake.ledger.record_miss(target.item)
+            fake.ledger.record_failed_pick(target.item)
         run_skill(
             Approach(target=replace(target, change_count=fake.ledger.change_count), offset=offset), fake
         )
@@ -60,7 +60,7 @@ def test_a_touch_that_only_the_fourth_attempt_can_make_is_no_touch_of_the_target
     if is_touched:
         run_skill(Approach(target=target), fake)
     for _ in range(3):
-        fake.ledger.record_miss(target.item)
+        fake.ledger.record_failed_pick(target.item)
     thing.position[2] = -0.005
     result = run_skill(Approach(target=replace(target, change_count=fake.ledger.change_count)), fake)
     assert (result.reason, result.message[: len(message)]) == (reason, message)

@@ -41,7 +41,7 @@ def test_further_attempts_go_round_the_ring(
         (target,) = look()
         run_skill(Approach(target=target), fake)
         steps.append(fake.arm.tool_pose.position[:2] - target.position[:2])
-        fake.ledger.record_miss(target.item)
+        fake.ledger.record_failed_pick(target.item)
     assert np.linalg.norm(steps, axis=1) == pytest.approx([RING] * 5)
     angles = sorted(math.atan2(y, x) for x, y in steps)
     gaps = np.diff([*angles, angles[0] + math.tau])

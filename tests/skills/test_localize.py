@@ -28,7 +28,7 @@ def test_a_frame_from_before_a_missed_grasp_is_stale(fake: FakeCell, look) -> No
     fake.world.put("cube", 0.5, 0.0)
     look()
     old = run_skill(Detect(), fake).outputs["detections"]
-    fake.ledger.record_miss("cube-1")
+    fake.ledger.record_failed_pick("cube-1")
     result = run_skill(Localize(detections=old), fake)
     assert (result.reason, result.message) == (
         "stale",

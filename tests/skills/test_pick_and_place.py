@@ -85,7 +85,7 @@ def test_every_further_attempt_comes_down_elsewhere(fake: FakeCell, target: Targ
     for _ in range(4):
         run_skill(Approach(target=look()[0]), fake)
         places.append(fake.arm.tool_pose.position[:2].copy())
-        fake.ledger.record_miss("cube-1")
+        fake.ledger.record_failed_pick("cube-1")
     assert all(np.linalg.norm(a - b) > 0.002 for a, b in combinations(places, 2))
 
 
@@ -178,7 +178,7 @@ def test_an_item_is_given_up_with_its_reason_after_the_failures_the_mission_gran
     fake: FakeCell, target: Target
 ) -> None:
     for failures, state in ((1, "open"), (2, "rejected")):
-        fake.ledger.record_miss("cube-1")
+        fake.ledger.record_failed_pick("cube-1")
         run_skill(RejectTarget(item="cube-1", after=2), fake)
         assert fake.ledger.describe("cube-1").state == state, failures
     assert fake.ledger.list_items()[0].reason == "could not be picked (2 failed attempts)"

@@ -131,7 +131,7 @@ def test_an_item_is_deferred_a_limited_number_of_times(fake: FakeCell, look) -> 
 def test_the_least_tried_item_comes_first_and_of_equals_the_nearest(fake: FakeCell, look) -> None:
     put(fake, cube=(0.45, 0.0), duck=(0.5, 0.15), sphere=(0.6, -0.2))
     look()
-    fake.ledger.record_miss("duck-1")
+    fake.ledger.record_failed_pick("duck-1")
     targets = look()
     assert select(fake, targets).outputs["item"] == "duck-1"
     assert select(fake, targets, prefer="least_tried").outputs["item"] == "cube-1"

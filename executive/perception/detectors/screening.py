@@ -29,7 +29,7 @@ MAX_SECOND_CLASS_RATIO = 0.5
 """Maximum confidence of the second class of a confident detection, as a fraction of the first confidence."""
 
 
-def screen_answer(answer: Answer, frame: Frame, view: str, detected_labels: Mapping[str, str]) -> Answer:
+def screen_answer(answer: Answer, frame: Frame, view: str, label_map: Mapping[str, str]) -> Answer:
     """Return an answer with its detections divided into `confident`, `doubtful` and `unknown`.
 
     Boxes that the arm occludes, and unknown labels with a confidence below the threshold, are omitted. The
@@ -39,7 +39,7 @@ def screen_answer(answer: Answer, frame: Frame, view: str, detected_labels: Mapp
         answer: Answer with all detections in `confident`.
         frame: The searched frame.
         view: Name of the searched region, for an error message.
-        detected_labels: For each class in the cell file, the class that it looks like; by default, itself.
+        label_map: For each class of the cell, the class that the detectors report for it.
 
     Raises:
         Crowded: There are more than `MAX_BOXES` boxes.
@@ -59,10 +59,10 @@ def screen_answer(answer: Answer, frame: Frame, view: str, detected_labels: Mapp
     for detection in answer.confident:
         if frame.compute_visible_fraction(detection.box) < MIN_VISIBLE_FRACTION:
             continue
-        if detection.label in detected_labels:
+        if detection.label in label_map:
             is_confident = _is_confident(detection, threshold)
             (confident if is_confident else doubtful).append(
-                replace(detection, label=detected_labels[detection.label])
+                replace(detection, label=label_map[detection.label])
             )
         elif detection.confidence >= threshold:
             unknown.append(detection)
@@ -76,18 +76,18 @@ class ScreenedDetector:
     Attributes:
         detector: The detector.
         name: Name of the detector in the cell file.
-        detected_labels: For each class in the cell file, the class that it looks like; by default, itself.
+        label_map: For each class of the cell, the class that the detectors report for it.
     """
 
     detector: Detector
     name: str
-    detected_labels: Mapping[str, str]
+    label_map: Mapping[str, str]
 
     def request(self, frame: Frame, view: str) -> ChangedRequest:
         """Start the detection in a view of a frame: `table` (the workspace) or `full` (the whole image)."""
         request = self.detector.request(frame, view)
         return ChangedRequest(
-            request, lambda answer: screen_answer(answer, frame, view, self.detected_labels), self.name
+            request, lambda answer: screen_answer(answer, frame, view, self.label_map), self.name
         )
 
 
@@ -95,8 +95,8 @@ def screen_detectors(
     detectors: Mapping[str, Detector], classes: Mapping[str, ObjectClass]
 ) -> dict[str, Detector]:
     """Return detectors with screened answers, by name; `classes` are the classes of the cell by label."""
-    detected_labels = {label: object_class.detected_label for label, object_class in classes.items()}
-    return {name: ScreenedDetector(detector, name, detected_labels) for name, detector in detectors.items()}
+    label_map = {label: object_class.detected_label for label, object_class in classes.items()}
+    return {name: ScreenedDetector(detector, name, label_map) for name, detector in detectors.items()}
 
 
 def _is_confident(detection: Detection, threshold: float) -> bool:
