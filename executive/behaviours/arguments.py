@@ -16,7 +16,7 @@ from py_trees.ports import PortsMixin
 from executive.skill import Param, param
 
 _PLAIN_TYPES = (str, int, float, bool, NoneType, list, tuple, dict, set, frozenset, Any)
-"""Types without type arguments that are allowed for values in a mission."""
+"""Types of values in a mission if the declaration has no type arguments: `list`, not `list[int]`."""
 _CONTAINERS = {
     list: list, tuple: tuple, dict: dict, set: set, frozenset: frozenset, Sequence: list, Mapping: dict,
 }  # fmt: skip

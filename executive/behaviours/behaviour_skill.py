@@ -114,8 +114,10 @@ def make_behaviour_skill(name: str, behaviour_type: type[Behaviour]) -> type[Beh
     arguments = list_arguments(behaviour_type)
     params = dict(_make_params(arguments))
     for each in (*params, *ports):
-        if hasattr(Skill, each) or (each in params and each in ports):
+        if hasattr(Skill, each):
             raise InputError(f'has an argument or port with the reserved name "{each}"; rename it')
+        if each in params and each in ports:
+            raise InputError(f'has an argument and a port with the same name "{each}"; rename one of them')
     is_known = (
         behaviour_type.__module__ == _REPLAYABLE_MODULE and behaviour_type is not ProbabilisticBehaviour
     )

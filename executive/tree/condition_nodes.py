@@ -11,7 +11,7 @@ from executive.tree.sequence import Sequence
 
 
 class ConditionList(KeyOwner):
-    """First base class of `all` and `any`; the second base class is the sequence or the fallback.
+    """Mixin of `all` and `any`, which restricts a sequence or a fallback to conditions.
 
     Conditions decide within one tick, so the key `memory` would have no effect.
     """

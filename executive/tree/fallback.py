@@ -21,7 +21,7 @@ class Fallback(OrderedNode):
 
     * BehaviorTree.CPP: `Fallback`; without memory `ReactiveFallback`. Here, children are never skipped.
       The checker warns if two children can return RUNNING, unless the first of them may fail in its first
-      tick. BehaviorTree.CPP can throw an exception in the run, without this exemption.
+      tick. BehaviorTree.CPP makes no exception and can throw an error during the run.
     * py_trees: `Selector(memory=True)` or `Selector(memory=False)`. There, a fallback may be empty.
     """
 

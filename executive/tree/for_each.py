@@ -31,7 +31,7 @@ class ForEach(Loop):
     unreachable_reason = "the body runs 0 times"
 
     each: VariableName = key(list_key="in", doc="Variable that holds the current element.")
-    in_: Elements = key(doc="List, variable that holds a list, or all `poses`, `bins`, `classes` or `items`.")
+    in_: Elements = key(doc="A list, a variable that holds a list, or `poses`, `bins`, `classes` or `items`.")
     do: Child = key(doc="Body of the loop.")
 
     @property

@@ -213,7 +213,7 @@ class ControlNode(KeyOwner, TreeNode):
         yield from ()
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield (name in reports, child) for each child that runs only after a failure or at the end."""
+        """Yield (name in reports, child) for each child that runs only after a failure, or in `finally`."""
         yield from ()
 
     # Property for the export.
@@ -278,7 +278,7 @@ class ControlNode(KeyOwner, TreeNode):
                 raise self._make_status_fault(child)
             return child.status
 
-        # An attribute of the instance hides the method, so that a tick without visitors costs nothing more.
+        # An attribute of the instance hides the method, so that a tick without visitors has no extra cost.
         self.tick_child = tick_and_visit  # type: ignore[method-assign]
         try:
             self.tick_once()

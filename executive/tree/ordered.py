@@ -63,7 +63,7 @@ class OrderedNode(ReactiveNode):
         """Return the possible outcomes.
 
         Without memory, each tick begins with the first child, even while a later child is running. Therefore,
-        the states in which a child is running are entry states, too; the iteration ends at a fixed point.
+        the states in which a child is running (`halted`) are entry states of the first child, too.
         """
         while True:
             flow = self._compute_pass(get_flow, state)
@@ -104,8 +104,8 @@ class OrderedNode(ReactiveNode):
             message = "`memory: false` has no effect: no child after the first takes time"
             yield NodeFinding("memory", "useless-reactive", message, is_warning=True)
             return
-        # `blocker` is the first child that cannot end with `continue_status` in its first tick, or the last
-        # slow child. Each tick runs `blocker` again and thereby halts a running child after `blocker`.
+        # `blocker` is the first slow child that cannot end with `continue_status` in its first tick; if there
+        # is none, the last slow child. Each tick of `blocker` halts a running child after it.
         blocker = next((child for child in slow if not self._may_continue_at_once(child, analysis)), slow[-1])
         name = analysis.get_name(blocker)
         for child in slow[slow.index(blocker) + 1 :]:

@@ -140,15 +140,15 @@ class Parallel(ControlNode):
         halted = join_states(flow.halted for flow in flows)
         halted = halted and halted.with_tool_states(combine_tool_states(state.tool_states, halted_ends))
         if self._has_lead:
-            lead, siblings = flows[0], halted_ends[1:]
-            failures = {cause: _with_siblings(state, end, siblings) for cause, end in lead.failures.items()}
-            return Flow(lead.success and _with_siblings(state, lead.success, siblings), failures, halted)
+            lead, others = flows[0], halted_ends[1:]
+            failures = {cause: _with_siblings(state, end, others) for cause, end in lead.failures.items()}
+            return Flow(lead.success and _with_siblings(state, lead.success, others), failures, halted)
         failures, can_be_halted = {}, self.halt or self._required_count < len(flows)
         ends = [find_end_tool_states(flow, state, can_be_halted) for flow in flows]
         can_fail = len([flow for flow in flows if flow.failures]) > len(flows) - self._required_count
         for index, flow in enumerate(flows if can_fail else ()):
-            siblings = [*ends[:index], *ends[index + 1 :]]
-            failures |= {cause: _with_siblings(state, end, siblings) for cause, end in flow.failures.items()}
+            others = [*ends[:index], *ends[index + 1 :]]
+            failures |= {cause: _with_siblings(state, end, others) for cause, end in flow.failures.items()}
         return Flow(self._compute_success_state(flows, state), failures, halted)
 
     def _compute_success_state(self, flows: Sequence[Flow], state: FlowState) -> FlowState | None:
@@ -204,6 +204,6 @@ class Parallel(ControlNode):
         return Counterpart("ParallelAll", {"max_failures": 1}) if is_all else None
 
 
-def _with_siblings(entry: FlowState, end: FlowState, siblings: Iterable[ToolStates]) -> FlowState:
-    """Return the state `end` after one child, with the effects of all siblings on the tool."""
-    return end.with_tool_states(combine_tool_states(entry.tool_states, [end.tool_states, *siblings]))
+def _with_siblings(entry: FlowState, end: FlowState, others: Iterable[ToolStates]) -> FlowState:
+    """Return the state `end` after one child, with the tool states `others` after its siblings."""
+    return end.with_tool_states(combine_tool_states(entry.tool_states, [end.tool_states, *others]))

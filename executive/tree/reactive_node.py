@@ -9,7 +9,7 @@ from executive.tree.keys import Child
 from executive.tree.node import ControlNode, NodeContext
 
 _COMPARED_ATTRIBUTES = ("node", "status", "reason", "choice", "item", "outputs")
-"""Attributes of events by which two runs of a child are compared: not messages, which may contain numbers."""
+"""Attributes of events by which two runs of a child are compared; the numbers in messages may differ."""
 
 
 class ReactiveNode(ControlNode):

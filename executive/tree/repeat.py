@@ -126,11 +126,11 @@ class Repeat(Loop):
         return Flow(success, failures, join_states((body.halted, entry)))
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time of all iterations [s]; 0 if a failure may end the loop with success."""
+        """Return the minimum time of all iterations [s]; 0 with `until`, which may end the loop earlier."""
         return 0.0 if self.until else (self.times or 0) * get_min_time(self.do)
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
-        """Yield an error if the loop can succeed only by placed items, and its body places none."""
+        """Yield an error if only a limit of `placed` can end the loop, and the body places no item."""
         has_only_placed = {name for name, _ in self._limits} == {"placed"} and not self._expected_reasons
         if not has_only_placed or self._is_empty or self.times or analysis.is_concurrent:
             return

@@ -17,7 +17,7 @@ class Sequence(OrderedNode):
 
     * BehaviorTree.CPP: `Sequence`; without memory `ReactiveSequence`. Here, children are never skipped.
       The checker warns if two children can return RUNNING, unless the first of them may succeed in its first
-      tick. BehaviorTree.CPP can throw an exception in the run, without this exemption.
+      tick. BehaviorTree.CPP makes no exception and can throw an error during the run.
     * py_trees: `Sequence(memory=True)` or `Sequence(memory=False)`. There, a sequence may be empty.
     """
 

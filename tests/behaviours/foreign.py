@@ -202,6 +202,13 @@ class Reserved(Behaviour):
         return Status.SUCCESS
 
 
+class SameName(Double):
+    """Have an argument and a port with the same name."""
+
+    def __init__(self, name: str, number: float) -> None:
+        super().__init__(name)
+
+
 class Undeclared(BehaviourWithPorts):
     """Declare no ports."""
 

@@ -156,6 +156,7 @@ def test_the_values_of_ports_do_not_remain(fake: FakeCell) -> None:
         (foreign.Abstract, "is abstract: it has no method update, or does not declare its ports"),
         (foreign.NeedsChild, 'needs the argument "child", and no mission can contain a value of its type'),
         (foreign.Reserved, 'has an argument or port with the reserved name "run"'),
+        (foreign.SameName, 'has an argument and a port with the same name "number"; rename one of them'),
         (foreign.Undeclared, "does not declare its ports"),
         (behaviours.CheckBlackboardVariableValue, 'needs the argument "check"'),
     ],

@@ -56,7 +56,7 @@ class _Exporter:
         self._mission, self._skills = mission, skills
         self._models: dict[str, Element] = {}
         self._used_subtrees: list[Subtree] = []
-        self._reference_counts: Counter[str] = Counter()
+        self._use_counts: Counter[str] = Counter()
         names = {*_REGISTERED_NAMES, *skills, *load_control_nodes()}
         self._tree_ids = {name: _make_unique(name, names) for name in mission.subtrees}
         self._main_id = _make_unique(mission.name, {*names, *self._tree_ids.values()})
@@ -101,16 +101,16 @@ class _Exporter:
 
     def _add_subtree_reference(self, parent: Element, node: nodes.SubtreeNode) -> Element:
         subtree, ports, values = self._mission.subtrees[node.name], [], {}
-        if not self._reference_counts[node.name]:
+        if not self._use_counts[node.name]:
             self._used_subtrees.append(subtree)
-        self._reference_counts[node.name] += 1
+        self._use_counts[node.name] += 1
         for name, argument in subtree.arguments.items():
             default = _format(argument.default) if argument.default else ""
             ports.append(Port(name, None, Direction.IN, default, "", ""))
             values[name] = _format(node.arguments[name].value) if name in node.arguments else default
         if subtree.returns is not None:
             # Local variables get unique names, because `_autoremap` shares all variables that are no ports.
-            prefix = f"{node.name}-{self._reference_counts[node.name]}."
+            prefix = f"{node.name}-{self._use_counts[node.name]}."
             for name in sorted(self._find_written_variables(subtree.body)):
                 ports.append(Port(name, None, Direction.OUT, ..., "", ""))
                 values[name] = _format_pointer(name if name in subtree.returns else prefix + name)
