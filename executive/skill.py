@@ -103,7 +103,7 @@ class Port:
         refers_to: Kind of the name (`item`, `bin`, `class`) if the value is a name; otherwise "".
         doc: Description of the port.
         compared_with: Name of the input with which the skill compares this input, or "". If a mission sets
-            this input to a constant, the compared input must be able to have this value.
+            this input to a constant, the checker reports a constant that the other input never equals.
     """
 
     name: str
@@ -156,8 +156,8 @@ class Skill:
     Attributes:
         params: Declared params by name.
         ports: Declared ports by name.
-        one_of: Names of optional inputs of which a mission sets exactly one. Unlike other inputs, an input
-            that the mission does not set reads no variable of the same name.
+        one_of: Names of optional inputs of which a mission sets exactly one. An unset input
+            usually reads the variable with the name of the port; the inputs in `one_of` do not.
         reasons: Reasons with which the skill may fail.
         uses: Devices that no concurrent branch may use at the same time: `arm`, `tool`, `camera`.
         senses: True if the skill gets new information: an image, or a request of the operator.
@@ -241,7 +241,7 @@ class Skill:
     def is_instantaneous(cls) -> bool:
         """Return True if the skill ends in its first tick: `run` is no generator and returns None.
 
-        A `run` that returns the iterator of another function must declare this in its annotation.
+        If `run` returns an iterator of another function, its return annotation must not be None.
         """
         has_steps = inspect.isgeneratorfunction(cls.run)
         annotation = cls.run.__annotations__.get("return", "")

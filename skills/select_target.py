@@ -80,7 +80,7 @@ class SelectTarget(Skill):
         items = (item for item in cell.ledger.find_uncertain_items() if self._is_requested(cell, item))
         return ", ".join(item for item in items if cell.ledger.describe(item).deferral_rank < rank_limit)
 
-    def _is_nothing_left(self, cell: Cell) -> bool:
+    def _has_nothing_left(self, cell: Cell) -> bool:
         """Return True if no requested item is left, or if none of the items in `among` is open or lost.
 
         An item counts as left if a weighing may find that it is of the class `wanted`.
@@ -104,7 +104,7 @@ class SelectTarget(Skill):
         if names := self._format_uncertain_items(cell):
             return self.failure("doubtful", f"not enough looks agree on {names} yet; look again")
         name = self.same or self.wanted or "object to sort"
-        if self._is_nothing_left(cell):
+        if self._has_nothing_left(cell):
             labels = (label for label in cell.routes if self.wanted in (None, label))
             skip_reasons = sorted({cell.ledger.explain_skipped_class(label) for label in labels} - {""})
             surplus = " and surplus objects" if skip_reasons else ""

@@ -119,9 +119,9 @@ class Ledger(Protocol):
     ) -> Presence:
         """Record whether a frame shows an item at its place, and return its presence.
 
-        All frames so far decide whether the item is gone: the probability that they missed the item by chance
-        is then small enough, given the miss rates of the detectors. The position of the item is then unknown:
-        the item counts as dropped until a frame shows an object of its class at a new place.
+        The item is gone if the probability that all frames so far missed the item by chance is small enough,
+        given the miss rates of the detectors. Its position is then unknown: the item counts as dropped until
+        a frame shows an object of its class at a new place.
 
         Args:
             item: The item.

@@ -34,7 +34,7 @@ def make_viewpoint_key(look: Detections) -> str:
 
 
 def compute_repeat_probability(independent_probability: float, error_correlation: float) -> float:
-    """Return the probability that a detector repeats, also by chance, an earlier answer from a viewpoint.
+    """Return the probability of the same answer as in an earlier look from the viewpoint, also by chance.
 
     Args:
         independent_probability: Probability of the answer (a class, or no detection) in an independent look.
@@ -54,10 +54,10 @@ class Belief:
         is_confirmed: True if the item certainly exists, by the log odds or by a touch of the tool.
         miss_probability: Probability that all looks since the last detection missed the item by chance.
         low_confidence_count: Number of looks with a doubtful detection since the last confident detection.
-        last_label_by_viewpoint: For each viewpoint key, the last detected class, or "" after a miss that
-            `add_miss` received with the key; empty after a possible move of the item.
-        miss_count_by_viewpoint: For each viewpoint key, number of these misses; empty after a detection at
-            the place of the item.
+        last_label_by_viewpoint: For each viewpoint key, the class of the last detection, or "" if the last
+            look was a miss in `add_miss`. `ItemRecord.clear_viewpoints` clears the mapping.
+        miss_count_by_viewpoint: For each viewpoint key, number of misses in `add_miss`; cleared together with
+            `last_label_by_viewpoint`.
         repeat_count: Number of looks that repeated the class of an earlier look from the same viewpoint.
         log_likelihoods: Log likelihood of each detected class, relative to a class that was never detected.
         label_counts: For each detected class, number of looks.

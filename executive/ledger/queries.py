@@ -22,8 +22,8 @@ from executive.ledger.staleness import Staleness
 from executive.perception.evidence import find_classes_distinct_by_touch
 
 MIN_LOG_RATIO_OF_WEIGHT = math.log(0.01)
-"""Minimum log likelihood ratio of a weight that agrees with a class, against objects of no declared class: a
-class is then as probable as an undeclared class, whose prior odds are 0.01."""
+"""Minimum log likelihood ratio of a weight that agrees with a class, against objects of no declared class. At
+the minimum, the class and an undeclared class (prior odds 0.01) are equally probable."""
 
 
 @dataclass(eq=False)

@@ -67,8 +67,8 @@ class Tracker(LedgerQueries):
     ) -> Presence:
         """Record whether an image shows an item at its place, and return its presence.
 
-        All images so far decide whether the item is gone: the probability that they missed the item by chance
-        is then at most `max_miss_probability`, and the position of the item becomes unknown.
+        The item is gone if the probability that all images so far missed the item by chance is at most
+        `max_miss_probability`; its position then becomes unknown.
         """
         record, frame = self._records.find(item), detections.frame
         if record.state is State.PLACED:
@@ -101,8 +101,8 @@ class Tracker(LedgerQueries):
         """Record a touch, and return False if the touch contradicts the class of the item.
 
         A touch proves that the item exists. After a touch at the height of the class, other heights are no
-        contradiction, because the item may have tipped over. If `may_have_missed_top`, the first touch below
-        the top is no contradiction if the looks prove the class.
+        contradiction, because the item may have tipped over. The first touch that is too low is no
+        contradiction if `may_have_missed_top` is True and the looks prove the class.
         """
         record = self._records.find(item)
         record.belief.is_confirmed, record.had_contact, record.empty_probe_count = True, True, 0
@@ -172,7 +172,7 @@ class Tracker(LedgerQueries):
         record = self._records.find(item)
         if record.state is State.HELD:
             record.reason, record.slot = "", self._bin_contents.find_next_slot_index(bin)
-        # An object that an earlier look showed on the table is not this item after it has left the bin.
+        # If the item later leaves the bin, an object seen before this time is not taken for the item.
         record.stamp, record.belief.miss_probability = self._last_stamp, 1.0
         record.clear_viewpoints()
         record.was_detected_in_bin = False
