@@ -96,7 +96,7 @@ def describe_weight(weight: float, label: str, classes: Mapping[str, ObjectClass
 
 
 def find_classes_distinct_by_touch(classes: Mapping[str, ObjectClass]) -> frozenset[str]:
-    """Return the classes whose height differs by more than `MAX_TOUCH_HEIGHT_ERROR` from all other classes."""
+    """Return the classes whose height differs by more than `MAX_TOUCH_HEIGHT_ERROR` from all others."""
     heights = {label: object_class.height for label, object_class in classes.items()}
     return frozenset(
         label
