@@ -11,6 +11,7 @@ import pytest
 
 from executive.cli.cells import find_cell
 from executive.mission.parse.cell_file import load_cell
+from executive.processes import WorkerPool
 from executive.training.evaluation.metrics import Evaluation
 from tests.benchmarks import detector_variants
 from tests.benchmarks.detector_variants import describe_evaluation, list_variants
@@ -123,7 +124,9 @@ def test_a_cube_as_large_as_a_duck_that_is_called_a_duck_is_found_in_a_wrong_bin
     scene = tmp_path / "scene.yaml"
     scene.write_text("scene: large cubes\nobjects: {cube: {scale: 1.12}}\n")
     detectors = partial(build_with_misclassifying, server=Server("embedded", "cube", "duck"))
-    run = run_audited(OVERHEAD, 310000, tmp_path, scene, detectors)
+    # A process in which a test has run a model cannot run a model after a fork, so a new process forks.
+    with WorkerPool(1) as pool:
+        run = pool.submit(run_audited, OVERHEAD, 310000, tmp_path, scene, detectors).result()
     assert len(run.in_wrong_bin) == run.audit["wrong_bin"] > 0
     assert run.unreported == run.in_wrong_bin
     assert {one.label for one in run.in_wrong_bin} == {"cube"}
