@@ -62,7 +62,7 @@ class FlowAnalysis:
         self.root_flow = self._analyse(tree, entry)
 
     def find_skill_or_most_similar(self, name: str) -> type[Skill] | None:
-        """Return the skill `name`, or the most similar one to avoid further findings, or None."""
+        """Return the skill `name`; if it is misspelled, the most similar skill; None if there is none."""
         known_name = name if name in self._skills else find_similar_word(name, self._skills)
         return self._skills[known_name] if known_name else None
 

@@ -83,12 +83,12 @@ class FlowState:
         if self.tool_states is None:
             return self
         failure_name = str(failure)
-        # States that differ only in the failure handled before become equal; a set of tuples is fast.
-        histories = {(state.state, state.cause, state.has_arm_moved) for state in self.tool_states}
+        # Merge the states that differ only in `handled_failure`; tuples are hashed faster than dataclasses.
+        merged_states = {(state.state, state.cause, state.has_arm_moved) for state in self.tool_states}
         return self.with_tool_states(
             frozenset(
                 PossibleToolState(state, cause, failure_name, has_arm_moved)
-                for state, cause, has_arm_moved in histories
+                for state, cause, has_arm_moved in merged_states
             )
         )
 
@@ -139,7 +139,7 @@ class FlowState:
         return self.with_tool_states(frozenset({PossibleToolState(declared_state, path)}))
 
     def find_tool_state(self, state: ToolState) -> PossibleToolState | None:
-        """Return a possible tool state in which the tool is EMPTY or HOLDING as in `state`, or None."""
+        """Return one of the possible tool states whose `state` is `state`, or None."""
         candidates = (candidate for candidate in self.tool_states or () if candidate.state is state)
         # Sets have no order; `min` makes the findings reproducible.
         return min(candidates, key=lambda state: (state.cause, state.handled_failure), default=None)

@@ -86,7 +86,7 @@ def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator
 def _find_uncovered_areas(
     config: CellConfig, world: World, camera: SimCamera
 ) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each scan pose without a view of the workspace, and each area without pose.
+    """Yield key and message for each scan pose that shows no area, and each area that no scan pose shows.
 
     A pose shows a point if the image contains a whole object at the point that neither arm nor bin hides.
     """
@@ -98,7 +98,7 @@ def _find_uncovered_areas(
         frame = camera.capture()
         mask = frame.compute_area_mask(points, camera.get_view_box("full"))
         mask &= frame.compute_unoccluded_mask(points)
-        bodies = _find_nearest_bodies(world, points, frame.X_WC.position)
+        bodies = _find_occluding_bodies(world, points, frame.X_WC.position)
         mask &= ~np.isin(bodies, list(world.bin_bodies.values()))
         if not mask.any():
             message = f'from the pose "{pose}" the camera {camera.name} sees no part of the workspace'
@@ -126,7 +126,7 @@ def _list_object_centres(config: CellConfig, xs: Array, ys: Array) -> Array:
     return np.array([(x, y, height) for x in xs for y in ys])
 
 
-def _find_nearest_bodies(world: World, points: Array, camera_position: Array) -> list[int]:
+def _find_occluding_bodies(world: World, points: Array, camera_position: Array) -> list[int]:
     """Return the body that hides each point `(N, 3)` [m] from the camera; -1 for none."""
     hits = world.client.rayTestBatch(points.tolist(), [tuple(camera_position)] * len(points))
     return [hit[0] for hit in hits]
@@ -136,5 +136,5 @@ def _find_occluding_bin(config: CellConfig, world: World, camera_position: Array
     """Return a bin that occludes the centre of the flattest object somewhere in the workspace, or None."""
     xs, ys = (np.linspace(*side, POINTS_PER_SIDE) for side in (config.table.x, config.table.y))
     points = _list_object_centres(config, xs, ys)
-    hit_bodies = {*_find_nearest_bodies(world, points, camera_position)}
+    hit_bodies = {*_find_occluding_bodies(world, points, camera_position)}
     return next((name for name, body in world.bin_bodies.items() if body in hit_bodies), None)

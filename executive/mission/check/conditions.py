@@ -28,14 +28,14 @@ def _find_problem(context: CheckContext, node: Node) -> str:
             return problem and f'in the subtree "{node.name}", {problem}'
         case SkillNode() if node.skill in context.skills:
             skill = context.skills[node.skill]
-            effects = [*list_effects(skill), "is not declared as a condition (is_condition)"]
+            effects = [*list_condition_violations(skill), "is not declared as a condition (is_condition)"]
             return "" if skill.is_condition else f"{node.skill} {effects[0]}"
         case InnerNode() if not node.declaring_class.is_condition:
             return "a list runs as a sequence" if node.is_list else f"{get_type_name(node)} is no condition"
     return ""
 
 
-def list_effects(skill: type[Skill]) -> list[str]:
+def list_condition_violations(skill: type[Skill]) -> list[str]:
     """Return the reasons why a skill is not a condition, as ends of a message: `moves the arm`."""
     effects = ["moves the arm"] if skill.moves else []
     effects += [f"writes ${name}" for name, port in skill.ports.items() if port.direction is Direction.OUT]

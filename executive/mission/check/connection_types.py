@@ -90,7 +90,7 @@ def _find_list_writers(node: Node, elements: KeyValue, writers: WritersByVariabl
 
 
 def _check_lists(name: str, reference: Reference, list_writers: Iterable[Writer]) -> Iterator[Finding]:
-    """Yield an error for each writer of `reference` that writes no list; the key `name` needs a list."""
+    """Yield an error for each writer of `reference` that writes no list, but the key `name` needs a list."""
     for writer in list_writers:
         for constant in writer.constants or ():
             if not isinstance(constant.value, list):
@@ -104,7 +104,7 @@ def _check_lists(name: str, reference: Reference, list_writers: Iterable[Writer]
 
 
 def _make_element_writers(node: Node, list_writers: Iterable[Writer]) -> Iterator[Writer]:
-    """Yield a writer of the elements of each list: the node that iterates over the list."""
+    """Per writer of a list, yield `node`, which iterates over the list, as the writer of its elements."""
     for writer in list_writers:
         if writer.constants is not None:
             elements = [
@@ -180,7 +180,7 @@ def _check_compared_constants(
         # `check_settings` reports a constant of the wrong type.
         if port is None or port.compared_with != wire.port.name or find_problem(value.value, port):
             continue
-        # A field without a bin contains "". `find_unknown_names` accepts this value if it is the default.
+        # A field such as `$item.bin` is "" if it names no bin; `find_unknown_names` accepts the default.
         expected = replace(port, type=writer.type, refers_to=writer.refers_to, default="")
         yield from find_unknown_names(context, wire.skill, expected, value)
         if not is_assignable(type(value.value), expected.type):

@@ -30,7 +30,7 @@ def find_shorthand_key(owner: type[KeyOwner]) -> Key | None:
     return next((key for key in owner.keys.values() if key.shorthand), None)
 
 
-def has_optional_body(node_class: type[KeyOwner]) -> bool:
+def is_value_optional(node_class: type[KeyOwner]) -> bool:
     """Return True if the keyword of a node may stand alone, without a value."""
     shorthand_key = find_shorthand_key(node_class)
     return shorthand_key is not None and not shorthand_key.is_required
@@ -81,8 +81,8 @@ def _read_inner_keys(
     """Return the values of the keys of `owner`; `yaml_node` is below the keyword `name`."""
     shorthand_key, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
     is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
-    # If the owner has inner keys, a mapping is read as these keys, never as a node in shorthand form.
-    # A scalar is read in the same way if a list is required, so that an error lists the allowed keys.
+    # If the owner has inner keys, a mapping contains these keys, and is no node in shorthand form. A scalar
+    # in place of a list is treated like a mapping, so that `MappingReader` reports it and lists the keys.
     is_scalar_for_list = is_list_required and isinstance(yaml_node, YamlScalar)
     reads_inner_keys = isinstance(yaml_node, YamlMapping) or is_scalar_for_list
     if shorthand_key is not None and not (reads_inner_keys and inner_keys):
@@ -127,9 +127,9 @@ def _read_value(parser: NodeParser, reader: MappingReader, key: Key, yaml_node: 
             parser.add_error(reader.span, "too-large", message)
             return None
         case KeyKind.REASONS:
-            return reader.read_failure_names(key.name)
+            return reader.read_reasons(key.name)
         case KeyKind.REASONS_OR_SECTIONS:
-            names = reader.read_failure_names(key.name, tuple(key.section.keys))
+            names = reader.read_reasons(key.name, tuple(key.section.keys))
             mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
             return *names, *(_read_section(parser, key, item, item.span) for item in mappings)
         case KeyKind.VARIABLE:

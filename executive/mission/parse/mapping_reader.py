@@ -82,7 +82,7 @@ class MappingReader:
         self.add_error(node.span, "wrong-type", message)
         return ""
 
-    def read_failure_names(self, key: str, section_keys: Sequence[str] = ()) -> tuple[LocatedReason, ...]:
+    def read_reasons(self, key: str, section_keys: Sequence[str] = ()) -> tuple[LocatedReason, ...]:
         """Return the failure names in the list or single value of `key`; add an error for invalid items.
 
         If the value may also contain sections with keys `section_keys`, mappings are ignored.
@@ -159,7 +159,7 @@ def read_settings(
 
 
 def read_value(node: YamlNode, findings: list[Finding]) -> Value:
-    """Return a reference for `$name` or `$name.field`, or a constant with `$` for `$$`."""
+    """Return a reference for `$name` or `$name.field`; otherwise a constant, with `$` in place of `$$`."""
     text = node.value if isinstance(node, YamlScalar) else None
     if isinstance(text, str) and (match := REFERENCE_PATTERN.fullmatch(text)):
         return Reference(match[1], node.span, match[2] or "")

@@ -14,7 +14,7 @@ from executive.mission.model.values import Literal, Reference
 from executive.mission.parse.control_node_parser import (
     find_inner_keys,
     find_sibling_keys,
-    has_optional_body,
+    is_value_optional,
     read_control_node,
 )
 from executive.mission.parse.mapping_reader import is_empty, read_settings
@@ -92,7 +92,7 @@ class NodeParser:
         """Return the mission node for a YAML scalar: a skill, or a keyword that needs no body."""
         word = scalar.text
         node_class = self._node_classes.get(word)
-        if node_class is not None and has_optional_body(node_class):
+        if node_class is not None and is_value_optional(node_class):
             return InnerNode(scalar.span, "", node_class, {})
         if word in self._keywords:
             self.add_error(scalar.span, "missing-node", f'"{word}" needs a body: write {word}: ...')

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from executive.mission.model import grammar
 from executive.mission.model.grammar import AllowedKeys, GrammarKey, GrammarKeys
-from executive.mission.parse.control_node_parser import find_inner_keys, find_shorthand_key, has_optional_body
+from executive.mission.parse.control_node_parser import find_inner_keys, find_shorthand_key, is_value_optional
 from executive.mission.parse.mapping_reader import NAME_PATTERN
 from executive.mission.parse.node_parser import Skills
 from executive.mission.parse.params import PARAM_TYPES
@@ -74,7 +74,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     nodes_without_body = [
         {"const": word, "title": word, "description": _get_first_line(node_class), **NO_ITEM_SUGGESTION}
         for word, node_class in node_classes.items()
-        if has_optional_body(node_class)
+        if is_value_optional(node_class)
     ]
     siblings: dict[str, Schema] = {grammar.USE_KEYWORD: _make_properties(grammar.USE_SIBLINGS)}
     requirements: dict[str, Schema] = {}

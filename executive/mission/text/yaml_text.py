@@ -21,7 +21,7 @@ from executive.mission.text.scalars import ScalarValue, convert_scalar
 _MAX_DEPTH = 50
 """Maximum depth of the nesting of lists and mappings."""
 _SURROGATE = re.compile("[\ud800-\udfff]")
-"""Half of a UTF-16 character, which an escape sequence can produce, but UTF-8 cannot encode."""
+"""Surrogate code point, which an escape sequence can produce, but UTF-8 cannot encode."""
 _MAX_NODE_COUNT = 20_000
 """Maximum number of keys and values; an alias counts like a copy of the anchored node."""
 _ADVICE_BY_MESSAGE = {
@@ -39,7 +39,7 @@ _DEPTH_MESSAGE = f"lists and mappings are nested more than {_MAX_DEPTH} levels d
 _FAST_LOADER: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """Parser of libyaml, which takes a quarter of the time; the Python parser if PyYAML lacks libyaml."""
 _LIBYAML_DIFFERENCE = re.compile(r"[^\n\x20-\x7e\xa1-\u1fff]|[?]|---|:\s*[,}\]]")
-"""Text that libyaml may read in another way than the Python parser, or at another position: tabs and other
+"""Text for which libyaml and the Python parser may disagree on a value or its position: tabs and other
 special characters, question marks, document markers, and keys without a value in brackets."""
 _LINE_LENGTH = 1000
 """Length of a span [characters] that reaches the end of the line."""

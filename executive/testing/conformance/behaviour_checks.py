@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any, get_args
 
-from executive.mission.check.conditions import list_effects
+from executive.mission.check.conditions import list_condition_violations
 from executive.mission.model.port_types import describe_type, find_element_type, is_assignable, is_union
 from executive.skill import ANY, EMPTY, HOLDING, Skill, ToolState
 from executive.testing.conformance.declaration_checks import HALT
@@ -141,7 +141,7 @@ def decides_without_effect(runs: SkillRuns) -> Iterator[str]:
     skill, name = runs.skill, runs.name
     if not skill.is_condition:
         return
-    for effect in list_effects(skill):
+    for effect in list_condition_violations(skill):
         yield f"{name} {effect}, and declares is_condition. Remove one of the two."
     calls = [call.name for test_run in runs.unhalted_runs for call in test_run.cell_calls]
     for call in dict.fromkeys(calls):
