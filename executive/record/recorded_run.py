@@ -52,11 +52,13 @@ class RecordOptions:
         views: Views of the run.
         starts_paused: True to pause the run before its first control step.
         saves_pictures: True to save pictures, and to keep the log of the simulated world for a film.
+        timeline: Timeline of the run, which receives the events first; None: one without history.
     """
 
     views: Sequence[View] = ()
     starts_paused: bool = False
     saves_pictures: bool = True
+    timeline: Timeline | None = None
 
 
 def record_run(
@@ -137,7 +139,7 @@ class RecordedRun:
     start_message: str = ""
 
     def __post_init__(self) -> None:
-        self._timeline = Timeline(has_history=False)
+        self._timeline = self.options.timeline or Timeline(has_history=False)
 
     def execute(self, seed: int, start_time: float) -> Result:
         """Execute the run, write and return its result; `start_time` is a `time.perf_counter()` value [s].

@@ -60,6 +60,7 @@ class ItemHistory:
     Attributes:
         last_change: Last event that changed the item.
         last_change_number: Sequence number of the item's last state change among those of all items.
+        state_change_time: Time of the item's last state change [s].
         state_at_tree_end: State of the item at the end of the tree; the ledger sets final states afterwards.
         sighting: Last look in which the item was detected, or None.
         unseen_look_count: Number of looks after `sighting`.
@@ -69,6 +70,7 @@ class ItemHistory:
 
     last_change: ItemChanged
     last_change_number: int = 0
+    state_change_time: float = 0.0
     state_at_tree_end: str = ""
     sighting: Sighting | None = None
     unseen_look_count: int = 0
@@ -105,6 +107,7 @@ class ItemsTimeline:
         if event.state != last_state:
             self._state_change_count += 1
             item.last_change_number = self._state_change_count
+            item.state_change_time = clock
             if event.state == "held":
                 item.pick_time = clock
             elif event.state == "dropped":

@@ -1,0 +1,114 @@
+"""Database of a sweep: one SQLite file with the settings, and the rows of each ended run."""
+
+from __future__ import annotations
+
+import contextlib
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+from executive.campaign.results.rows import ItemRow, PhaseRow, RunRecord, RunRow, SweepSettings
+from executive.campaign.results.tables import ITEMS, PHASES, RUNS, SETTINGS, RowT, Table
+from executive.errors import InputError
+
+FILE_NAME = "results.sqlite"
+"""Name of the database in the folder of a sweep."""
+SCHEMA_VERSION = 1
+"""Version of the tables, stored as `user_version` of the file."""
+LOCK_TIMEOUT = 60.0
+"""Maximum time for which a transaction waits for another program that reads the file [s]."""
+
+
+class ResultsDatabase:
+    """An open database; each run is stored in one transaction, and later readers see only complete runs.
+
+    The file has a rollback journal, because a write-ahead log would need two more files and shared memory,
+    which network file systems do not have.
+
+    Args:
+        path: The file.
+        settings: Settings of a new database, which is created; None: open an existing database.
+
+    Attributes:
+        path: The file.
+        settings: Settings of the sweep.
+
+    Raises:
+        InputError: The file is missing or no database of this version, or cannot be written.
+    """
+
+    def __init__(self, path: Path, settings: SweepSettings | None = None) -> None:
+        self.path = path
+        if settings is None and not path.is_file():
+            raise InputError(
+                f'there is no file "{path}"; name the file {FILE_NAME} of a sweep, or its folder'
+            )
+        with self._explain_errors():
+            self._connection = sqlite3.connect(path, timeout=LOCK_TIMEOUT)
+        try:
+            with self._explain_errors():
+                if settings is not None:
+                    self._create_tables(settings)
+                (version,) = self._connection.execute("PRAGMA user_version").fetchone()
+                if version != SCHEMA_VERSION:
+                    advice = f"this program reads version {SCHEMA_VERSION}; start a new sweep"
+                    raise InputError(f'"{path}" is no results of a sweep, or has version {version}; {advice}')
+                (self.settings,) = self._read(SETTINGS)
+        except BaseException:
+            self._connection.close()
+            raise
+
+    def append(self, record: RunRecord) -> None:
+        """Store the rows of a run in one transaction.
+
+        Raises:
+            InputError: The file cannot be written, or contains the run already.
+        """
+        with self._explain_errors(), self._connection as connection:
+            connection.execute(RUNS.insertion_sql, RUNS.encode(record.run))
+            connection.executemany(ITEMS.insertion_sql, map(ITEMS.encode, record.items))
+            connection.executemany(PHASES.insertion_sql, map(PHASES.encode, record.phases))
+
+    def read_runs(self) -> list[RunRow]:
+        """Return the rows of all stored runs, sorted by job."""
+        return self._read(RUNS)
+
+    def read_items(self) -> list[ItemRow]:
+        """Return the rows of all items, sorted by job."""
+        return self._read(ITEMS)
+
+    def read_phases(self) -> list[PhaseRow]:
+        """Return the rows of all phases, sorted by job."""
+        return self._read(PHASES)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._connection.close()
+
+    def _create_tables(self, settings: SweepSettings) -> None:
+        with self._connection as connection:
+            for table in (SETTINGS, RUNS, ITEMS, PHASES):
+                connection.execute(table.creation_sql)
+            connection.execute(SETTINGS.insertion_sql, SETTINGS.encode(settings))
+            connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+
+    def _read(self, table: Table[RowT]) -> list[RowT]:
+        with self._explain_errors(), closing(self._connection.execute(table.selection_sql)) as cursor:
+            return list(map(table.decode, cursor))
+
+    @contextlib.contextmanager
+    def _explain_errors(self) -> Iterator[None]:
+        """Convert an error of SQLite to an InputError with the path of the file."""
+        try:
+            yield
+        except sqlite3.Error as error:
+            advice = "the file contains all runs that ended before"
+            raise InputError(
+                f'the results "{self.path}" cannot be read or written: {error}; {advice}'
+            ) from error
+
+
+def find_database(path: Path) -> Path:
+    """Return the database at a path: the file itself, or the file in the folder of a sweep."""
+    return path / FILE_NAME if path.is_dir() else path

@@ -1,0 +1,145 @@
+"""Rows of the results of a sweep: one per run, one per item, and one per phase of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from pydantic import ConfigDict
+
+from executive.record.audit_comparison import Audit, ItemCounts
+from executive.record.timeline.timeline import PlanningTotals
+
+
+class Row:
+    """Base class of the rows; the docstrings of the fields are the comments of the columns."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(use_attribute_docstrings=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepSettings(Row):
+    """Settings of a sweep, from which its jobs are computed; the table has one row."""
+
+    mission: str
+    """Mission file, or name of a shipped mission."""
+    mission_name: str
+    """Name of the mission."""
+    cell: str
+    """Path of the cell file."""
+    overrides: Mapping[str, str]
+    """Values of `--set` by param or by `cell.<key>.<key>`; equal in all runs."""
+    variations: Mapping[str, tuple[str, ...]]
+    """Values of `--vary` by param or by `cell.<key>.<key>`; each combination is a variant."""
+    first_seed: int
+    """First seed of each variant."""
+    last_seed: int
+    """Last seed of each variant."""
+    scene: str | None
+    """Scene file; NULL: no change of the simulated world."""
+    saves_pictures: bool
+    """1 if the runs save the images on which decisions are based."""
+    inputs_hash: str
+    """Hash of mission, libraries, cell and scene; `--resume` requires equal inputs."""
+    versions: Mapping[str, str]
+    """Versions of this project, Python, the machine and the required packages."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunRow(Row):
+    """A run; all columns except `wall_time_s`, `run` and `crashes` are equal in a repetition of the run."""
+
+    job: int
+    """Index of the run in the sweep, from 0: variant by variant, and seed by seed."""
+    seed: int
+    """Random seed."""
+    variant: Mapping[str, str] = field(default_factory=dict)
+    """Values of the varied params and keys of the cell, by name."""
+    status: str
+    """Final status: SUCCESS, INCOMPLETE, FAILURE or FAULT."""
+    reason: str
+    """Reason of the failure, for instance `Transit.dropped`; "" on success."""
+    message: str
+    """Sentence that explains the status, or ""."""
+    node: str
+    """Path of the node that caused the status, or ""."""
+    items: ItemCounts = field(default_factory=ItemCounts)
+    """Number of items by final state, from the ledger."""
+    audit: Audit | None = None
+    """True places of the objects, and agreement with the ledger; NULL in a cell without ground truth."""
+    planning: PlanningTotals = field(default_factory=PlanningTotals)
+    """Number of planned motions, and time for which skills waited for plans [s]."""
+    ticks: int = 0
+    """Number of control steps."""
+    robot_time_s: float = 0.0
+    """Duration on the clock of the run [s]."""
+    wall_time_s: float = 0.0
+    """Duration on a wall clock [s]."""
+    trace: str = ""
+    """Hash of all decisions."""
+    run: str = ""
+    """Path of the run directory; "" if there is none."""
+    crashes: int = 0
+    """Number of worker processes that died during the run; after the first, the run was repeated."""
+
+    @property
+    def is_success(self) -> bool:
+        """True if the run succeeded."""
+        return self.status == "SUCCESS"
+
+    @property
+    def disagrees(self) -> bool:
+        """True if the audit contradicts the ledger."""
+        return self.audit is not None and not self.audit.agrees
+
+
+@dataclass(frozen=True, kw_only=True)
+class ItemRow(Row):
+    """An item of the ledger."""
+
+    job: int
+    """Index of the run."""
+    item: str
+    """Name of the item."""
+    label: str
+    """Class of the item."""
+    state: str
+    """Final state: placed, rejected, skipped, lost or phantom."""
+    bin: str
+    """Bin into which the item was placed, or ""."""
+    attempts: int
+    """Number of failed attempts to pick the item."""
+    robot_time_s: float
+    """Time from each selection as the target to the next selection or the end of the item [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhaseRow(Row):
+    """A phase of a run: all activations of one skill."""
+
+    job: int
+    """Index of the run."""
+    phase: str
+    """Name of the skill."""
+    activations: int
+    """Number of activations."""
+    failures: int
+    """Number of failed activations."""
+    robot_time_s: float
+    """Total duration of the activations [s]; the phases of parallel branches overlap."""
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """All rows of one run.
+
+    Attributes:
+        run: Row of the run.
+        items: Rows of the items, in the order of their detection.
+        phases: Rows of the phases, in the order of their first activation.
+    """
+
+    run: RunRow
+    items: tuple[ItemRow, ...] = ()
+    phases: tuple[PhaseRow, ...] = ()

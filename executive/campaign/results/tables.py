@@ -1,0 +1,126 @@
+"""Conversion between the rows of a sweep and the tables of SQLite, derived from the fields of the rows."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Generic, TypeAlias, TypeVar, get_args, get_type_hints
+
+from pydantic import TypeAdapter
+
+from executive.campaign.results.rows import ItemRow, PhaseRow, Row, RunRow, SweepSettings
+
+RowT = TypeVar("RowT", bound=Row)
+SqlValue: TypeAlias = str | int | float | None
+"""Value of a column; collections are stored as JSON."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Attributes:
+        path: Name of the field, and name of the field in this field if the latter is a dataclass.
+        sql_type: Type in SQLite.
+        is_json: True if the text is JSON, the value of a mapping or a sequence.
+        comment: Description of the field; of a nested dataclass, only the first column has the description.
+    """
+
+    path: tuple[str, ...]
+    sql_type: str
+    is_json: bool
+    comment: str
+
+    @property
+    def name(self) -> str:
+        """Name of the column, for instance `audit_right`."""
+        return "_".join(self.path)
+
+
+class Table(Generic[RowT]):
+    """A table with a column for each field of a class of rows, and for each field of a nested dataclass.
+
+    Args:
+        name: Name of the table.
+        row_class: Class of the rows.
+        key: Names of the columns of the primary key.
+
+    Attributes:
+        columns: The columns, in the order of the fields.
+    """
+
+    def __init__(self, name: str, row_class: type[RowT], *key: str) -> None:
+        self.name, self.columns = name, tuple(_list_columns(row_class))
+        self._key, self._comment = key, (row_class.__doc__ or "").strip()
+        self._adapter = TypeAdapter(row_class)
+
+    @property
+    def creation_sql(self) -> str:
+        """Statement that creates the table, with a comment for each column."""
+        lines = [
+            f"  {each.name} {each.sql_type},{each.comment and f' -- {each.comment}'}" for each in self.columns
+        ]
+        key = f"  PRIMARY KEY ({', '.join(self._key)})"
+        return "\n".join((f"CREATE TABLE {self.name} ( -- {self._comment}", *lines, key, ")"))
+
+    @property
+    def insertion_sql(self) -> str:
+        """Statement that inserts a row."""
+        return f"INSERT INTO {self.name} VALUES ({', '.join('?' * len(self.columns))})"
+
+    @property
+    def selection_sql(self) -> str:
+        """Statement that selects all rows, sorted by job and in the order of their insertion."""
+        return f"SELECT * FROM {self.name} ORDER BY {self._key[0]}, rowid"
+
+    def encode(self, row: RowT) -> tuple[SqlValue, ...]:
+        """Return the values of the columns."""
+        values = self._adapter.dump_python(row, mode="json")
+        return tuple(_get_value(values, column) for column in self.columns)
+
+    def decode(self, values: Sequence[SqlValue]) -> RowT:
+        """Return the row with these values of the columns."""
+        nested: dict[str, object] = {}
+        for column, value in zip(self.columns, values, strict=True):
+            first, *others = column.path
+            decoded = json.loads(value) if column.is_json and isinstance(value, str) else value
+            if not others:
+                nested[first] = decoded
+            elif value is None:
+                nested[first] = None
+            else:
+                inner = nested.setdefault(first, {})
+                assert isinstance(inner, dict)
+                inner[others[0]] = decoded
+        return self._adapter.validate_python(nested)
+
+
+def _list_columns(row_class: type) -> list[Column]:
+    """Return the columns for the fields of a dataclass."""
+    hints, columns = get_type_hints(row_class), []
+    properties = TypeAdapter(row_class).json_schema()["properties"]
+    for each in fields(row_class):
+        hint, comment = hints[each.name], properties[each.name].get("description", "")
+        types = [one for one in get_args(hint) or (hint,) if one is not type(None)]
+        if isinstance(types[0], type) and is_dataclass(types[0]):
+            inner = [replace(one, path=(each.name, *one.path)) for one in _list_columns(types[0])]
+            columns += [replace(inner[0], comment=comment), *inner[1:]]
+        else:
+            sql_type = {bool: "INTEGER", int: "INTEGER", float: "REAL"}.get(hint, "TEXT")
+            columns.append(Column((each.name,), sql_type, len(types) > 1, comment))
+    return columns
+
+
+def _get_value(values: Mapping[str, object], column: Column) -> SqlValue:
+    """Return the value of a column from the nested values of a row."""
+    value: object = values
+    for name in column.path:
+        value = value[name] if isinstance(value, Mapping) else None
+    return json.dumps(value, ensure_ascii=False) if column.is_json else value  # type: ignore[return-value]
+
+
+SETTINGS = Table("settings", SweepSettings, "mission")
+RUNS = Table("runs", RunRow, "job")
+ITEMS = Table("items", ItemRow, "job", "item")
+PHASES = Table("phases", PhaseRow, "job", "phase")

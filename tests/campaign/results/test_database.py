@@ -1,0 +1,104 @@
+"""The database of a sweep: its tables, its transactions, and its errors."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from executive.campaign.results.database import ResultsDatabase, find_database
+from executive.campaign.results.rows import ItemRow, PhaseRow, RunRecord, RunRow, SweepSettings
+from executive.errors import InputError
+from executive.record.audit_comparison import Audit, ItemCounts
+from executive.record.timeline.timeline import PlanningTotals
+
+SETTINGS = SweepSettings(
+    mission="sort.yaml", mission_name="sort", cell="cells/fruit.yaml", overrides={"attempts": "3"},
+    variations={"speed": ("1", "2")}, first_seed=0, last_seed=9, scene=None, saves_pictures=False,
+    inputs_hash="abc", versions={"python": "3.11"},
+)  # fmt: skip
+RUN = RunRow(
+    job=3, seed=3, variant={"speed": "1"}, status="FAILURE", reason="Grasp.missed", message="no “seal”",
+    node="tree/Grasp", items=ItemCounts(seen=2, placed=1, lost=1), audit=Audit(agrees=False, right=1),
+    planning=PlanningTotals(4, 2, 0.1), ticks=70, robot_time_s=0.1 + 0.2, wall_time_s=1.5, trace="f00",
+    run="runs/x", crashes=1,
+)  # fmt: skip
+ITEM = ItemRow(job=3, item="cube-1", label="cube", state="lost", bin="", attempts=2, robot_time_s=1 / 3)
+PHASE = PhaseRow(job=3, phase="Grasp", activations=3, failures=2, robot_time_s=2 / 3)
+RECORD = RunRecord(RUN, (ITEM,), (PHASE,))
+
+
+def test_all_rows_are_read_as_they_were_stored(tmp_path: Path) -> None:
+    path = tmp_path / "results.sqlite"
+    plain = RunRow(job=0, seed=0, status="SUCCESS", reason="", message="", node="")
+    with closing(ResultsDatabase(path, SETTINGS)) as database:
+        database.append(RECORD)
+        database.append(RunRecord(plain))
+    with closing(ResultsDatabase(find_database(tmp_path))) as database:
+        assert database.settings == SETTINGS
+        assert database.read_runs() == [plain, RUN]
+        assert (database.read_items(), database.read_phases()) == ([ITEM], [PHASE])
+    assert [path.name for path in tmp_path.iterdir()] == ["results.sqlite"], "one file contains everything"
+
+
+def test_the_schema_describes_every_table_and_column(tmp_path: Path) -> None:
+    ResultsDatabase(tmp_path / "a", SETTINGS).close()
+    with closing(sqlite3.connect(tmp_path / "a")) as connection:
+        (schema,) = connection.execute("SELECT sql FROM sqlite_master WHERE name = 'runs'").fetchone()
+        names = [row[1] for row in connection.execute("PRAGMA table_info(runs)")]
+    assert schema.startswith("CREATE TABLE runs ( -- A run; ")
+    assert "  robot_time_s REAL, -- Duration on the clock of the run [s].\n" in schema
+    assert "  audit_agrees INTEGER, -- True places of the objects, and agreement" in schema
+    assert {"job", "items_placed", "audit_right", "planning_waited_s", "crashes"} <= set(names)
+
+
+def test_a_run_is_stored_completely_or_not_at_all(tmp_path: Path) -> None:
+    with closing(ResultsDatabase(tmp_path / "a", SETTINGS)) as database:
+        with pytest.raises(
+            InputError, match=r"cannot be read or written: UNIQUE.* phases\.job, phases\.phase"
+        ):
+            database.append(replace(RECORD, phases=(PHASE, PHASE)))
+        assert (database.read_runs(), database.read_items()) == ([], [])
+        database.append(RECORD)
+        with pytest.raises(
+            InputError, match=r"UNIQUE constraint failed: runs\.job; the file contains all runs"
+        ):
+            database.append(RECORD)
+
+
+def test_a_killed_process_leaves_every_stored_run(tmp_path: Path) -> None:
+    script = f"""
+import os, signal
+from pathlib import Path
+from tests.campaign.results.test_database import RECORD, SETTINGS, ResultsDatabase
+ResultsDatabase(Path({str(tmp_path / "a")!r}), SETTINGS).append(RECORD)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+    root = Path(__file__).parents[3]
+    ended = subprocess.run([sys.executable, "-c", script], cwd=root, env={**os.environ, "PYTHONPATH": "."})
+    assert ended.returncode == -signal.SIGKILL
+    with closing(ResultsDatabase(tmp_path / "a")) as database:
+        assert database.read_runs() == [RUN]
+
+
+def test_another_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "text").write_text("no database, but a text of some length" * 9)
+    sqlite3.connect(tmp_path / "empty").close()
+    (tmp_path / "empty").touch()
+    for name, message in [
+        ("missing", r'there is no file ".*missing"; name the file results.sqlite of a sweep, or its folder'),
+        ("text", r'the results ".*text" cannot be read or written: file is not a database'),
+        (
+            "empty",
+            r'".*empty" is no results of a sweep, or has version 0; this program reads version 1; start',
+        ),
+    ]:
+        with pytest.raises(InputError, match=message):
+            ResultsDatabase(tmp_path / name)
