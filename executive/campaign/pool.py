@@ -7,7 +7,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from typing import TypeVar
@@ -20,6 +20,8 @@ JobResult = TypeVar("JobResult")
 
 MAX_HALT_DELAY = 0.1
 """Maximum time between a signal to this process and the signals to its workers [s]."""
+MAX_CRASHES = 2
+"""Number of worker processes that may die during a job before the job counts as failed."""
 
 
 def run_jobs(
@@ -29,19 +31,24 @@ def run_jobs(
     *,
     workers: int,
     progress: Callable[[int, int], None] = lambda *_: None,
+    on_result: Callable[[int, JobResult], None] = lambda *_: None,
+    on_crash: Callable[[int], None] = lambda _: None,
     on_halt: Callable[[], None] = lambda: None,
 ) -> list[JobResult | None]:
     """Execute all jobs in worker processes and return the results in the order of the jobs.
 
+    A worker process that dies is replaced, and its job is repeated until `MAX_CRASHES` processes have died.
     After Ctrl-C or SIGTERM no further job starts, and running jobs are halted; the result of an unfinished
     job is None. A second signal kills the processes immediately.
 
     Args:
         jobs: The jobs.
         run_job: Function that executes a job and returns its result.
-        make_failure: Function that returns the result after an exception or the death of a process.
+        make_failure: Function that returns the result after an exception or the death of the processes.
         workers: Number of processes.
         progress: Function that is called with the number of finished jobs and the number of all jobs.
+        on_result: Function that is called with the index and the result of each job as soon as it ends.
+        on_crash: Function that is called with the index of a job after the death of its process.
         on_halt: Function that is called after the first signal.
 
     Raises:
@@ -49,21 +56,22 @@ def run_jobs(
     """
     pending_indices = deque(range(len(jobs)))
     results: dict[int, JobResult] = {}
-    running_jobs: dict[Future[JobResult], int] = {}
-    pool, is_broken, is_halted, signal_event = WorkerPool(workers), False, False, threading.Event()
+    crash_counts: Counter[int] = Counter()
+    running_jobs: dict[Future[JobResult], tuple[int, WorkerPool]] = {}
+    # Each pool has one process, because the death of a process breaks all jobs of its pool.
+    idle_pools = [WorkerPool(1) for _ in range(min(workers, len(jobs)))]
+    is_halted, signal_event = False, threading.Event()
     try:
         with handle_signals(HALT_SIGNALS, lambda *_: signal_event.set()):
             while running_jobs or (pending_indices and not is_halted):
-                # The pool gets only jobs that can start at once, because queued jobs cannot be removed.
-                while pending_indices and len(running_jobs) < workers:
-                    if is_broken or is_halted or signal_event.is_set():
-                        break
-                    index = pending_indices[0]
+                while pending_indices and idle_pools and not is_halted and not signal_event.is_set():
+                    index, pool = pending_indices.popleft(), idle_pools.pop()
                     try:
-                        running_jobs[pool.submit(run_job, jobs[index])] = index
-                        pending_indices.popleft()
-                    except BrokenExecutor:  # A worker died after its last result was read.
-                        is_broken = True
+                        running_jobs[pool.submit(run_job, jobs[index])] = index, pool
+                    except BrokenExecutor:  # The process died after its last result was read.
+                        pool.shutdown()
+                        pending_indices.appendleft(index)
+                        idle_pools.append(WorkerPool(1))
                 ended_jobs, _ = wait(running_jobs, MAX_HALT_DELAY, FIRST_COMPLETED)
                 # Two signals within `MAX_HALT_DELAY` count as one signal: the command `timeout` sends two.
                 if signal_event.is_set():
@@ -76,17 +84,25 @@ def run_jobs(
                 if is_halted:
                     _halt_runs()
                 for future in ended_jobs:
-                    index, error = running_jobs.pop(future), future.exception()
-                    is_broken = is_broken or isinstance(error, BrokenExecutor)
-                    if is_halted and isinstance(error, BrokenExecutor):
-                        continue  # The signal also killed a worker.
+                    (index, pool), error = running_jobs.pop(future), future.exception()
+                    if isinstance(error, BrokenExecutor):
+                        pool.shutdown()
+                        pool = WorkerPool(1)
+                    idle_pools.append(pool)
+                    if isinstance(error, BrokenExecutor):
+                        if is_halted:
+                            continue  # The signal also killed a worker.
+                        crash_counts[index] += 1
+                        on_crash(index)
+                        if crash_counts[index] < MAX_CRASHES:
+                            pending_indices.appendleft(index)
+                            continue
                     results[index] = future.result() if error is None else make_failure(jobs[index], error)
+                    on_result(index, results[index])
                     progress(len(results), len(jobs))
-                if is_broken and not running_jobs:
-                    pool.shutdown()
-                    pool, is_broken = WorkerPool(workers), False
     finally:
-        pool.shutdown()
+        for pool in (*idle_pools, *(pool for _, pool in running_jobs.values())):
+            pool.shutdown()
     return list(map(results.get, range(len(jobs))))
 
 

@@ -26,7 +26,11 @@ from executive.processes import build_command
 
 MIN_PYTHON, MAX_PYTHON = (3, 10), (3, 11)
 """Oldest and newest Python version for which every required package has wheels."""
-EXTRAS = {"view": "watch a run in the browser", "train": "train a detector of your own"}
+EXTRAS = {
+    "view": "watch a run in the browser",
+    "export": "export the results of a sweep to Parquet",
+    "train": "train a detector of your own",
+}
 """Purpose of each extra of this project (an optional group of packages), by the name of the extra."""
 FRAME_COUNT = 5
 """Number of timed frames; the slower first frame of a process is not timed."""

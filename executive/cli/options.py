@@ -23,6 +23,28 @@ def _parse_overrides(ctx: click.Context, param: click.Parameter, values: tuple[s
     return overrides
 
 
+def _parse_variations(
+    ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
+) -> dict[str, tuple[str, ...]]:
+    """Return the values of options `--vary KEY=[VALUE, ...]` by key, each as text for `--set`."""
+    import yaml  # Imported here, because other commands start faster without it.
+
+    variations: dict[str, tuple[str, ...]] = {}
+    for key, text in _parse_overrides(ctx, param, values).items():
+        try:
+            nodes = yaml.compose(text, yaml.SafeLoader)
+        except yaml.YAMLError:
+            nodes = None
+        if not isinstance(nodes, yaml.SequenceNode) or not nodes.value:
+            message = f'"{key}={text}" is not of the form KEY=[VALUE, ...], for example attempts=[1, 3]'
+            raise click.BadParameter(message, ctx, param)
+        texts = tuple(text[node.start_mark.index : node.end_mark.index] for node in nodes.value)
+        if len(set(texts)) < len(texts):
+            raise click.BadParameter(f'"{key}={text}" contains a value twice', ctx, param)
+        variations[key] = texts
+    return variations
+
+
 class PathType(click.Path):
     """Path type that rejects broken links and empty paths; an empty path would mean the working directory."""
 
@@ -39,6 +61,8 @@ FILE = PathType(path_type=Path, dir_okay=False)
 """Type of an option with the path of a file."""
 FOLDER = PathType(path_type=Path, file_okay=False)
 """Type of an option with the path of a folder."""
+PATH = PathType(path_type=Path)
+"""Type of an option with the path of a file or a folder."""
 COUNT = click.IntRange(min=1)
 """Type of an option with a positive number."""
 MAX_SEED = 2**32 - 1
@@ -56,6 +80,10 @@ def check_usage(*errors: tuple[object, str]) -> None:
 overrides_option = click.option(
     "--set", "overrides", metavar="KEY=VALUE", multiple=True, callback=_parse_overrides,
     help="Set a param of the mission, or a key of the cell: cell.KEY.KEY=VALUE; repeatable.",
+)  # fmt: skip
+variations_option = click.option(
+    "--vary", "variations", metavar="KEY=[VALUE, ...]", multiple=True, callback=_parse_variations,
+    help="Run every seed with each of the values, named as in --set; repeatable: all combinations are run.",
 )  # fmt: skip
 runs_option = click.option("--runs", type=FOLDER, default=Path("runs"), help="Folder with run directories.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")

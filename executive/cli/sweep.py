@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import re
+from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -14,100 +15,112 @@ from executive.exit_codes import ExitCode
 
 
 def parse_seed_range(text: str) -> range:
-    """Return the seeds from A to B (inclusive) for the text `A-B`, or the seed A for the text `A`."""
-    match = re.fullmatch(r"(\d{1,10})(?:-(\d{1,10}))?", text)
+    """Return the seeds for `A:B` (without B), `A-B` (with B), or `A`."""
+    match = re.fullmatch(r"(\d{1,10})(?:([-:])(\d{1,10}))?", text)
     if match is None:
-        raise click.BadParameter(f'"{text}" is not a range of seeds, for example 0-99')
-    first, last = int(match[1]), int(match[2] or match[1])
+        raise click.BadParameter(f'"{text}" is not a range of seeds, for example 0:100 or 0-99')
+    first, last = int(match[1]), int(match[3] or match[1]) - (match[2] == ":")
     if last < first:
-        raise click.BadParameter(f'"{text}" contains no seed: {last} is less than {first}')
+        end = f"the end {match[3]} is excluded" if match[2] == ":" else f"{last} is less than {first}"
+        raise click.BadParameter(f'"{text}" contains no seed: {end}')
     if last > options.MAX_SEED:
         raise click.BadParameter(f'seed {last} in "{text}" is too large; the maximum is {options.MAX_SEED}')
     return range(first, last + 1)
 
 
 @click.command(name="sweep")
-@options.mission_argument
-@click.option("--seeds", type=parse_seed_range, metavar="A-B", required=True, help="First and last seed.")
+@click.argument("mission", metavar="MISSION", required=False)
+@click.option(
+    "--seeds", type=parse_seed_range, metavar="A:B",
+    help="Seeds from A to B; A:B excludes B, A-B includes B.",
+)  # fmt: skip
+@options.variations_option
+@click.option(
+    "--resume", type=options.PATH, metavar="SWEEP",
+    help="Execute the missing runs of an interrupted sweep: its folder, or its file results.sqlite.",
+)  # fmt: skip
 @options.workers_option
 @click.option("--frames", is_flag=True, help="Save the camera images on which decisions are based.")
 @options.overrides_option
 @options.scene_option
 @options.runs_option
+@click.option(
+    "--require", metavar="EXPR",
+    help='Exit with code 1 if the runs do not meet EXPR: "success>=0.99 and p95(robot_time_s)<20".',
+)  # fmt: skip
+@click.option("--junit", type=options.FILE, help="Write a report in the JUnit XML format to this file.")
+@click.option("--export", type=options.FOLDER, help="Write the tables of runs, items and phases as Parquet.")
 @options.json_option
+@click.pass_context
 def command(
-    mission: str, seeds: range, workers: int, frames: bool, overrides: dict[str, str],
-    scene: Path | None, runs: Path, as_json: bool,
+    ctx: click.Context, mission: str | None, seeds: range | None, variations: dict[str, tuple[str, ...]],
+    resume: Path | None, workers: int, frames: bool, overrides: dict[str, str], scene: Path | None,
+    runs: Path, require: str | None, junit: Path | None, export: Path | None, as_json: bool,
 ) -> int:  # fmt: skip
-    """Run a mission once for every seed, and summarize the runs.
+    """Run a mission once for every seed and variant, and summarize the runs.
 
-    MISSION is a file or the name of a shipped mission. Exit code 1 if a run did not succeed, or recorded
-    an object outcome that differs from the simulated world. Ctrl-C halts the current runs; then the results
-    of the complete runs are printed. A second Ctrl-C quits immediately.
+    MISSION is a file or the name of a shipped mission. The results are stored in results.sqlite in a folder
+    below --runs, which also contains the run directories. Only a run that did not succeed, or recorded an
+    object outcome that differs from the simulated world, gets a report; `executive report` writes the others.
+    Exit code 1 if --require is not met. Ctrl-C halts the current runs; then the results of the complete runs
+    are printed. A second Ctrl-C quits immediately.
     """
+    names = ("mission", "seeds", "variations", "frames", "overrides", "scene")
+    sources = map(ctx.get_parameter_source, names)
+    has_settings = any(source is not click.core.ParameterSource.DEFAULT for source in sources)
+    repeated_keys = ", ".join(variations.keys() & overrides.keys())
+    options.check_usage(
+        (
+            resume is None and (mission is None or seeds is None),
+            "give a MISSION and --seeds, or --resume SWEEP",
+        ),
+        (
+            resume is not None and has_settings,
+            "--resume takes mission, seeds and settings from the sweep; omit them",
+        ),
+        (repeated_keys, f"--set and --vary both give {repeated_keys}; omit one of them"),
+    )
     with keep_stdout_clean():
-        from executive.campaign.sweep import SweepJob, run_sweep, summarize_results
+        from executive.campaign.results.export import check_exporter, export_tables
+        from executive.campaign.results.junit import write_junit
+        from executive.campaign.results.requirement import list_unmet, parse_requirement
+        from executive.campaign.results.sweep_folder import create_sweep, open_sweep
+        from executive.campaign.results.sweep_summary import summarize_runs
+        from executive.campaign.sweep import list_jobs, make_repeat_command, run_sweep
         from executive.cell.json_values import to_json
         from executive.cli.progress import print_halt, show_progress
-        from executive.mission.load import load_mission
-        from executive.plugins import load_cell_kind, load_skills
-        from executive.record.run_directory import check_runs_folder
+        from executive.cli.sweep_tables import print_summary
 
-        # The mission and the folder are checked here, so that an error is not reported for every seed.
-        loaded_mission = load_mission(mission, load_skills(), overrides, load_cell_kind)
-        if scene is not None:
-            from executive.cells.sim.scene_file import load_scene
-
-            load_scene(scene, loaded_mission.cell_config)
-        check_runs_folder(runs)
-        with show_progress(mission) as progress:
-            jobs = [SweepJob(mission, seed, overrides, runs, frames, scene) for seed in seeds]
-            results = run_sweep(jobs, workers=workers, progress=progress, on_halt=print_halt)
-        summary = summarize_results(results, len(seeds))
-        click.echo(_describe_summary(summary), err=True)
+        comparisons = parse_requirement(require) if require else ()
+        if export is not None:
+            check_exporter()
+        if resume is not None:
+            database = open_sweep(resume)
+        else:
+            assert mission is not None and seeds is not None
+            database = create_sweep(mission, seeds, overrides, variations, scene, frames, runs)
+        with closing(database):
+            settings, folder = database.settings, database.path.parent
+            click.echo(f"results: {database.path}", err=True)
+            jobs = list_jobs(settings, folder)
+            stored = {run.job for run in database.read_runs()}
+            missing = [job for job in jobs if job.index not in stored]
+            with show_progress(settings.mission, print_lines=True, has_rate=True) as progress:
+                run_sweep(missing, database, workers=workers, progress=progress, on_halt=print_halt)
+            rows = database.read_runs()
+            repeat = functools.partial(make_repeat_command, settings)
+            summaries = summarize_runs(rows, database.read_phases(), repeat)
+            print_summary(summaries, len(jobs))
+            if junit is not None:
+                write_junit(junit, settings.mission_name, rows, repeat)
+            if export is not None:
+                export_tables(database, export)
+        unmet = list_unmet(comparisons, rows, summaries)
+        for message in unmet:
+            click.echo(message, err=True)
     if as_json:
-        settings = {"mission": mission, "seeds": [seeds[0], seeds[-1]], "scene": scene and str(scene)}
-        print_json({**settings, **summary, "results": to_json(results)})
-    has_problem = summary["succeeded"] < summary["runs"] or bool(summary["disagreements"])
-    return ExitCode.HALTED if summary["cut_off"] else int(has_problem)
-
-
-def _describe_summary(summary: dict[str, Any]) -> str:
-    """Return a text with the summary of a sweep."""
-    from executive.view.terminal.summary import describe_end
-
-    run_count, success_count = summary["runs"], summary["succeeded"]
-    headline = f"{success_count} of {run_count} runs succeeded"
-    if summary["cut_off"]:
-        successes = f"; {success_count} of them succeeded" if run_count else ""
-        headline = f"{run_count} of {summary['asked']} runs, halted{successes}"
-    if not run_count:
-        return headline
-    objects, robot, wall = summary["objects"], summary["robot_time_s"], summary["wall_time_s"]
-    lower_bound, upper_bound = objects["interval_95"]
-    lines = [
-        headline,
-        f"{objects['right']} of {objects['total']} objects correct: {objects['share']:.2%} "
-        f"(95 % interval {lower_bound:.2%} to {upper_bound:.2%})",
-        f"robot time {robot['median']:.1f} s (median; {robot['least']:.1f} to {robot['most']:.1f}), "
-        f"wall time {wall['median']:.1f} s ({wall['least']:.1f} to {wall['most']:.1f})",
-    ]
-    planning, time_per_object = summary["planning"], summary["robot_time_per_object_s"]
-    if time_per_object and planning["motions"]:
-        ahead_ratio = planning["ahead"] / planning["motions"]
-        planned_ahead = f"{ahead_ratio:.0%} of {planning['motions']} motions planned ahead"
-        waiting_time = f"{planning['waited_s']:.1f} s waited for planning"
-        lines.append(f"robot time per object {time_per_object:.2f} s; {planned_ahead}, {waiting_time}")
-    lines.append(f"ledger and audit disagree in {len(summary['disagreements'])} runs")
-    for entry in summary["disagreements"]:
-        ledger_text = ", ".join(f"{name} {count}" for name, count in entry["items"].items())
-        audit_text = ", ".join(f"{name} {count}" for name, count in entry["audit"].items())
-        lines.append(f"  seed {entry['seed']}: ledger: {ledger_text}; audit: {audit_text}; {entry['run']}")
-    if summary["failures"]:
-        lines.append(f"{len(summary['failures'])} runs did not succeed:")
-    keys = ("status", "reason", "node", "message")
-    for entry in summary["failures"]:
-        # `run` is empty if the process crashed or could not create a run directory.
-        directory_text = entry["run"] and f"; {entry['run']}"
-        lines.append(f"  seed {entry['seed']}: {describe_end(*map(entry.get, keys))}{directory_text}")
-    return "\n".join(lines)
+        print_json(to_json({
+            "settings": settings, "results": str(database.path), "asked": len(jobs),
+            "cut_off": len(rows) < len(jobs), "variants": summaries, "unmet": unmet, "runs": rows,
+        }))  # fmt: skip
+    return ExitCode.HALTED if len(rows) < len(jobs) else ExitCode(int(bool(unmet)))

@@ -8,7 +8,6 @@ import os
 from collections.abc import Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import yaml
 
@@ -55,17 +54,10 @@ class RunDirectory:
     def create(runs: Path, mission: str, seed: int, start_time: datetime) -> RunDirectory:
         """Make and return a directory below the folder `runs`, named after start time, mission and seed.
 
-        If this name exists already, the new directory gets the suffix `-2`, `-3`, ....
-
         Raises:
             InputError: The directory cannot be made.
         """
-        day = runs / start_time.strftime("%Y-%m-%d")
-        name = f"{start_time.strftime('%H-%M-%S')}_{mission}_s{seed}"
-        with convert_os_errors(f'make a run directory below "{runs}"'):
-            day.mkdir(parents=True, exist_ok=True)
-            path = _make_unique_folder(day, name)
-        return RunDirectory(path)
+        return RunDirectory(make_dated_folder(runs, f"{mission}_s{seed}", start_time))
 
     def save_inputs(
         self,
@@ -108,16 +100,18 @@ class RunDirectory:
         _update_latest_link(self.path.parents[1], self.path)
 
 
-def check_runs_folder(runs: Path) -> None:
-    """Make the folder `runs` if it does not exist, and check that a directory can be made in the folder.
+def make_dated_folder(runs: Path, name: str, start_time: datetime) -> Path:
+    """Make and return the folder `runs/<YYYY-MM-DD>/<HH-MM-SS>_<name>`.
+
+    If the folder exists already, the new folder gets the suffix `-2`, `-3`, ....
 
     Raises:
-        InputError: A directory cannot be made.
+        InputError: The folder cannot be made.
     """
+    day = runs / start_time.strftime("%Y-%m-%d")
     with convert_os_errors(f'make a run directory below "{runs}"'):
-        runs.mkdir(parents=True, exist_ok=True)
-        # A read-only file system is detected only when a directory is made.
-        TemporaryDirectory(prefix=".try-", dir=runs).cleanup()
+        day.mkdir(parents=True, exist_ok=True)
+        return _make_unique_folder(day, f"{start_time.strftime('%H-%M-%S')}_{name}")
 
 
 @contextlib.contextmanager

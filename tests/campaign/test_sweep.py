@@ -1,79 +1,101 @@
-"""Many seeds of one mission."""
+"""Many seeds and variants of one mission."""
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import time
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
 import pytest
 
-from executive.campaign.sweep import (
-    SweepJob,
-    compute_wilson_interval,
-    run_job,
-    run_sweep,
-    summarize_results,
-    summarize_values,
-)
+from executive.campaign.results.database import ResultsDatabase
+from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings
+from executive.campaign.results.run_record import make_record
+from executive.campaign.sweep import SweepJob, list_jobs, make_repeat_command, run_job, run_sweep
 from executive.errors import InputError
-from executive.record.audit_comparison import Audit, ItemCounts
-from executive.record.result import Result
-from executive.record.timeline.timeline import PlanningTotals
+from executive.mission.load import load_mission
+from executive.plugins import load_skills
+from executive.record.journal import read_journal
+from executive.record.recorded_run import record_run
+from executive.record.timeline.timeline import Timeline
+from executive.run.assembly import RunOptions
+
+SETTINGS = SweepSettings(
+    mission="sort", mission_name="sort", cell="c.yaml", overrides={"a": "1"}, variations={}, first_seed=0,
+    last_seed=3, scene=None, saves_pictures=False, inputs_hash="", versions={},
+)  # fmt: skip
 
 
-def result(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **more) -> Result:
-    fields = {
-        "mission": "sort", "status": status, "reason": "" if status == "SUCCESS" else "Grasp.missed",
-        "message": "", "node": "", "items": ItemCounts(seen=right + left, placed=right, rejected=left),
-        "audit": Audit(right=right, left=left), "planning": PlanningTotals(10, 8, 0.1),
-        "robot_time_s": 30.0 + seed, "wall_time_s": 6.0, "run": f"runs/{seed}",
-    }  # fmt: skip
-    return Result(seed=seed, **fields | more)
+def record(job: SweepJob, **values: object) -> RunRecord:
+    end = {"status": "SUCCESS", "reason": "", "message": "", "node": ""}
+    return RunRecord(RunRow(job=job.index, seed=job.seed, variant=job.variant, **end | values))
 
 
-def swept(seeds: range, work, **options) -> list:
+def swept(folder: Path, work: Callable[[SweepJob], RunRecord], count: int = 4, **options) -> list[RunRow]:
     """Sweep without a mission: `work` says what comes of it."""
-    jobs = [SweepJob("sort", seed, {"a": "1"}, Path("runs"), False) for seed in seeds]
-    with patch("executive.campaign.sweep.run_job", work):
-        return run_sweep(jobs, **options)
+    jobs = list_jobs(replace(SETTINGS, last_seed=count - 1), folder)
+    with (
+        patch("executive.campaign.sweep.run_job", work),
+        closing(ResultsDatabase(folder / "a", SETTINGS)) as database,
+    ):
+        run_sweep(jobs, database, **options)
+        return database.read_runs()
 
 
-def work(job: SweepJob) -> Result:
+def test_every_seed_is_run_with_every_combination() -> None:
+    settings = replace(SETTINGS, variations={"b": ("1", "2"), "c": ("x", "y")}, last_seed=1, scene="s.yaml")
+    jobs = list_jobs(settings, Path("folder"))
+    assert [(job.index, job.seed, "".join(job.variant.values())) for job in jobs] == [
+        (0, 0, "1x"), (1, 1, "1x"), (2, 0, "1y"), (3, 1, "1y"),
+        (4, 0, "2x"), (5, 1, "2x"), (6, 0, "2y"), (7, 1, "2y"),
+    ]  # fmt: skip
+    assert make_repeat_command(settings, record(jobs[3]).run) == (
+        "executive run sort --seed 1 --set a=1 --set b=1 --set c=y --scene s.yaml"
+    )
+
+
+def work(job: SweepJob) -> RunRecord:
     """Do a run in another process, in a way that the seed says."""
+    if job.seed == 2:
+        raise ValueError("seed two")
     if job.seed == 3:
-        raise ValueError("seed three")
-    if job.seed == 4:
-        raise InputError("there is no place for seed four")
-    return result(job.seed, ticks=os.getpid(), unknown_labels=dict(job.overrides))
+        raise InputError("there is no place for seed three")
+    return record(job, ticks=os.getpid(), message=job.settings.overrides["a"])
 
 
 @pytest.mark.slow
-def test_every_seed_is_run_once_in_another_process():
-    reported = []
-    results = swept(range(1, 5), work, progress=lambda done, total: reported.append((done, total)))
-    assert [entry.seed for entry in results] == [1, 2, 3, 4]
-    assert results[0].ticks != os.getpid()
-    assert results[0].unknown_labels == {"a": "1"}
-    assert (results[2].status, results[2].message) == ("FAULT", "ValueError: seed three")
-    assert (results[3].status, results[3].message) == ("FAULT", "there is no place for seed four")
-    assert results[2].planning == PlanningTotals()
+def test_every_seed_is_run_once_in_another_process(tmp_path: Path) -> None:
+    reported: list[tuple[int, int]] = []
+    rows = swept(tmp_path, work, progress=lambda done, total: reported.append((done, total)))
+    assert [row.seed for row in rows] == [0, 1, 2, 3]
+    assert rows[0].ticks != os.getpid()
+    assert rows[0].message == "1"
+    assert [(row.status, row.message, row.crashes) for row in rows[2:]] == [
+        ("FAULT", "ValueError: seed two", 0),
+        ("FAULT", "there is no place for seed three", 0),
+    ]
     assert reported == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
-def interrupt(job: SweepJob) -> Result:
+def interrupt(job: SweepJob) -> RunRecord:
     """Do a run during which somebody presses Ctrl-C."""
-    os.kill(os.getppid(), signal.SIGINT)
-    time.sleep(0.2)
-    return result(job.seed)
+    if job.seed == 1:
+        os.kill(os.getppid(), signal.SIGINT)
+        time.sleep(0.2)
+        return record(job, status="HALTED")
+    return record(job)
 
 
 @pytest.fixture
-def sigint():
+def sigint() -> Iterator[None]:
     """Hear SIGINT: what a shell runs in the background begins with it ignored."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
@@ -81,37 +103,33 @@ def sigint():
 
 
 @pytest.mark.slow
-def test_every_run_leaves_its_record_and_its_report(tmp_path):
-    few = {"cell.kind": "fake", "cell.table.objects": "[1, 1]"}
-    result = run_job(SweepJob("sort_fruit", 3, few, tmp_path, saves_pictures=False))
-    assert result.status == "SUCCESS"
-    assert (Path(result.run) / "report.html").is_file()
-
-
-@pytest.mark.slow
 @pytest.mark.usefixtures("sigint")
-def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
-    reported = []
-    results = swept(range(9), interrupt, workers=1, on_halt=lambda: reported.append("halting"))
-    assert ([entry.seed for entry in results], reported) == ([0], ["halting"])
+def test_after_ctrl_c_no_further_run_begins_and_halted_runs_are_not_stored(tmp_path: Path) -> None:
+    reported: list[str] = []
+    rows = swept(tmp_path, interrupt, workers=1, on_halt=lambda: reported.append("halting"))
+    assert ([row.seed for row in rows], reported) == ([0], ["halting"])
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def die(job: SweepJob) -> Result:
-    """Take the process down with the run, if the seed says so."""
-    if job.seed == 0:
+def die(job: SweepJob) -> RunRecord:
+    """Take the process down with the run of seed 0 always, and of seed 1 the first time."""
+    mark = job.runs_folder / "died"
+    if job.seed == 0 or (job.seed == 1 and not mark.exists()):
+        mark.touch() if job.seed == 1 else None
         os._exit(1)
-    return result(job.seed)
+    return record(job)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_run_that_takes_its_process_down_costs_only_what_runs_beside_it(workers):
-    results = swept(range(4), die, workers=workers)
-    assert [entry.seed for entry in results] == [0, 1, 2, 3]
-    lost = [entry for entry in results if entry.status != "SUCCESS"]
-    assert lost[0].seed == 0 and len(lost) <= workers
-    assert all("BrokenProcessPool" in entry.message for entry in lost)
+def test_a_run_that_takes_its_process_down_is_repeated_once_and_costs_no_other_run(
+    workers: int, tmp_path: Path
+) -> None:
+    rows = swept(tmp_path, die, workers=workers)
+    assert [(row.seed, row.status, row.crashes) for row in rows] == [
+        (0, "FAULT", 2), (1, "SUCCESS", 1), (2, "SUCCESS", 0), (3, "SUCCESS", 0),
+    ]  # fmt: skip
+    assert "BrokenProcessPool" in rows[0].message
 
 
 class Torn:
@@ -124,45 +142,44 @@ class Torn:
         pass
 
 
-def test_a_pool_found_broken_is_replaced_and_no_run_is_lost(monkeypatch):
+def test_a_pool_found_broken_is_replaced_and_no_run_is_lost(monkeypatch, tmp_path: Path) -> None:
     pools = iter([Torn(), ThreadPoolExecutor(1)])
     monkeypatch.setattr("executive.campaign.pool.WorkerPool", lambda count: next(pools))
-    results = swept(range(2), lambda job: result(job.seed), workers=1)
-    assert [entry.status for entry in results] == ["SUCCESS", "SUCCESS"]
+    monkeypatch.setattr(ResultsDatabase, "append", lambda self, record: stored.append(record.run.status))
+    stored: list[str] = []
+    swept(tmp_path, record, count=2, workers=1)
+    assert stored == ["SUCCESS", "SUCCESS"]
 
 
-def test_the_summary_counts_objects_and_lists_what_went_wrong():
-    wrong = result(2, right=3, audit=Audit(agrees=False, right=2, wrong_bin=1))
-    figures = summarize_results([result(0), result(1, "FAILURE", right=3, left=1), wrong], requested_count=3)
-    assert (figures["asked"], figures["cut_off"]) == (3, False)
-    assert (figures["runs"], figures["succeeded"]) == (3, 2)
-    assert (figures["objects"]["right"], figures["objects"]["total"]) == (9, 11)
-    assert [entry["seed"] for entry in figures["disagreements"]] == [2]
-    assert [(entry["seed"], entry["reason"]) for entry in figures["failures"]] == [(1, "Grasp.missed")]
-    assert figures["robot_time_s"] == {"least": 30.0, "median": 31.0, "mean": 31.0, "most": 32.0}
-    assert figures["robot_time_per_object_s"] == round(93.0 / 9, 3)
-    assert figures["planning"] == {"motions": 30, "ahead": 24, "waited_s": 0.3}
+def test_runs_of_a_worker_are_equal_to_single_runs(tmp_path: Path) -> None:
+    variations = {"cell.table.objects": ("[1, 1]", "[2, 2]")}
+    settings = replace(SETTINGS, mission="sort_fruit", overrides={}, variations=variations)
+    jobs = list_jobs(settings, tmp_path)
+    # The same process runs all jobs, as a worker does.
+    for job in (jobs[0], jobs[5], jobs[1]):
+        found = run_job(job)
+        loaded = load_mission("sort_fruit", load_skills(), job.variant)
+        single = record_run(loaded, load_skills(), RunOptions(job.seed), tmp_path / "single")
+        expected = make_record(
+            job.index,
+            job.variant,
+            single,
+            Timeline.from_events(read_journal(Path(single.run) / "journal.jsonl")),
+        )
+        same_run = replace(expected.run, wall_time_s=found.run.wall_time_s, run=found.run.run)
+        assert found == replace(expected, run=same_run)
+        assert found.run.trace == json.loads((Path(found.run.run) / "result.json").read_text())["trace"] != ""
 
 
-def test_runs_that_were_halted_or_never_began_make_it_cut_off_and_count_in_nothing_else():
-    whole, halted = result(0), result(1, "HALTED", right=1, left=3)
-    figures = summarize_results([whole, halted], requested_count=6)
-    assert (figures["asked"], figures["cut_off"]) == (6, True)
-    assert summarize_results([whole], requested_count=1) == {**figures, "asked": 1, "cut_off": False}
-    # Without an audit no object counts.
-    figures = summarize_results([result(0, audit=None)], requested_count=1)
-    assert (figures["objects"]["total"], figures["disagreements"]) == (0, [])
-    assert figures["robot_time_per_object_s"] is None
-
-
-@pytest.mark.parametrize(
-    ("successes", "total", "low", "high"),
-    # Newcombe, Statistics in Medicine 17 (1998), table I, method 3.
-    [(81, 263, 0.2553, 0.3662), (0, 20, 0.0, 0.1611), (0, 0, 0.0, 1.0)],
-)
-def test_the_interval_is_the_published_one(successes, total, low, high):
-    assert compute_wilson_interval(successes, total) == pytest.approx((low, high), abs=5e-5)
-
-
-def test_the_spread_of_nothing_is_zero():
-    assert summarize_values([]) == {"least": 0.0, "median": 0.0, "mean": 0.0, "most": 0.0}
+@pytest.mark.slow
+def test_only_a_run_with_a_problem_has_a_report(tmp_path: Path) -> None:
+    mission = tmp_path / "look.yaml"
+    mission.write_text(
+        "mission: look\ndescription: Look.\ncell: cells/overhead.yaml\n"
+        "routes: {cube: red_bin}\ntree: [MoveToScan, Detect, Localize, SelectTarget]\n"
+    )
+    overrides = {"cell.table.objects": "[0, 0]", "cell.kind": "fake"}
+    for name, has_report in (("sort_fruit", False), (str(mission), True)):
+        settings = replace(SETTINGS, mission=name, overrides=overrides)
+        run = run_job(list_jobs(settings, tmp_path)[0]).run
+        assert (run.has_problem, (Path(run.run) / "report.html").is_file()) == (has_report, has_report), run

@@ -185,7 +185,22 @@ def test_help_names_every_command_and_every_exit_code():
             "--paused needs --view or a keyboard in a terminal to continue the run",
         ),
         ("sweep sort --seeds 3-1", '"3-1" contains no seed: 1 is less than 3'),
-        ("sweep sort --seeds a-b", '"a-b" is not a range of seeds, for example 0-99'),
+        ("sweep sort --seeds a-b", '"a-b" is not a range of seeds, for example 0:100 or 0-99'),
+        ("sweep sort --seeds 3:3", '"3:3" contains no seed: the end 3 is excluded'),
+        ("sweep sort", "give a MISSION and --seeds, or --resume SWEEP"),
+        ("sweep sort --resume x", "--resume takes mission, seeds and settings from the sweep; omit them"),
+        (
+            "sweep --resume x --set a=1",
+            "--resume takes mission, seeds and settings from the sweep; omit them",
+        ),
+        ("sweep sort --seeds 3 --set a=1 --vary a=[1]", "--set and --vary both give a; omit one of them"),
+        (
+            "sweep sort --seeds 3 --vary a=1",
+            '"a=1" is not of the form KEY=[VALUE, ...], for example attempts',
+        ),
+        ("sweep sort --seeds 3 --vary a=[1,1]", '"a=[1,1]" contains a value twice'),
+        ("sweep sort --seeds 3 --require succes>1", 'there is no metric "succes"; the metrics are success,'),
+        ("sweep --resume nowhere", 'there is no file "nowhere"; name the file results.sqlite of a sweep, or'),
         (
             f"sweep sort --seeds {2**32}",
             'seed 4294967296 in "4294967296" is too large; the maximum is 4294967295',
@@ -278,41 +293,3 @@ def test_a_warning_is_printed_and_the_run_continues(project):
     assert (checked.exit_code, ran.exit_code) == (0, 0)
     assert "sort.yaml:3:5: warning[unused]: no skill reads it" in checked.stdout
     assert "warning[unused]" in ran.stderr
-
-
-@pytest.mark.parametrize(
-    ("statuses", "asked", "code", "expected"),
-    [
-        (["SUCCESS"], 1, 0, "1 of 1 runs succeeded\n"),
-        (["SUCCESS", "FAILURE"], 2, 1, "1 of 2 runs succeeded\n"),
-        (["SUCCESS", "FAILURE"], 6, 130, "2 of 6 runs, halted; 1 of them succeeded\n"),
-        (["SUCCESS", "HALTED"], 6, 130, "1 of 6 runs, halted; 1 of them succeeded\n"),
-        ([], 6, 130, "0 of 6 runs, halted\n"),
-    ],
-)
-def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, tmp_path, statuses, asked, code, expected):
-    results = [replace(RESULT, seed=seed, status=status) for seed, status in enumerate(statuses)]
-    monkeypatch.setattr("executive.campaign.sweep.run_sweep", lambda *args, **options: results)
-    shown = invoke("sweep", "sort", "--seeds", f"0-{asked - 1}", "--json", "--runs", str(tmp_path))
-    assert shown.exit_code == code
-    assert expected in shown.stderr
-    figures = json.loads(shown.stdout)
-    assert (figures["asked"], figures["cut_off"], figures["results"]) == (
-        asked,
-        code == 130,
-        to_json(results),
-    )
-
-
-def test_a_sweep_tells_of_a_run_without_a_directory_and_of_no_place_for_any(project, monkeypatch, tmp_path):
-    broken = replace(RESULT, status="FAULT", reason="fault", message="it broke", run="")
-    monkeypatch.setattr("executive.campaign.sweep.run_sweep", lambda *args, **options: [broken, RESULT])
-    shown = invoke("sweep", "sort", "--seeds", "7-8", "--runs", str(tmp_path))
-    assert "1 runs did not succeed:\n  seed 7: FAULT: it broke\n" in shown.stderr
-    (tmp_path / "file").touch()
-    shown = invoke("sweep", "sort", "--seeds", "0-9", "--runs", str(tmp_path / "file" / "runs"))
-    assert (shown.exit_code, shown.stderr) == (
-        2,
-        f'cannot make a run directory below "{tmp_path}/file/runs": not a directory; '
-        "name another folder with --runs DIR\n",
-    )

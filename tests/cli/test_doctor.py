@@ -24,7 +24,13 @@ INSTALLED = {
     "executive": "1.0", "pybullet": "3.2", "av": "14.0", "viser": "1.1", "aiohttp": "3.11",
     "opencv-python-headless": "4.12", "opencv-python": "5.0",
 }  # fmt: skip
-NEEDED = {"": ("pybullet", "av"), "view": ("viser", "aiohttp"), "train": ("torch", "onnx")}
+NEEDED = {
+    "": ("pybullet", "av"), "view": ("viser", "aiohttp"), "export": ("pyarrow",), "train": ("torch", "onnx"),
+}  # fmt: skip
+EXPORT = (
+    "note export: not installed: pyarrow; to export the results of a sweep to Parquet, "
+    "run `uv sync --extra export`"
+)
 TORCH = "note train: not installed: torch, onnx; to train a detector of your own, run `uv sync --extra train`"
 VIEW = "ok view: viser 1.1, aiohttp 3.11"
 FILM = "ok film: av 14.0 encodes videos; the program ffmpeg is not needed"
@@ -79,9 +85,13 @@ MISSING = [f"problem packages: {name} is missing; run `uv sync`" for name in ("e
 @pytest.mark.parametrize(
     ("missing", "opencv", "expected"),
     [
-        ((), ["opencv-python-headless"] * 2, [NEEDED_ARE_THERE, ONE_CV2, VIEW, TORCH, FILM]),
-        (("executive", "pybullet", "av", "aiohttp"), [], [*MISSING, NO_VIEW, TORCH]),
-        ((), ["opencv-python-headless", "opencv-python"], [NEEDED_ARE_THERE, TWO_CV2, VIEW, TORCH, FILM]),
+        ((), ["opencv-python-headless"] * 2, [NEEDED_ARE_THERE, ONE_CV2, VIEW, EXPORT, TORCH, FILM]),
+        (("executive", "pybullet", "av", "aiohttp"), [], [*MISSING, NO_VIEW, EXPORT, TORCH]),
+        (
+            (),
+            ["opencv-python-headless", "opencv-python"],
+            [NEEDED_ARE_THERE, TWO_CV2, VIEW, EXPORT, TORCH, FILM],
+        ),
     ],
 )
 def test_packages(monkeypatch, missing, opencv, expected):
@@ -233,10 +243,10 @@ def test_everything_is_examined_whatever_fails(monkeypatch):
     monkeypatch.setattr(doctor, "measure_frame_time", lambda renderer: (9.0, ""))
     found = shown(doctor.run_checks())
     assert [line.split(": ")[0].split(" ")[1] for line in found] == [
-        "python", "display", "packages", "opencv", "view", "train", "film",
+        "python", "display", "packages", "opencv", "view", "export", "train", "film",
         "plugins", "renderer", "egl", "roboflow",
     ]  # fmt: skip
-    assert found[7] == "problem plugins: the skill is broken; correct it"
+    assert found[8] == "problem plugins: the skill is broken; correct it"
     assert found[-1].startswith(
         "problem roboflow: cannot be checked: import of executive.perception.detectors.r"
     )

@@ -68,7 +68,7 @@ def test_the_run_directory_has_a_copy_from_which_the_run_is_repeated_and_replaye
 def test_a_sweep_runs_every_seed_in_the_scene(sort: str, scene: Path, tmp_path: Path) -> None:
     words = ("--seeds", "1-2", "--workers", "1", "--scene", str(scene), "--runs", str(tmp_path), "--json")
     done = invoke("sweep", sort, *words)
-    assert [each["audit"]["left"] for each in json.loads(done.stdout)["results"]] == [1, 1]
+    assert [each["audit"]["left"] for each in json.loads(done.stdout)["runs"]] == [1, 1]
 
 
 @pytest.mark.parametrize("command", ["run sort_fruit", "sweep sort_fruit --seeds 0-3"])

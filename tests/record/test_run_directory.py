@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from executive.errors import InputError
-from executive.record.run_directory import RunDirectory, check_runs_folder, convert_os_errors
+from executive.record.run_directory import RunDirectory, convert_os_errors
 
 STARTED = datetime(2026, 11, 21, 3, 15, 42)
 
@@ -40,7 +40,6 @@ def test_latest_points_to_the_last_run_and_survives_moving_the_folder(tmp_path):
 def test_what_repeats_a_run_is_on_the_disk_and_libraries_lie_where_the_mission_looks(tmp_path, monkeypatch):
     synced = []
     monkeypatch.setattr(os, "fsync", lambda file: synced.append(os.fstat(file).st_ino))
-    check_runs_folder(tmp_path)
     directory = create(tmp_path)
     libraries = {"library/sorting.yaml": "library: sorting\n", "own.yaml": "library: own\n"}
     directory.save_inputs(
@@ -52,11 +51,10 @@ def test_what_repeats_a_run_is_on_the_disk_and_libraries_lie_where_the_mission_l
     assert synced == [(directory.path / name).stat().st_ino for name in (*left, "cell.yaml")]
 
 
-@pytest.mark.parametrize("make", [create, check_runs_folder])
-def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path, make):
+def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError) as raised:
-        make(tmp_path / "file" / "runs")
+        create(tmp_path / "file" / "runs")
     assert str(raised.value) == (
         f'cannot make a run directory below "{tmp_path}/file/runs": not a directory; '
         "name another folder with --runs DIR"

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
 from typing import ClassVar
 
 from pydantic import ConfigDict
 
-from executive.record.audit_comparison import Audit, ItemCounts
+from executive.record.audit_comparison import Audit, ItemCounts, describe_disagreement
 from executive.record.timeline.timeline import PlanningTotals
 
 
@@ -44,6 +46,17 @@ class SweepSettings(Row):
     """Hash of mission, libraries, cell and scene; `--resume` requires equal inputs."""
     versions: Mapping[str, str]
     """Versions of this project, Python, the machine and the required packages."""
+
+    @property
+    def scene_path(self) -> Path | None:
+        """Path of the scene file, or None."""
+        return None if self.scene is None else Path(self.scene)
+
+    @property
+    def variants(self) -> list[dict[str, str]]:
+        """Each combination of the varied values by name; one empty combination if no value is varied."""
+        names = self.variations
+        return [dict(zip(names, values, strict=True)) for values in product(*names.values())]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,9 +102,14 @@ class RunRow(Row):
         return self.status == "SUCCESS"
 
     @property
-    def disagrees(self) -> bool:
-        """True if the audit contradicts the ledger."""
-        return self.audit is not None and not self.audit.agrees
+    def disagreement(self) -> str:
+        """Message with the counts of audit and ledger if they disagree, else ""."""
+        return describe_disagreement(self.audit, self.items)
+
+    @property
+    def has_problem(self) -> bool:
+        """True if the run did not succeed, or the audit contradicts the ledger."""
+        return not self.is_success or self.disagreement != ""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -117,7 +117,10 @@ def _get_value(values: Mapping[str, object], column: Column) -> SqlValue:
     value: object = values
     for name in column.path:
         value = value[name] if isinstance(value, Mapping) else None
-    return json.dumps(value, ensure_ascii=False) if column.is_json else value  # type: ignore[return-value]
+    if column.is_json:
+        return json.dumps(value, ensure_ascii=False)
+    # SQLite and Parquet have no truth values of their own.
+    return int(value) if isinstance(value, bool) else value  # type: ignore[return-value]
 
 
 SETTINGS = Table("settings", SweepSettings, "mission")

@@ -1,0 +1,52 @@
+"""Export of the tables of a sweep to Parquet files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from executive.campaign.results.database import ResultsDatabase
+from executive.campaign.results.tables import ITEMS, PHASES, RUNS, RowT, Table
+from executive.errors import InputError
+from executive.record.run_directory import convert_os_errors
+
+
+def check_exporter() -> None:
+    """Check that the package that writes Parquet files is installed.
+
+    Raises:
+        InputError: The package is not installed.
+    """
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError as error:
+        raise InputError(
+            "--export needs pyarrow; install the extra: uv sync --extra export, "
+            'or pip install "executive[export]"'
+        ) from error
+
+
+def export_tables(database: ResultsDatabase, folder: Path) -> None:
+    """Write the files `runs.parquet`, `items.parquet` and `phases.parquet` into a folder.
+
+    Raises:
+        InputError: A file cannot be written.
+    """
+    with convert_os_errors(f'write the tables to "{folder}"', "name another folder with --export DIR"):
+        folder.mkdir(parents=True, exist_ok=True)
+        _write(RUNS, database.read_runs(), folder)
+        _write(ITEMS, database.read_items(), folder)
+        _write(PHASES, database.read_phases(), folder)
+
+
+def _write(table: Table[RowT], rows: list[RowT], folder: Path) -> None:
+    """Write a table to a file."""
+    import pyarrow
+    from pyarrow import parquet
+
+    types = {"INTEGER": pyarrow.int64(), "REAL": pyarrow.float64(), "TEXT": pyarrow.string()}
+    columns = zip(*map(table.encode, rows), strict=True) if rows else [()] * len(table.columns)
+    arrays = {
+        column.name: pyarrow.array(values, types[column.sql_type])
+        for column, values in zip(table.columns, columns, strict=True)
+    }
+    parquet.write_table(pyarrow.table(arrays), folder / f"{table.name}.parquet")

@@ -1,0 +1,66 @@
+"""Confidence intervals: Wilson intervals of proportions, and bootstrap intervals of ratios."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+RESAMPLE_COUNT = 2000
+"""Number of bootstrap resamples."""
+BOOTSTRAP_SEED = 0
+"""Seed of the bootstrap resamples, so that a summary can be repeated exactly."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its 95 % confidence interval.
+
+    Attributes:
+        value: The value; None without data.
+        low, high: Limits of the interval; None if the data do not suffice.
+    """
+
+    value: float | None = None
+    low: float | None = None
+    high: float | None = None
+
+
+def estimate_share(successes: int, total: int) -> Estimate:
+    """Return the proportion successes / total with its Wilson score interval."""
+    if total == 0:
+        return Estimate()
+    from scipy.stats import binomtest  # Imported here, because workers do not need the import of 0.5 s.
+
+    interval = binomtest(successes, total).proportion_ci(method="wilson")
+    return Estimate(successes / total, float(interval.low), float(interval.high))
+
+
+def estimate_ratio(numerators: Sequence[float], denominators: Sequence[float]) -> Estimate:
+    """Return the ratio of two sums over runs, with its percentile bootstrap interval over the runs.
+
+    The ratio of a single run has no interval.
+    """
+    if not sum(denominators):
+        return Estimate()
+    ratio = sum(numerators) / sum(denominators)
+    if len(numerators) < 2:
+        return Estimate(ratio)
+    from scipy.stats import bootstrap
+
+    def compute_ratio(
+        tops: NDArray[np.float64], bottoms: NDArray[np.float64], axis: int
+    ) -> NDArray[np.float64]:
+        return tops.sum(axis) / bottoms.sum(axis)
+
+    data = (np.asarray(numerators, float), np.asarray(denominators, float))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Equal runs have an interval of length 0.
+        interval = bootstrap(
+            data, compute_ratio, paired=True, vectorized=True, n_resamples=RESAMPLE_COUNT, batch=100,
+            method="percentile", rng=np.random.default_rng(BOOTSTRAP_SEED),
+        ).confidence_interval  # fmt: skip
+    return Estimate(ratio, float(interval.low), float(interval.high))

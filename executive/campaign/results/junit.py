@@ -1,0 +1,62 @@
+"""Report of a sweep in the JUnit XML format, for servers of continuous integration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+from executive.campaign.results.rows import RunRow
+from executive.campaign.results.sweep_summary import RepeatCommand
+from executive.record.atomic_file import write_atomically
+from executive.record.run_directory import convert_os_errors
+from executive.view.text import replace_invalid_xml_characters
+
+
+def write_junit(path: Path, mission: str, runs: Sequence[RunRow], make_repeat_command: RepeatCommand) -> None:
+    """Write the report of a sweep of a mission.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    with convert_os_errors(f'write the report "{path}"', "name another file with --junit FILE"):
+        write_atomically(path, format_junit(mission, runs, make_repeat_command))
+
+
+def format_junit(mission: str, runs: Sequence[RunRow], make_repeat_command: RepeatCommand) -> str:
+    """Return the report: a test case per run, with the reason of a failure and the command that repeats it.
+
+    A run with status FAULT is an error; a run that did not succeed otherwise, or whose ledger the audit
+    contradicts, is a failure.
+    """
+    cases = [_make_case(mission, run, make_repeat_command(run)) for run in runs]
+    suite = ElementTree.Element(
+        "testsuite",
+        name=f"executive sweep {mission}",
+        tests=str(len(cases)),
+        failures=str(sum(case.find("failure") is not None for case in cases)),
+        errors=str(sum(case.find("error") is not None for case in cases)),
+        time=f"{sum(run.wall_time_s for run in runs):.3f}",
+    )
+    suite.extend(cases)
+    root = ElementTree.Element("testsuites")
+    root.append(suite)
+    ElementTree.indent(root)
+    text = ElementTree.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{replace_invalid_xml_characters(text)}\n'
+
+
+def _make_case(mission: str, run: RunRow, repeat_command: str) -> ElementTree.Element:
+    """Return the test case of a run."""
+    name = " ".join((f"seed {run.seed}", *(f"{key}={value}" for key, value in run.variant.items())))
+    case = ElementTree.Element("testcase", classname=mission, name=name, time=f"{run.wall_time_s:.3f}")
+    if run.has_problem:
+        tag = "error" if run.status == "FAULT" else "failure"
+        reason = "disagreement" if run.is_success else run.reason or run.status
+        message = run.message or run.disagreement or run.status
+        problem = ElementTree.SubElement(case, tag, type=reason, message=message)
+        problem.text = "\n".join(
+            filter(None, (f"{run.status} {reason} {run.node}".strip(), message, run.run))
+        )
+    ElementTree.SubElement(case, "system-out").text = repeat_command
+    return case

@@ -1,0 +1,121 @@
+"""Requirement on the results of a sweep, for instance `success>=0.99 and p95(robot_time_s)<20`."""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from executive.campaign.results.rows import RunRow
+from executive.campaign.results.sweep_summary import VariantSummary
+from executive.campaign.results.tables import RUNS
+from executive.errors import InputError
+
+METRICS: Mapping[str, Callable[[VariantSummary], float | None]] = {
+    "success": lambda summary: summary.success.value,
+    "agreement": lambda summary: summary.agreement.value,
+    "objects_per_hour": lambda summary: summary.objects_per_hour.value,
+}
+"""Metrics without a column, by name."""
+PERCENTILES: Mapping[str, float] = {"min": 0, "median": 50, "p50": 50, "p95": 95, "p99": 99, "max": 100}
+"""Percentiles of a column over the runs, by name [%]."""
+STATISTICS = ("mean", *PERCENTILES)
+"""Names of the statistics of a column."""
+OPERATORS: Mapping[str, Callable[[float, float], bool]] = {
+    ">=": operator.ge,
+    "<=": operator.le,
+    ">": operator.gt,
+    "<": operator.lt,
+}
+"""Comparisons by symbol."""
+_COLUMN_INDICES = {
+    column.name: index
+    for index, column in enumerate(RUNS.columns)
+    if column.sql_type != "TEXT" and column.name not in ("job", "seed")
+}
+"""Index of each column with numbers in an encoded `RunRow`, by name."""
+_COMPARISON = re.compile(r"\s*(\w+)\s*(?:\(\s*(\w+)\s*\))?\s*(>=|<=|>|<)\s*([-+.\w]+)\s*")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A metric that is compared with a number.
+
+    Attributes:
+        metric: Name of a metric, or of a statistic.
+        column: Column of the runs for a statistic, or "".
+        symbol: Key of `OPERATORS`.
+        limit: The number.
+    """
+
+    metric: str
+    column: str
+    symbol: str
+    limit: float
+
+    def compute_value(self, runs: Sequence[RunRow], summary: VariantSummary) -> float | None:
+        """Return the value of the metric for the runs of a variant; None without data."""
+        if not self.column:
+            return METRICS[self.metric](summary)
+        values = [RUNS.encode(run)[_COLUMN_INDICES[self.column]] for run in runs]
+        numbers = [float(value) for value in values if value is not None]
+        if not numbers:
+            return None
+        percentile = PERCENTILES.get(self.metric)
+        return float(np.mean(numbers) if percentile is None else np.percentile(numbers, percentile))
+
+    def __str__(self) -> str:
+        """Return the text of the comparison."""
+        metric = f"{self.metric}({self.column})" if self.column else self.metric
+        return f"{metric}{self.symbol}{self.limit:g}"
+
+
+def parse_requirement(text: str) -> tuple[Comparison, ...]:
+    """Return the comparisons in a text that joins comparisons with `and`.
+
+    Raises:
+        InputError: The text contains something else, or an unknown metric, statistic or column.
+    """
+    return tuple(map(_parse_comparison, re.split(r"\band\b", text)))
+
+
+def list_unmet(
+    comparisons: Sequence[Comparison], runs: Sequence[RunRow], summaries: Sequence[VariantSummary]
+) -> list[str]:
+    """Return a message for each comparison that the runs of a variant do not meet."""
+    messages = [] if summaries else ["no run was made"]
+    for summary in summaries:
+        variant_runs = [run for run in runs if run.variant == summary.variant]
+        name = ", ".join(f"{key}={value}" for key, value in summary.variant.items())
+        for comparison in comparisons:
+            value = comparison.compute_value(variant_runs, summary)
+            if value is None or not OPERATORS[comparison.symbol](value, comparison.limit):
+                found = "no run has a value" if value is None else f"the value is {value:.6g}"
+                messages.append(f"{comparison} is not met{name and f' with {name}'}: {found}")
+    return messages
+
+
+def _parse_comparison(text: str) -> Comparison:
+    """Return a comparison from its text."""
+    match = _COMPARISON.fullmatch(text)
+    try:
+        limit = float(match[4]) if match else None
+    except ValueError:
+        limit = None
+    if match is None or limit is None:
+        raise InputError(
+            f'"{text.strip()}" is no comparison of a metric with a number; write for example '
+            "success>=0.99 and p95(robot_time_s)<20"
+        )
+    metric, column = match[1], match[2] or ""
+    if metric not in (STATISTICS if column else METRICS):
+        statistics = ", ".join(f"{name}(COLUMN)" for name in STATISTICS)
+        raise InputError(f'there is no metric "{metric}"; the metrics are {", ".join(METRICS)}, {statistics}')
+    if column and column not in _COLUMN_INDICES:
+        raise InputError(
+            f'runs have no column "{column}" with numbers; they have {", ".join(_COLUMN_INDICES)}'
+        )
+    return Comparison(metric, column, match[3], limit)

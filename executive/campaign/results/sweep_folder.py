@@ -1,0 +1,102 @@
+"""Folder of a sweep: creation with valid inputs, and opening with unchanged inputs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+from executive.campaign.results.database import FILE_NAME, ResultsDatabase, find_database
+from executive.campaign.results.rows import SweepSettings
+from executive.cells.sim.scene_file import load_scene
+from executive.errors import InputError
+from executive.mission.load import LoadedMission, load_mission
+from executive.mission.text.file_search import read_source
+from executive.perception.envelope.measurement import compute_fingerprint
+from executive.perception.envelope.rated_detectors import FAKE_KIND
+from executive.plugins import load_cell_kind, load_skills
+from executive.record.run_directory import make_dated_folder
+from executive.run.versions import list_versions
+
+
+def create_sweep(
+    mission: str,
+    seeds: range,
+    overrides: Mapping[str, str],
+    variations: Mapping[str, tuple[str, ...]],
+    scene: Path | None,
+    saves_pictures: bool,
+    runs: Path,
+) -> ResultsDatabase:
+    """Check the inputs, and create the folder `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_sweep_<mission>` with a database.
+
+    Args:
+        mission: Mission file, or name of a shipped mission.
+        seeds: Seeds of each variant.
+        overrides: Values of params of the mission and keys of the cell, as given with `--set`.
+        variations: Values as given with `--vary`, by the same names.
+        scene: Scene file; None: no change of the simulated world.
+        saves_pictures: True to save the images on which decisions are based.
+        runs: Folder of runs.
+
+    Raises:
+        MissionError: A variant has errors.
+        InputError: An input does not exist, or the folder cannot be made.
+    """
+    settings = SweepSettings(
+        mission=mission, mission_name="", cell="", overrides=overrides, variations=variations,
+        first_seed=seeds[0], last_seed=seeds[-1], scene=None if scene is None else str(scene),
+        saves_pictures=saves_pictures, inputs_hash="", versions=dict(list_versions()),
+    )  # fmt: skip
+    missions = _load_variants(settings)
+    name = missions[0].mission.name
+    settings = replace(
+        settings,
+        mission_name=name,
+        cell=str(missions[0].cell_path),
+        inputs_hash=_hash_inputs(missions, scene),
+    )
+    return ResultsDatabase(make_dated_folder(runs, f"sweep_{name}", datetime.now()) / FILE_NAME, settings)
+
+
+def open_sweep(path: Path) -> ResultsDatabase:
+    """Open the database of a sweep to resume the sweep; `path` is the file, or the folder of the sweep.
+
+    Raises:
+        InputError: There is no such sweep, or an input has changed.
+    """
+    database = ResultsDatabase(find_database(path))
+    settings = database.settings
+    if _hash_inputs(_load_variants(settings), settings.scene_path) != settings.inputs_hash:
+        raise InputError(
+            f'the mission "{settings.mission}", its libraries, its cell, its weights or its scene changed '
+            f'after the sweep "{path}" began, and the results would mix both versions; restore the files, or '
+            "start a new sweep without --resume"
+        )
+    return database
+
+
+def _load_variants(settings: SweepSettings) -> list[LoadedMission]:
+    """Return the mission with the values of each variant; an error is reported once, not for every seed."""
+    skills, mission = load_skills(), settings.mission
+    missions = [
+        load_mission(mission, skills, {**settings.overrides, **variant}, load_cell_kind)
+        for variant in settings.variants
+    ]
+    for loaded in missions if settings.scene else ():
+        load_scene(settings.scene_path, loaded.cell_config)
+    return missions
+
+
+def _hash_inputs(missions: Iterable[LoadedMission], scene: Path | None) -> str:
+    """Return a hash of the texts of missions, libraries and scene, the cells, and the weights."""
+    inputs: list[object] = [] if scene is None else [read_source(scene).text]
+    for loaded in missions:
+        cell, base = loaded.cell_config, loaded.cell_path.parent
+        names = [] if cell.kind == FAKE_KIND else [*cell.detectors]
+        weights = [compute_fingerprint(cell, name, base)["weights"] for name in names]
+        inputs += [loaded.text, dict(loaded.libraries), cell.model_dump(mode="json"), weights]
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()

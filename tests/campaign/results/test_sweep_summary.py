@@ -1,0 +1,92 @@
+"""Statistics of the runs of a sweep, and their confidence intervals."""
+
+from __future__ import annotations
+
+import pytest
+
+from executive.campaign.results.intervals import Estimate, estimate_ratio, estimate_share
+from executive.campaign.results.rows import PhaseRow, RunRow
+from executive.campaign.results.sweep_summary import FailureGroup, PhaseSummary, Spread, summarize_runs
+from executive.record.audit_comparison import Audit, ItemCounts
+from executive.record.timeline.timeline import PlanningTotals
+
+
+def run(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **more: object) -> RunRow:
+    fields = {
+        "job": seed, "seed": seed, "status": status, "reason": "" if status == "SUCCESS" else "Grasp.missed",
+        "message": "", "node": "", "items": ItemCounts(seen=right + left, placed=right, rejected=left),
+        "audit": Audit(right=right, left=left), "planning": PlanningTotals(10, 8, 0.1),
+        "robot_time_s": 30.0 + seed, "wall_time_s": 6.0, "run": f"runs/{seed}",
+    }  # fmt: skip
+    return RunRow(**fields | more)
+
+
+def repeat(run: RunRow) -> str:
+    return f"repeat {run.seed}"
+
+
+def test_the_summary_counts_objects_and_groups_problems() -> None:
+    wrong = run(2, right=3, audit=Audit(agrees=False, right=2, wrong_bin=1))
+    runs = [run(0), run(1, "FAILURE", right=3, left=1), wrong, run(3, "FAILURE"), run(4, "FAULT", crashes=2)]
+    (summary,) = summarize_runs(runs, [], repeat)
+    assert (summary.runs, summary.succeeded, summary.crashed) == (5, 2, 1)
+    assert (summary.right, summary.objects) == (17, 19)
+    assert (summary.success.value, summary.agreement.value) == (0.4, 0.8)
+    assert summary.objects_per_hour.value == pytest.approx(18 * 3600 / 160)
+    assert summary.robot_time_s == Spread(30.0, 32.0, 32.0, 34.0)
+    assert (summary.motions, summary.ahead, summary.waited_s) == (50, 40, pytest.approx(0.5))
+    assert summary.failures == (
+        FailureGroup("FAILURE", "Grasp.missed", "", (1, 3), "", "runs/1", "repeat 1"),
+        FailureGroup(
+            "SUCCESS", "disagreement", "", (2,),
+            "THE AUDIT DISAGREES: 1 in a wrong bin; the audit found 2 in their bins, 0 on the table and 0 "
+            "elsewhere; the executive reports 3 placed, 0 rejected, 0 skipped and 0 lost",
+            "runs/2", "repeat 2",
+        ),
+        FailureGroup("FAULT", "Grasp.missed", "", (4,), "", "runs/4", "repeat 4"),
+    )  # fmt: skip
+
+
+def test_variants_and_their_phases_are_separate() -> None:
+    runs = [run(0, variant={"a": "1"}), run(1, variant={"a": "1"}), run(2, variant={"a": "2"}, audit=None)]
+    phases = [
+        PhaseRow(job=job, phase=name, activations=2, failures=job, robot_time_s=time)
+        for job, name, time in ((0, "Grasp", 1.0), (0, "Transit", 5.0), (1, "Grasp", 2.0), (2, "Grasp", 7.0))
+    ]
+    first, second = summarize_runs(runs, phases, repeat)
+    assert (first.variant, second.variant) == ({"a": "1"}, {"a": "2"})
+    assert first.phases == (PhaseSummary("Transit", 2, 0, 2.5), PhaseSummary("Grasp", 4, 1, 1.5))
+    assert second.phases == (PhaseSummary("Grasp", 2, 2, 7.0),)
+    # Without ground truth no object counts.
+    assert (second.objects, second.right_share, second.agreement) == (0, Estimate(), Estimate())
+    assert summarize_runs([], [], repeat) == []
+
+
+@pytest.mark.parametrize(
+    ("successes", "total", "low", "high"),
+    # Newcombe, Statistics in Medicine 17 (1998), table I, method 3.
+    [(81, 263, 0.2553, 0.3662), (0, 20, 0.0, 0.1611)],
+)
+def test_the_interval_of_a_share_is_the_published_one(
+    successes: int, total: int, low: float, high: float
+) -> None:
+    estimate = estimate_share(successes, total)
+    assert (estimate.low, estimate.high) == pytest.approx((low, high), abs=5e-5)
+    assert estimate.value == successes / total
+
+
+def test_the_interval_of_a_ratio_contains_the_ratio_and_can_be_repeated() -> None:
+    tops, bottoms = (
+        [float(4 + number % 3) for number in range(50)],
+        [9.0 + number % 4 for number in range(50)],
+    )
+    estimate = estimate_ratio(tops, bottoms)
+    assert estimate == estimate_ratio(tops, bottoms)
+    assert estimate.value is not None and estimate.low is not None and estimate.high is not None
+    # Standard error of a ratio estimate (Cochran, Sampling Techniques, equation 2.39).
+    assert estimate.low < estimate.value < estimate.high
+    residuals = [top - estimate.value * bottom for top, bottom in zip(tops, bottoms, strict=True)]
+    error = sum(one**2 for one in residuals) ** 0.5 / sum(bottoms)
+    assert estimate.high - estimate.low == pytest.approx(2 * 1.96 * error, rel=0.1)
+    assert estimate_ratio([2.0, 2.0], [4.0, 4.0]) == Estimate(0.5, 0.5, 0.5)
+    assert (estimate_ratio([2.0], [4.0]), estimate_ratio([], [])) == (Estimate(0.5), Estimate())
