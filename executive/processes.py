@@ -15,10 +15,14 @@ from typing import Any, TypeVar
 ReturnT = TypeVar("ReturnT")
 """Type of the return value of a submitted function."""
 
+THREAD_COUNT_VARIABLES = ("OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
+"""Environment variables with the number of threads: of linear algebra and models, and of OpenCV."""
+
 
 class WorkerPool(ProcessPoolExecutor):
     """A pool of spawned processes that ends with its parent process.
 
+    Libraries in a process of the pool use one thread, because the processes of a pool use all processors.
     A terminal sends Ctrl-C to all processes. The processes of the pool ignore Ctrl-C, so that the parent
     process decides when they end. An exception in the `with` block kills the processes.
 
@@ -57,7 +61,9 @@ def kill_workers() -> None:
 
 
 def _initialize_worker() -> None:
-    """Ignore Ctrl-C, and start the thread that ends this process with its parent process."""
+    """Ignore Ctrl-C, limit threads, and start the thread that ends this process with its parent process."""
+    for variable in THREAD_COUNT_VARIABLES:
+        os.environ.setdefault(variable, "1")
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     threading.Thread(target=_exit_with_parent, name="exit with parent", daemon=True).start()

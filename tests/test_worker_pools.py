@@ -94,3 +94,12 @@ def test_who_leaves_the_pool_by_an_exception_does_not_wait_for_the_work() -> Non
         raise KeyboardInterrupt
     assert time.monotonic() - began < 60.0
     assert multiprocessing.active_children() == []
+
+
+def test_libraries_in_a_process_of_a_pool_use_one_thread(monkeypatch) -> None:
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    with WorkerPool(1) as pool:
+        assert pool.submit(os.getenv, "OMP_NUM_THREADS").result() == "1"
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    with WorkerPool(1) as pool:
+        assert pool.submit(os.getenv, "OMP_NUM_THREADS").result() == "3"

@@ -16,15 +16,23 @@ from unittest.mock import patch
 
 import pytest
 
+from executive.campaign.pool import run_jobs
 from executive.campaign.results.database import ResultsDatabase
 from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings
 from executive.campaign.results.run_record import make_record
-from executive.campaign.sweep import SweepJob, list_jobs, make_repeat_command, run_job, run_sweep
+from executive.campaign.sweep import (
+    SweepJob,
+    list_jobs,
+    make_fault_record,
+    make_repeat_command,
+    run_job,
+    run_sweep,
+)
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.record.journal import read_journal
-from executive.record.recorded_run import record_run
+from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.timeline.timeline import Timeline
 from executive.run.assembly import RunOptions
 
@@ -183,3 +191,20 @@ def test_only_a_run_with_a_problem_has_a_report(tmp_path: Path) -> None:
         settings = replace(SETTINGS, mission=name, overrides=overrides)
         run = run_job(list_jobs(settings, tmp_path)[0]).run
         assert (run.has_problem, (Path(run.run) / "report.html").is_file()) == (has_report, has_report), run
+
+
+@pytest.mark.slow
+def test_simulated_runs_of_a_worker_are_equal_to_single_runs(tmp_path: Path) -> None:
+    overrides = {"cell.table.objects": "[1, 1]"}
+    settings = replace(SETTINGS, mission="sort_overhead", overrides=overrides, first_seed=5, last_seed=7)
+    # The worker has one thread and reuses the model; this process has two threads and loads it once more.
+    found = run_jobs(list_jobs(settings, tmp_path), run_job, make_fault_record, workers=1)[-1]
+    assert found is not None
+    loaded = load_mission("sort_overhead", load_skills(), overrides)
+    history = Timeline()
+    single = record_run(
+        loaded, load_skills(), RunOptions(7), tmp_path / "single", RecordOptions(timeline=history)
+    )
+    expected = make_record(2, {}, single, history)
+    same_run = replace(expected.run, wall_time_s=found.run.wall_time_s, run=found.run.run)
+    assert found == replace(expected, run=same_run)

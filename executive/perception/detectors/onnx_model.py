@@ -7,6 +7,8 @@ standard deviation; outputs `dets` `(1, Q, 4)`, centre x, y, width, height in 0.
 
 from __future__ import annotations
 
+import functools
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -31,7 +33,7 @@ class OnnxModel:
     Args:
         path: The ONNX file.
         labels: Class names in the order of the model's outputs.
-        threads: Maximum number of threads of one inference.
+        threads: Maximum number of threads of one inference; also limited by `OMP_NUM_THREADS`.
 
     Raises:
         InputError: The file cannot be read, is not an RF-DETR model, or does not have one class per label.
@@ -44,7 +46,8 @@ class OnnxModel:
         if not path.is_file():
             raise InputError(describe_missing_model(path))
         options = SessionOptions()
-        options.intra_op_num_threads = threads
+        limit = os.environ.get("OMP_NUM_THREADS", "")
+        options.intra_op_num_threads = min(threads, int(limit)) if limit.isdecimal() else threads
         options.inter_op_num_threads = 1
         # Threads that spin while they wait would slow down the simulation.
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
@@ -107,6 +110,22 @@ class OnnxModel:
             advice = "give one label per class, in the order of the model"
             raise InputError(f"{path} has {class_count} classes, but there are {labels}; {advice}")
         return size
+
+
+def load_model(path: Path, labels: Sequence[str], threads: int = 2) -> OnnxModel:
+    """Return the model in a file, with the arguments of `OnnxModel`.
+
+    Unchanged models are loaded once per process, because a worker of a sweep runs a mission many times, and
+    loading takes 0.2 s.
+    """
+    change_time = path.stat().st_mtime_ns if path.is_file() else 0
+    return _load_model(path, tuple(labels), threads, change_time)
+
+
+@functools.lru_cache(maxsize=4)
+def _load_model(path: Path, labels: tuple[str, ...], threads: int, change_time: int) -> OnnxModel:
+    del change_time  # The argument only distinguishes versions of a file.
+    return OnnxModel(path, labels, threads)
 
 
 def describe_missing_model(path: Path) -> str:
