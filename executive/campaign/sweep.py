@@ -92,7 +92,7 @@ def run_job(job: SweepJob) -> RunRecord:
     record_options = RecordOptions(saves_pictures=settings.saves_pictures, timeline=timeline)
     result = record_run(loaded, skills, options, job.runs_folder, record_options)
     record = make_record(job.index, job.variant, result, timeline)
-    if record.run.has_problem:
+    if record.run.problem:
         try_write_report(result.run)
     return record
 

@@ -24,9 +24,9 @@ def print_summary(summaries: Sequence[VariantSummary], asked: int) -> None:
 
 
 def _list_lines_and_tables(summaries: Sequence[VariantSummary], asked: int) -> Iterator[RenderableType]:
-    """Yield the lines of text and the tables of the summary."""
-    run_count = sum(summary.runs for summary in summaries)
-    success_count = sum(summary.succeeded for summary in summaries)
+    """Yield the lines of text and the table of the summary."""
+    run_count = sum(summary.success.denominator for summary in summaries)
+    success_count = sum(summary.success.numerator for summary in summaries)
     if run_count == asked:
         yield f"{success_count} of {run_count} runs succeeded"
     else:
@@ -34,55 +34,44 @@ def _list_lines_and_tables(summaries: Sequence[VariantSummary], asked: int) -> I
         yield f"{run_count} of {asked} runs, halted{successes}"
     if not summaries:
         return
-    has_variants = len(summaries) > 1
-    yield _make_variant_table(summaries)
-    yield _make_phase_table(summaries)
+    yield _make_table(summaries)
     for summary in summaries:
-        if has_variants and summary.failures:
+        if summary.variant and summary.failures:
             yield f"with {_describe_variant(summary.variant)}:"
         for group in summary.failures:
             yield from _list_failure_lines(group)
 
 
-def _make_variant_table(summaries: Sequence[VariantSummary]) -> Table:
-    """Return a table with a column per variant and a row per metric, with 95 % intervals."""
-    headings = [_describe_variant(each.variant) or "all runs" for each in summaries]
-    table = _make_table("(95 % interval)", headings)
-    for name, texts in {
-        "success": [_format_share(each.success) for each in summaries],
-        "objects in the right bin": [f"{each.right} of {each.objects}" for each in summaries],
-        "share of these objects": [_format_share(each.right_share) for each in summaries],
-        "ledger and audit agree": [_format_share(each.agreement) for each in summaries],
-        "objects per hour": [_format_estimate(each.objects_per_hour) for each in summaries],
-        "robot time, median [s]": [f"{each.robot_time_s.median:.1f}" for each in summaries],
-        "robot time, range [s]": [
-            f"{each.robot_time_s.min:.1f} to {each.robot_time_s.max:.1f}" for each in summaries
-        ],
-        "wall time, median [s]": [f"{each.wall_time_s.median:.1f}" for each in summaries],
-        "motions planned ahead": [f"{each.ahead} of {each.motions}" for each in summaries],
-        "waited for plans [s]": [f"{each.waited_s:.1f}" for each in summaries],
-        "crashed runs": [str(each.crashed) for each in summaries],
-    }.items():
-        table.add_row(name, *texts)
+def _make_table(summaries: Sequence[VariantSummary]) -> Table:
+    """Return a table with a column per variant and a row per metric and skill."""
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1))
+    table.add_column("(95 % interval)", no_wrap=True)
+    for summary in summaries:
+        table.add_column(_describe_variant(summary.variant) or "all runs", justify="right")
+    columns = list(map(_list_texts, summaries))
+    for name in dict.fromkeys(name for column in columns for name in column):
+        table.add_row(name, *(column.get(name, "") for column in columns))
     return table
 
 
-def _make_phase_table(summaries: Sequence[VariantSummary]) -> Table:
-    """Return a table with a column per variant and a row per skill: mean time per run, and failures."""
-    table = _make_table(
-        "time per run [s] (failures)", [_describe_variant(each.variant) for each in summaries]
-    )
-    phases = [{phase.phase: phase for phase in summary.phases} for summary in summaries]
-    for name in dict.fromkeys(name for by_name in phases for name in by_name):
-        found = (by_name.get(name) for by_name in phases)
-        table.add_row(
-            name,
-            *(
-                f"{one.robot_time_s:.2f} ({one.failures} of {one.activations})" if one else ""
-                for one in found
-            ),
-        )
-    return table
+def _list_texts(summary: VariantSummary) -> dict[str, str]:
+    """Return the values of the metrics of a variant as text, by name."""
+    objects, robot_time, planning = summary.right_objects, summary.robot_time_s, summary.planning
+    texts = {
+        "success": _format_share(summary.success),
+        "objects in the right bin": _format_share(objects),
+        "": f"{objects.numerator} of {objects.denominator}",
+        "ledger and audit agree": _format_share(summary.agreement),
+        "objects per hour": _format_estimate(summary.objects_per_hour),
+        "robot time, median [s]": f"{robot_time.median:.1f} ({robot_time.min:.1f} to {robot_time.max:.1f})",
+        "wall time, median [s]": f"{summary.wall_time_s.median:.1f}",
+        "motions planned ahead": f"{planning.ahead} of {planning.motions}",
+        "waited for plans [s]": f"{planning.waited_s:.1f}",
+    }
+    for phase in summary.phases:
+        failures = f"{phase.failures} of {phase.activations} failed"
+        texts[f"{phase.phase}, mean [s]"] = f"{phase.robot_time_s:.2f} ({failures})"
+    return texts
 
 
 def _list_failure_lines(group: FailureGroup) -> Iterator[str]:
@@ -116,12 +105,3 @@ def _format_estimate(estimate: Estimate) -> str:
         return "unknown"
     interval = "" if estimate.low is None else f" ({estimate.low:.0f} to {estimate.high:.0f})"
     return f"{estimate.value:.0f}{interval}"
-
-
-def _make_table(row_heading: str, headings: Sequence[str]) -> Table:
-    """Return an empty table with a left-aligned column for the names of rows, and right-aligned columns."""
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1))
-    table.add_column(row_heading, no_wrap=True)
-    for heading in headings:
-        table.add_column(heading, justify="right")
-    return table

@@ -53,11 +53,11 @@ def test_it_says_at_once_that_it_halts_and_then_how_far_it_came(tmp_path: Path, 
     assert sweep.returncode == 130
     figures = json.loads(shown)
     assert (figures["asked"], figures["cut_off"]) == (400, True)
-    assert 1 <= len(figures["runs"]) == figures["variants"][0]["runs"] < 400
+    success = figures["variants"][0]["success"]
+    assert 1 <= len(figures["runs"]) == success["denominator"] < 400
     halting, summary = said.index("halting: no new runs start"), said.index(" of 400 runs, halted; ")
     assert halting < summary
-    succeeded = figures["variants"][0]["succeeded"]
-    assert f"{len(figures['runs'])} of 400 runs, halted; {succeeded} of them succeeded" in said
+    assert f"{len(figures['runs'])} of 400 runs, halted; {success['numerator']} of them succeeded" in said
 
 
 def invoke(*words: str) -> Result:

@@ -17,13 +17,16 @@ BOOTSTRAP_SEED = 0
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with its 95 % confidence interval.
+    """A ratio with its 95 % confidence interval.
 
     Attributes:
-        value: The value; None without data.
+        numerator, denominator: Terms of the ratio, for instance successful runs and all runs.
+        value: The ratio; None if the denominator is 0.
         low, high: Limits of the interval; None if the data do not suffice.
     """
 
+    numerator: float
+    denominator: float
     value: float | None = None
     low: float | None = None
     high: float | None = None
@@ -32,11 +35,11 @@ class Estimate:
 def estimate_share(successes: int, total: int) -> Estimate:
     """Return the proportion successes / total with its Wilson score interval."""
     if total == 0:
-        return Estimate()
+        return Estimate(successes, total)
     from scipy.stats import binomtest  # Imported here, because workers do not need the import of 0.5 s.
 
     interval = binomtest(successes, total).proportion_ci(method="wilson")
-    return Estimate(successes / total, float(interval.low), float(interval.high))
+    return Estimate(successes, total, successes / total, float(interval.low), float(interval.high))
 
 
 def estimate_ratio(numerators: Sequence[float], denominators: Sequence[float]) -> Estimate:
@@ -44,11 +47,12 @@ def estimate_ratio(numerators: Sequence[float], denominators: Sequence[float]) -
 
     The ratio of a single run has no interval.
     """
-    if not sum(denominators):
-        return Estimate()
-    ratio = sum(numerators) / sum(denominators)
+    numerator, denominator = sum(numerators), sum(denominators)
+    if not denominator:
+        return Estimate(numerator, denominator)
+    ratio = numerator / denominator
     if len(numerators) < 2:
-        return Estimate(ratio)
+        return Estimate(numerator, denominator, ratio)
     from scipy.stats import bootstrap
 
     def compute_ratio(
@@ -56,11 +60,10 @@ def estimate_ratio(numerators: Sequence[float], denominators: Sequence[float]) -
     ) -> NDArray[np.float64]:
         return tops.sum(axis) / bottoms.sum(axis)
 
-    data = (np.asarray(numerators, float), np.asarray(denominators, float))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Equal runs have an interval of length 0.
         interval = bootstrap(
-            data, compute_ratio, paired=True, vectorized=True, n_resamples=RESAMPLE_COUNT, batch=100,
-            method="percentile", rng=np.random.default_rng(BOOTSTRAP_SEED),
+            (numerators, denominators), compute_ratio, paired=True, vectorized=True, batch=100,
+            n_resamples=RESAMPLE_COUNT, method="percentile", rng=np.random.default_rng(BOOTSTRAP_SEED),
         ).confidence_interval  # fmt: skip
-    return Estimate(ratio, float(interval.low), float(interval.high))
+    return Estimate(numerator, denominator, ratio, float(interval.low), float(interval.high))

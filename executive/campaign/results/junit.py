@@ -50,13 +50,9 @@ def _make_case(mission: str, run: RunRow, repeat_command: str) -> ElementTree.El
     """Return the test case of a run."""
     name = " ".join((f"seed {run.seed}", *(f"{key}={value}" for key, value in run.variant.items())))
     case = ElementTree.Element("testcase", classname=mission, name=name, time=f"{run.wall_time_s:.3f}")
-    if run.has_problem:
-        tag = "error" if run.status == "FAULT" else "failure"
-        reason = "disagreement" if run.is_success else run.reason or run.status
-        message = run.message or run.disagreement or run.status
-        problem = ElementTree.SubElement(case, tag, type=reason, message=message)
-        problem.text = "\n".join(
-            filter(None, (f"{run.status} {reason} {run.node}".strip(), message, run.run))
-        )
+    if run.problem:
+        tag, message = "error" if run.status == "FAULT" else "failure", run.explanation or run.status
+        element = ElementTree.SubElement(case, tag, type=run.problem, message=message)
+        element.text = "\n".join((f"{run.status} {run.problem} {run.node}".strip(), message, run.run))
     ElementTree.SubElement(case, "system-out").text = repeat_command
     return case

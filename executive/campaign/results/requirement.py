@@ -4,32 +4,24 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from executive.campaign.results.intervals import Estimate
 from executive.campaign.results.rows import RunRow
 from executive.campaign.results.sweep_summary import VariantSummary
 from executive.campaign.results.tables import RUNS
 from executive.errors import InputError
 
-METRICS: Mapping[str, Callable[[VariantSummary], float | None]] = {
-    "success": lambda summary: summary.success.value,
-    "agreement": lambda summary: summary.agreement.value,
-    "objects_per_hour": lambda summary: summary.objects_per_hour.value,
-}
-"""Metrics without a column, by name."""
+METRICS = ("success", "agreement", "objects_per_hour")
+"""Metrics without a column, which are attributes of `VariantSummary`."""
 PERCENTILES: Mapping[str, float] = {"min": 0, "median": 50, "p50": 50, "p95": 95, "p99": 99, "max": 100}
 """Percentiles of a column over the runs, by name [%]."""
 STATISTICS = ("mean", *PERCENTILES)
 """Names of the statistics of a column."""
-OPERATORS: Mapping[str, Callable[[float, float], bool]] = {
-    ">=": operator.ge,
-    "<=": operator.le,
-    ">": operator.gt,
-    "<": operator.lt,
-}
+OPERATORS = {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
 """Comparisons by symbol."""
 _COLUMN_INDICES = {
     column.name: index
@@ -37,7 +29,9 @@ _COLUMN_INDICES = {
     if column.sql_type != "TEXT" and column.name not in ("job", "seed")
 }
 """Index of each column with numbers in an encoded `RunRow`, by name."""
-_COMPARISON = re.compile(r"\s*(\w+)\s*(?:\(\s*(\w+)\s*\))?\s*(>=|<=|>|<)\s*([-+.\w]+)\s*")
+_COMPARISON = re.compile(
+    r"\s*(\w+)\s*(?:\(\s*(\w+)\s*\))?\s*([<>]=?)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+)
 
 
 @dataclass(frozen=True)
@@ -59,7 +53,8 @@ class Comparison:
     def compute_value(self, runs: Sequence[RunRow], summary: VariantSummary) -> float | None:
         """Return the value of the metric for the runs of a variant; None without data."""
         if not self.column:
-            return METRICS[self.metric](summary)
+            estimate: Estimate = getattr(summary, self.metric)
+            return estimate.value
         values = [RUNS.encode(run)[_COLUMN_INDICES[self.column]] for run in runs]
         numbers = [float(value) for value in values if value is not None]
         if not numbers:
@@ -101,11 +96,7 @@ def list_unmet(
 def _parse_comparison(text: str) -> Comparison:
     """Return a comparison from its text."""
     match = _COMPARISON.fullmatch(text)
-    try:
-        limit = float(match[4]) if match else None
-    except ValueError:
-        limit = None
-    if match is None or limit is None:
+    if match is None:
         raise InputError(
             f'"{text.strip()}" is no comparison of a metric with a number; write for example '
             "success>=0.99 and p95(robot_time_s)<20"
@@ -118,4 +109,4 @@ def _parse_comparison(text: str) -> Comparison:
         raise InputError(
             f'runs have no column "{column}" with numbers; they have {", ".join(_COLUMN_INDICES)}'
         )
-    return Comparison(metric, column, match[3], limit)
+    return Comparison(metric, column, match[3], float(match[4]))

@@ -102,14 +102,16 @@ class RunRow(Row):
         return self.status == "SUCCESS"
 
     @property
-    def disagreement(self) -> str:
-        """Message with the counts of audit and ledger if they disagree, else ""."""
-        return describe_disagreement(self.audit, self.items)
+    def problem(self) -> str:
+        """Reason of a run that did not succeed; `disagreement` if the audit contradicts a successful run."""
+        if self.is_success:
+            return "disagreement" if describe_disagreement(self.audit, self.items) else ""
+        return self.reason or self.status
 
     @property
-    def has_problem(self) -> bool:
-        """True if the run did not succeed, or the audit contradicts the ledger."""
-        return not self.is_success or self.disagreement != ""
+    def explanation(self) -> str:
+        """Message of the end of the run; without a message, the disagreement of audit and ledger, or ""."""
+        return self.message or describe_disagreement(self.audit, self.items)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import statistics
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
-from executive.campaign.pool import MAX_CRASHES
 from executive.campaign.results.intervals import Estimate, estimate_ratio, estimate_share
 from executive.campaign.results.rows import PhaseRow, RunRow
+from executive.record.timeline.timeline import PlanningTotals
 
 SECONDS_PER_HOUR = 3600.0
 """Number of seconds per hour [s]."""
@@ -75,34 +75,24 @@ class VariantSummary:
 
     Attributes:
         variant: Values of the varied params and keys of the cell, by name.
-        runs, succeeded, crashed: Number of runs, successful runs, and runs whose process died twice.
         success: Share of the successful runs.
-        right, objects: Number of objects in a permitted bin, and of all objects; 0 without ground truth.
-        right_share: Share of the objects in a permitted bin.
+        right_objects: Share of the objects in a permitted bin; without ground truth, of no objects.
         agreement: Share of the runs in which the audit confirms the ledger.
         objects_per_hour: Placed objects per hour of robot time.
         robot_time_s, wall_time_s: Duration of a run on the clock of the run and on a wall clock [s].
-        motions, ahead: Number of planned motions, and number of motions that were planned ahead.
-        waited_s: Time for which skills waited for plans, of all runs [s].
+        planning: Statistics of motion planning, summed over the runs.
         phases: The skills, by decreasing time.
         failures: The problems, by decreasing number of runs.
     """
 
     variant: Mapping[str, str]
-    runs: int
-    succeeded: int
-    crashed: int
     success: Estimate
-    right: int
-    objects: int
-    right_share: Estimate
+    right_objects: Estimate
     agreement: Estimate
     objects_per_hour: Estimate
     robot_time_s: Spread
     wall_time_s: Spread
-    motions: int
-    ahead: int
-    waited_s: float
+    planning: PlanningTotals
     phases: tuple[PhaseSummary, ...]
     failures: tuple[FailureGroup, ...]
 
@@ -117,39 +107,29 @@ def summarize_runs(
     phases_by_job: dict[int, list[PhaseRow]] = defaultdict(list)
     for phase in phases:
         phases_by_job[phase.job].append(phase)
-    return [
-        _summarize_variant(
-            group, [row for run in group for row in phases_by_job[run.job]], make_repeat_command
-        )
-        for group in runs_by_variant.values()
-    ]
+    summaries = []
+    for group in runs_by_variant.values():
+        group_phases = [phase for run in group for phase in phases_by_job[run.job]]
+        summaries.append(_summarize_variant(group, group_phases, make_repeat_command))
+    return summaries
 
 
 def _summarize_variant(
     runs: Sequence[RunRow], phases: Sequence[PhaseRow], make_repeat_command: RepeatCommand
 ) -> VariantSummary:
     """Return the summary of runs of one variant."""
-    audits = [run.audit for run in runs if run.audit is not None]
-    right = sum(audit.right for audit in audits)
-    total = sum(audit.right + audit.wrong_bin + audit.left + audit.elsewhere for audit in audits)
-    success_count = sum(run.is_success for run in runs)
+    audits, plannings = [run.audit for run in runs if run.audit], [run.planning for run in runs]
+    object_count = sum(audit.right + audit.wrong_bin + audit.left + audit.elsewhere for audit in audits)
     hours = [run.robot_time_s / SECONDS_PER_HOUR for run in runs]
     return VariantSummary(
         variant=runs[0].variant,
-        runs=len(runs),
-        succeeded=success_count,
-        crashed=sum(run.crashes == MAX_CRASHES for run in runs),
-        success=estimate_share(success_count, len(runs)),
-        right=right,
-        objects=total,
-        right_share=estimate_share(right, total),
+        success=estimate_share(sum(run.is_success for run in runs), len(runs)),
+        right_objects=estimate_share(sum(audit.right for audit in audits), object_count),
         agreement=estimate_share(sum(audit.agrees for audit in audits), len(audits)),
         objects_per_hour=estimate_ratio([run.items.placed for run in runs], hours),
         robot_time_s=Spread.from_values([run.robot_time_s for run in runs]),
         wall_time_s=Spread.from_values([run.wall_time_s for run in runs]),
-        motions=sum(run.planning.motions for run in runs),
-        ahead=sum(run.planning.ahead for run in runs),
-        waited_s=sum(run.planning.waited_s for run in runs),
+        planning=PlanningTotals(*map(sum, zip(*map(astuple, plannings), strict=True))),
         phases=_summarize_phases(phases, len(runs)),
         failures=_group_failures(runs, make_repeat_command),
     )
@@ -160,15 +140,11 @@ def _summarize_phases(phases: Sequence[PhaseRow], run_count: int) -> tuple[Phase
     rows_by_phase: dict[str, list[PhaseRow]] = defaultdict(list)
     for phase in phases:
         rows_by_phase[phase.phase].append(phase)
-    summaries = [
-        PhaseSummary(
-            name,
-            sum(row.activations for row in rows),
-            sum(row.failures for row in rows),
-            sum(row.robot_time_s for row in rows) / run_count,
-        )
-        for name, rows in rows_by_phase.items()
-    ]
+    summaries = []
+    for name, rows in rows_by_phase.items():
+        activations, failures = sum(row.activations for row in rows), sum(row.failures for row in rows)
+        time = sum(row.robot_time_s for row in rows) / run_count
+        summaries.append(PhaseSummary(name, activations, failures, time))
     return tuple(sorted(summaries, key=lambda summary: -summary.robot_time_s))
 
 
@@ -176,11 +152,11 @@ def _group_failures(runs: Sequence[RunRow], make_repeat_command: RepeatCommand) 
     """Return the runs with a problem, grouped by status, reason and node, by decreasing number of runs."""
     groups: dict[tuple[str, str, str], list[RunRow]] = defaultdict(list)
     for run in runs:
-        if run.has_problem:
-            groups[run.status, "disagreement" if run.is_success else run.reason, run.node].append(run)
+        if run.problem:
+            groups[run.status, run.problem, run.node].append(run)
     failures = []
     for (status, reason, node), group in groups.items():
         first, seeds = group[0], tuple(run.seed for run in group)
-        message, repeat = first.message or first.disagreement, make_repeat_command(first)
-        failures.append(FailureGroup(status, reason, node, seeds, message, first.run, repeat))
+        repeat = make_repeat_command(first)
+        failures.append(FailureGroup(status, reason, node, seeds, first.explanation, first.run, repeat))
     return tuple(sorted(failures, key=lambda failure: -len(failure.seeds)))

@@ -29,12 +29,13 @@ def test_the_summary_counts_objects_and_groups_problems() -> None:
     wrong = run(2, right=3, audit=Audit(agrees=False, right=2, wrong_bin=1))
     runs = [run(0), run(1, "FAILURE", right=3, left=1), wrong, run(3, "FAILURE"), run(4, "FAULT", crashes=2)]
     (summary,) = summarize_runs(runs, [], repeat)
-    assert (summary.runs, summary.succeeded, summary.crashed) == (5, 2, 1)
-    assert (summary.right, summary.objects) == (17, 19)
-    assert (summary.success.value, summary.agreement.value) == (0.4, 0.8)
+    assert [
+        (share.numerator, share.denominator, share.value)
+        for share in (summary.success, summary.right_objects, summary.agreement)
+    ] == [(2, 5, 0.4), (17, 19, 17 / 19), (4, 5, 0.8)]
     assert summary.objects_per_hour.value == pytest.approx(18 * 3600 / 160)
     assert summary.robot_time_s == Spread(30.0, 32.0, 32.0, 34.0)
-    assert (summary.motions, summary.ahead, summary.waited_s) == (50, 40, pytest.approx(0.5))
+    assert summary.planning == PlanningTotals(50, 40, pytest.approx(0.5))
     assert summary.failures == (
         FailureGroup("FAILURE", "Grasp.missed", "", (1, 3), "", "runs/1", "repeat 1"),
         FailureGroup(
@@ -58,7 +59,7 @@ def test_variants_and_their_phases_are_separate() -> None:
     assert first.phases == (PhaseSummary("Transit", 2, 0, 2.5), PhaseSummary("Grasp", 4, 1, 1.5))
     assert second.phases == (PhaseSummary("Grasp", 2, 2, 7.0),)
     # Without ground truth no object counts.
-    assert (second.objects, second.right_share, second.agreement) == (0, Estimate(), Estimate())
+    assert (second.right_objects, second.agreement) == (Estimate(0, 0), Estimate(0, 0))
     assert summarize_runs([], [], repeat) == []
 
 
@@ -88,5 +89,5 @@ def test_the_interval_of_a_ratio_contains_the_ratio_and_can_be_repeated() -> Non
     residuals = [top - estimate.value * bottom for top, bottom in zip(tops, bottoms, strict=True)]
     error = sum(one**2 for one in residuals) ** 0.5 / sum(bottoms)
     assert estimate.high - estimate.low == pytest.approx(2 * 1.96 * error, rel=0.1)
-    assert estimate_ratio([2.0, 2.0], [4.0, 4.0]) == Estimate(0.5, 0.5, 0.5)
-    assert (estimate_ratio([2.0], [4.0]), estimate_ratio([], [])) == (Estimate(0.5), Estimate())
+    assert estimate_ratio([2.0, 2.0], [4.0, 4.0]) == Estimate(4.0, 8.0, 0.5, 0.5, 0.5)
+    assert (estimate_ratio([2.0], [4.0]), estimate_ratio([], [])) == (Estimate(2.0, 4.0, 0.5), Estimate(0, 0))
