@@ -6,6 +6,7 @@ The entry points of the project in the working directory are found even if the p
 from __future__ import annotations
 
 import difflib
+import functools
 import os
 import re
 import stat
@@ -169,10 +170,24 @@ def list_entries(group: str, noun: str) -> dict[str, PluginEntry]:
 
 def _list_installed_entries(group: str, noun: str, project: Project | None) -> Iterator[PluginEntry]:
     """Yield the entries of all installed packages except the project itself."""
-    for entry in entry_points(group=group):
-        package = entry.dist.name if entry.dist else entry.module.partition(".")[0]
+    for name, value, package in _read_installed_entries(group, tuple(sys.path)):
         if project is None or canonicalize_name(package) != canonicalize_name(project.name):
-            yield PluginEntry(entry.name, entry.value, noun, f"uninstall the package {package}")
+            yield PluginEntry(name, value, noun, f"uninstall the package {package}")
+
+
+@functools.cache
+def _read_installed_entries(group: str, search_path: tuple[str, ...]) -> tuple[tuple[str, str, str], ...]:
+    """Return name, import path and package of each installed entry of a group.
+
+    `search_path` must be `sys.path`: another path may contain other packages.
+    """
+    del search_path
+    entries = entry_points(group=group)
+    packages = {entry.dist: entry.dist.name for entry in entries if entry.dist}
+    return tuple(
+        (entry.name, entry.value, packages[entry.dist] if entry.dist else entry.module.partition(".")[0])
+        for entry in entries
+    )
 
 
 def _enable_project_entries(group: str, noun: str, project: Project | None) -> Iterator[PluginEntry]:

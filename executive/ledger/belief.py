@@ -11,8 +11,6 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from scipy.special import bdtrc, expit
-
 from executive.cell.detection import Detections
 from executive.cell.error_rates import ErrorRates
 
@@ -25,6 +23,8 @@ MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM = math.log(0.1)
 CONFIRMATION_LOG_ODDS = math.log(1e4)
 """Minimum log odds of existence of a confirmed item (`Belief.is_confirmed`); two detections of the same class
 may reach the minimum."""
+MIN_LOG_ODDS = -700.0
+"""Log odds below which a probability counts as the probability at this limit; `math.exp` overflows at 710."""
 
 
 def make_viewpoint_key(look: Detections) -> str:
@@ -42,6 +42,33 @@ def compute_repeat_probability(independent_probability: float, error_correlation
             answers are independent.
     """
     return error_correlation + (1.0 - error_correlation) * independent_probability
+
+
+def compute_probability(log_odds: float) -> float:
+    """Return the probability with the given log odds."""
+    return 1.0 / (1.0 + math.exp(-max(log_odds, MIN_LOG_ODDS)))
+
+
+def compute_binomial_tail(min_count: int, trial_count: int, probability: float) -> float:
+    """Return the probability of at least `min_count` events in independent trials.
+
+    Args:
+        min_count: Number of events, at most `trial_count`.
+        trial_count: Number of trials.
+        probability: Probability of an event in one trial, above 0 and below 1.
+    """
+    # scipy.special contains this function, but its import takes 0.5 s.
+    if min_count <= 0:
+        return 1.0
+    log_p, log_q = math.log(probability), math.log1p(-probability)
+
+    def compute_log_binomial(count: int) -> float:
+        return math.lgamma(trial_count + 1) - math.lgamma(count + 1) - math.lgamma(trial_count - count + 1)
+
+    return math.fsum(
+        math.exp(compute_log_binomial(count) + count * log_p + (trial_count - count) * log_q)
+        for count in range(min_count, trial_count + 1)
+    )
 
 
 @dataclass
@@ -120,13 +147,12 @@ class Belief:
         A small value shows that the detector confuses classes more often than its error rates state.
         """
         wrong_count = self.look_count - self.label_counts[self.detected_label]
-        # bdtrc(k, n, p) is the probability of more than k events in n trials with the event probability p.
-        return float(bdtrc(wrong_count - 1, self.look_count, self.max_confusion_rate))
+        return compute_binomial_tail(wrong_count, self.look_count, self.max_confusion_rate)
 
     @property
     def existence_probability(self) -> float:
         """Probability that the item exists, 0 to 1."""
-        return 1.0 if self.is_confirmed else float(expit(self.log_odds))
+        return 1.0 if self.is_confirmed else compute_probability(self.log_odds)
 
     @property
     def is_probable(self) -> bool:
@@ -136,7 +162,9 @@ class Belief:
     @property
     def probability_at_last_detection(self) -> float:
         """Probability that the item exists, 0 to 1, without the evidence since the last detection."""
-        return 1.0 if self.is_confirmed else float(expit(self.log_odds - math.log(self.miss_probability)))
+        if self.is_confirmed:
+            return 1.0
+        return compute_probability(self.log_odds - math.log(self.miss_probability))
 
     def add_detection(
         self, label: str, rates: ErrorRates, viewpoint: str = "", *, is_ambiguous: bool = False

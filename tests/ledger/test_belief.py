@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.special import bdtrc, expit
 
 from executive.cell.detection import Detection, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.ledger.association import compute_association_distance
-from executive.ledger.belief import Belief
+from executive.ledger.belief import Belief, compute_binomial_tail, compute_probability
 from executive.ledger.bin_contents import update_bin_log_odds
 from executive.ledger.item import ItemRecord
 
@@ -129,3 +130,14 @@ def test_the_gate_is_as_wide_as_the_measurements_scatter(spread: float, new: flo
     item.standard_error = spread
     observation = Observation(Detection("cube", 0.9, (0, 0, 1, 1)), HERE, new)
     assert compute_association_distance(item, observation, 0.025) == pytest.approx(allowed)
+
+
+@given(st.floats(-1e4, 1e4))
+def test_a_probability_from_log_odds_is_the_logistic_function_to_the_last_bit(log_odds: float) -> None:
+    assert compute_probability(log_odds) == pytest.approx(float(expit(log_odds)), rel=0, abs=1e-300)
+
+
+@given(st.integers(0, 2000), st.integers(0, 2000), st.floats(1e-6, 0.999))
+def test_the_tail_of_a_binomial_distribution_is_that_of_scipy(count: int, more: int, rate: float) -> None:
+    tail = compute_binomial_tail(count, count + more, rate)
+    assert tail == pytest.approx(bdtrc(count - 1, count + more, rate), rel=1e-9, abs=1e-200)

@@ -33,7 +33,7 @@ class LedgerConfig(Section):
 class DetectorConfig(Section):
     """A detector, its thresholds, its declared error rates, and the options of its kind."""
 
-    model_config = ConfigDict(extra="allow", frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="allow", frozen=True)
 
     kind: str
     """Kind of detector: the name of an entry point of the group `executive.detectors`."""

@@ -70,4 +70,4 @@ Seconds = Annotated[float, Field(ge=0, le=600)]
 class Section(BaseModel):
     """A section of a cell file: unknown keys are errors, and the values are immutable."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid", frozen=True)

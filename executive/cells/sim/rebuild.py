@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import BPoly
 
 from executive.cell.clock import STEP
 from executive.cells.sim import command_log
@@ -92,6 +91,9 @@ class SampledMotion:
     """
 
     def __init__(self, states: JointState, duration: float) -> None:
+        # scipy.interpolate is imported here because the import takes 0.5 s, and only resumed runs need it.
+        from scipy.interpolate import BPoly
+
         self.duration = duration
         motion_times = np.append(np.arange(0.0, duration, STEP), duration)
         if len(motion_times) == 1:  # a motion of duration 0

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import TypeAlias, cast
 
 from pydantic import TypeAdapter
@@ -43,11 +45,28 @@ class Draft07(GenerateJsonSchema):
         """Return the schema of a section of the cell file, without title."""
         section_schema = super().model_schema(schema)
         del section_schema["title"]
+        for name, docstring in find_attribute_docstrings(schema["cls"]).items():
+            section_schema["properties"][name]["description"] = docstring
         return section_schema
 
     def field_title_should_be_set(self, _schema: object) -> bool:
         """Return False, because no field has a title."""
         return False
+
+
+def find_attribute_docstrings(declaring_class: type[object]) -> dict[str, str]:
+    """Return the docstring of each annotated attribute in the body of a class, by name of the attribute.
+
+    The option `use_attribute_docstrings` of pydantic would parse the source code in every process.
+    """
+    (class_definition,) = ast.parse(inspect.getsource(declaring_class)).body
+    assert isinstance(class_definition, ast.ClassDef)
+    docstrings = {}
+    for attribute, comment in pairwise(class_definition.body):
+        match attribute, comment:
+            case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(docstring))):
+                docstrings[name] = inspect.cleandoc(docstring)
+    return docstrings
 
 
 def make_type_schema(declared_type: object) -> Schema:
