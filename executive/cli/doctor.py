@@ -215,7 +215,8 @@ def prepare_renderer(renderer: str) -> Callable[[], object]:
     """
     import pybullet
 
-    from executive.cells.sim.camera import CELL_LIGHT, get_camera_pose, render
+    from executive.cells.sim.camera import get_camera_pose
+    from executive.cells.sim.renderer import CELL_LIGHT, render
     from executive.cells.sim.world import World
     from executive.cli.cells import load_cells
     from executive.perception.camera_model import compute_calibration

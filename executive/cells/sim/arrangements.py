@@ -17,8 +17,8 @@ from executive.cell.clock import STEP
 from executive.cell.config import CameraConfig, CellConfig, Colour, ObjectConfig
 from executive.cell.layout import build_bins
 from executive.cells.ground_truth import UNKNOWN_LABEL
-from executive.cells.sim.camera import Region
 from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, load_mesh
+from executive.cells.sim.renderer import Region
 from executive.cells.sim.variations import draw_object_colour
 from executive.cells.sim.world import World, add_bin
 from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field
 from executive.cell.config import CellConfig, Colour, NoiseConfig, Section
 from executive.cell.config.section import Fraction, Natural, check_ascending
 from executive.cells.sim.arrangements import DAMAGED_MODEL_NUMBER, UNKNOWN_MODEL_COUNT
-from executive.cells.sim.camera import Light
+from executive.cells.sim.renderer import Light
 from executive.cells.sim.table_top import PATTERN_COUNT, PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, make_error, sort_findings, suggest_choice

@@ -17,17 +17,9 @@ from executive.cell.config import CellConfig
 from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim import arrangements, variations
 from executive.cells.sim.arrangements import SceneObject
-from executive.cells.sim.camera import (
-    CELL_LIGHT,
-    Image,
-    Region,
-    RenderedImage,
-    add_depth_noise,
-    add_noise,
-    get_camera_pose,
-    render,
-)
+from executive.cells.sim.camera import add_depth_noise, add_noise, get_camera_pose
 from executive.cells.sim.models import load_mesh
+from executive.cells.sim.renderer import CELL_LIGHT, Image, Region, RenderedImage, render
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
 from executive.cells.sim.scene_world import apply_scene, paint_table
 from executive.cells.sim.silhouette import compute_bounding_box, compute_silhouette_area

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from executive.cell.config import CameraConfig, Colour, NoiseConfig
-from executive.cells.sim.camera import Light
+from executive.cells.sim.renderer import Light
 from executive.cells.sim.table_top import PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE
 from executive.geometry import Array, Pose, rotate_about_z
 from executive.perception.camera_model import intersect_plane

@@ -12,7 +12,6 @@ import pytest
 from executive.cell.config import CellConfig
 from executive.cells.sim import command_log as log
 from executive.cells.sim import pictures as module
-from executive.cells.sim.camera import Image
 from executive.cells.sim.command_log import CommandLog
 from executive.cells.sim.pictures import (
     BOTTOM_COLOUR,
@@ -22,6 +21,7 @@ from executive.cells.sim.pictures import (
     render_pictures,
     render_pictures_in_process,
 )
+from executive.cells.sim.renderer import Image
 from executive.cells.sim.viewpoint import compute_viewpoint
 from executive.errors import InputError
 

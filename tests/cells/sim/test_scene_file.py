@@ -19,9 +19,9 @@ from executive.cell.frame import Frame
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import SHIPPED_ROUTES, SilentOperator
 from executive.cells.ground_truth import UNKNOWN_LABEL
-from executive.cells.sim.camera import CELL_LIGHT
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh
+from executive.cells.sim.renderer import CELL_LIGHT
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, load_scene
 from executive.cells.sim.scene_world import apply_scene
 from executive.cells.sim.scenes import SceneRenderer

@@ -8,8 +8,9 @@ import pytest
 
 from executive.cell.config import CalibrationConfig, CameraConfig, CellConfig, DepthConfig, NoiseConfig
 from executive.cells.sim.arm_occlusion import ArmOcclusion
-from executive.cells.sim.camera import CELL_LIGHT, SimCamera, add_depth_noise, get_camera_pose, render
+from executive.cells.sim.camera import SimCamera, add_depth_noise, get_camera_pose
 from executive.cells.sim.models import load_mesh
+from executive.cells.sim.renderer import CELL_LIGHT, render
 from executive.cells.sim.world import World
 from executive.geometry import Pose, rotate_about_z
 from executive.motion.arms import build_kinematics
