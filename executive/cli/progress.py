@@ -15,9 +15,11 @@ from rich.progress import (
     MofNCompleteColumn,
     Progress,
     ProgressColumn,
+    Task,
     TextColumn,
     TimeRemainingColumn,
-)
+)  # fmt: skip
+from rich.text import Text
 
 from executive.cli.streams import open_unescaped_stderr
 
@@ -25,11 +27,19 @@ LINE_PERIOD = 10.0
 """Minimum time between two progress lines if stderr is not a terminal [s]."""
 
 
+class RateColumn(ProgressColumn):
+    """Column of a progress bar with the number of completed parts per minute."""
+
+    def render(self, task: Task) -> Text:
+        """Return the content of the column; empty before the first completed part."""
+        return Text(f"{60 * task.speed:.1f} per minute" if task.speed else "")
+
+
 @contextmanager
 def show_progress(
-    description: str, *, quiet: bool = False, print_lines: bool = False, has_rate: bool = False
+    description: str, *, quiet: bool = False, print_lines: bool = False
 ) -> Iterator[Callable[[int, int], None]]:
-    """Show a progress bar with the remaining time if stderr is a terminal; yield the update function.
+    """Show a progress bar with rate and remaining time if stderr is a terminal; yield the update function.
 
     The arguments of the update function are the numbers of completed parts and of all parts of the work.
 
@@ -37,33 +47,23 @@ def show_progress(
         description: Name of the work, beside the bar.
         quiet: True to show nothing.
         print_lines: True to print a line per `LINE_PERIOD` if stderr is not a terminal.
-        has_rate: True to show the number of completed parts per minute.
     """
     console = Console(file=open_unescaped_stderr())
-    columns: list[ProgressColumn] = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()]
-    columns += [TextColumn("{task.fields[rate]}")] if has_rate else []
+    estimates = (RateColumn(), TimeRemainingColumn())
+    bar = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     is_hidden = quiet or not console.is_interactive
     if print_lines and not quiet and is_hidden:
-        yield _make_line_printer(description, has_rate=has_rate)
+        yield _make_line_printer(description)
         return
     # The remaining time is estimated from all completed parts, because a part may take minutes.
-    columns.append(TimeRemainingColumn())
-    with Progress(*columns, console=console, disable=is_hidden, speed_estimate_period=math.inf) as progress:
-        task, start_time = progress.add_task(description, total=None, rate=""), time.monotonic()
-
-        def update(completed: int, total: int) -> None:
-            rate = _format_rate(completed, start_time)
-            progress.update(task, completed=completed, total=total, rate=rate)
-
-        yield update
+    with Progress(
+        *bar, *estimates, console=console, disable=is_hidden, speed_estimate_period=math.inf
+    ) as progress:
+        task = progress.add_task(description, total=None)
+        yield lambda completed, total: progress.update(task, completed=completed, total=total)
 
 
-def _format_rate(completed: int, start_time: float) -> str:
-    """Return the number of parts completed per minute since `start_time` (of `time.monotonic`) as text."""
-    return f"{60 * completed / max(time.monotonic() - start_time, 1e-9):.1f} per minute"
-
-
-def _make_line_printer(description: str, *, has_rate: bool) -> Callable[[int, int], None]:
+def _make_line_printer(description: str) -> Callable[[int, int], None]:
     """Return an update function that prints at most one line per `LINE_PERIOD`."""
     start_time = last_print_time = time.monotonic()
 
@@ -72,10 +72,9 @@ def _make_line_printer(description: str, *, has_rate: bool) -> Callable[[int, in
         now = time.monotonic()
         if completed and now - last_print_time >= LINE_PERIOD:
             last_print_time = now
-            remaining_time = (now - start_time) / completed * (total - completed)
-            rate = f", {_format_rate(completed, start_time)}" if has_rate else ""
-            remaining = f"about {remaining_time:.0f} s left"
-            click.echo(f"{description}: {completed} of {total}{rate}, {remaining}", err=True)
+            rate = completed / (now - start_time)
+            estimates = f"{60 * rate:.1f} per minute, about {(total - completed) / rate:.0f} s left"
+            click.echo(f"{description}: {completed} of {total}, {estimates}", err=True)
 
     return update
 

@@ -105,7 +105,7 @@ def command(
             jobs = list_jobs(settings, folder)
             stored = {run.job for run in database.read_runs()}
             missing = [job for job in jobs if job.index not in stored]
-            with show_progress(settings.mission, print_lines=True, has_rate=True) as progress:
+            with show_progress(settings.mission, print_lines=True) as progress:
                 run_sweep(missing, database, workers=workers, progress=progress, on_halt=print_halt)
             rows = database.read_runs()
             repeat = functools.partial(make_repeat_command, settings)

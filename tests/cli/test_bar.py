@@ -54,7 +54,7 @@ def test_without_a_terminal_some_work_writes_lines(
     with show_progress("frames", print_lines=True) as move:
         for done in (1, 3, 4):
             move(done, 9)
-    assert capsys.readouterr() == ("", "frames: 3 of 9, about 24 s left\n")
+    assert capsys.readouterr() == ("", "frames: 3 of 9, 15.0 per minute, about 24 s left\n")
 
 
 @pytest.fixture

@@ -41,23 +41,17 @@ class ResultsDatabase:
     def __init__(self, path: Path, settings: SweepSettings | None = None) -> None:
         self.path = path
         if settings is None and not path.is_file():
-            raise InputError(
-                f'there is no file "{path}"; name the file {FILE_NAME} of a sweep, or its folder'
-            )
+            advice = f"name the file {FILE_NAME} of a sweep, or its folder"
+            raise InputError(f'there is no file "{path}"; {advice}')
         with self._explain_errors():
             self._connection = sqlite3.connect(path, timeout=LOCK_TIMEOUT)
-        try:
-            with self._explain_errors():
-                if settings is not None:
-                    self._create_tables(settings)
-                (version,) = self._connection.execute("PRAGMA user_version").fetchone()
-                if version != SCHEMA_VERSION:
-                    advice = f"this program reads version {SCHEMA_VERSION}; start a new sweep"
-                    raise InputError(f'"{path}" is no results of a sweep, or has version {version}; {advice}')
-                (self.settings,) = self._read(SETTINGS)
-        except BaseException:
-            self._connection.close()
-            raise
+            if settings is not None:
+                self._create_tables(settings)
+            (version,) = self._connection.execute("PRAGMA user_version").fetchone()
+        if version != SCHEMA_VERSION:
+            advice = f"this program reads version {SCHEMA_VERSION}; start a new sweep"
+            raise InputError(f'"{path}" is no results of a sweep, or has version {version}; {advice}')
+        (self.settings,) = self._read(SETTINGS)
 
     def append(self, record: RunRecord) -> None:
         """Store the rows of a run in one transaction.
@@ -103,10 +97,8 @@ class ResultsDatabase:
         try:
             yield
         except sqlite3.Error as error:
-            advice = "the file contains all runs that ended before"
-            raise InputError(
-                f'the results "{self.path}" cannot be read or written: {error}; {advice}'
-            ) from error
+            problem = f'the results "{self.path}" cannot be read or written: {error}'
+            raise InputError(f"{problem}; the file contains all runs that ended before") from error
 
 
 def find_database(path: Path) -> Path:

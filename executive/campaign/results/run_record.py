@@ -32,10 +32,9 @@ def _list_items(job: int, timeline: Timeline) -> Iterator[ItemRow]:
     """Yield the row of each item."""
     for name, history in timeline.items.by_name.items():
         last = history.last_change
-        yield ItemRow(
-            job=job, item=name, label=last.label, state=last.state, bin=last.bin, attempts=last.attempts,
-            robot_time_s=_measure_item_time(name, timeline),
-        )  # fmt: skip
+        time = _measure_item_time(name, timeline)
+        end = {"label": last.label, "state": last.state, "bin": last.bin}
+        yield ItemRow(job=job, item=name, **end, attempts=last.attempts, robot_time_s=time)
 
 
 def _measure_item_time(name: str, timeline: Timeline) -> float:
@@ -55,10 +54,7 @@ def _list_phases(job: int, timeline: Timeline) -> Iterator[PhaseRow]:
     """Yield the row of each skill."""
     for skill in dict.fromkeys(activation.skill for activation in timeline.activations if activation.skill):
         activations = [activation for activation in timeline.activations if activation.skill == skill]
-        yield PhaseRow(
-            job=job,
-            phase=skill,
-            activations=len(activations),
-            failures=sum(activation.status == "FAILURE" for activation in activations),
-            robot_time_s=round(sum(each.end - each.start for each in activations), DECIMAL_PLACES),
-        )
+        failure_count = sum(activation.status == "FAILURE" for activation in activations)
+        time = round(sum(each.end - each.start for each in activations), DECIMAL_PLACES)
+        counts = {"activations": len(activations), "failures": failure_count}
+        yield PhaseRow(job=job, phase=skill, **counts, robot_time_s=time)

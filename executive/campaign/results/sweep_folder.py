@@ -52,13 +52,8 @@ def create_sweep(
         saves_pictures=saves_pictures, inputs_hash="", versions=dict(list_versions()),
     )  # fmt: skip
     missions = _load_variants(settings)
-    name = missions[0].mission.name
-    settings = replace(
-        settings,
-        mission_name=name,
-        cell=str(missions[0].cell_path),
-        inputs_hash=_hash_inputs(missions, scene),
-    )
+    name, cell, inputs_hash = missions[0].mission.name, missions[0].cell_path, _hash_inputs(missions, scene)
+    settings = replace(settings, mission_name=name, cell=str(cell), inputs_hash=inputs_hash)
     return ResultsDatabase(make_dated_folder(runs, f"sweep_{name}", datetime.now()) / FILE_NAME, settings)
 
 
