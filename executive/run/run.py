@@ -13,6 +13,7 @@ from py_trees.trees import BehaviourTree
 from executive.cell.workcell import Workcell
 from executive.errors import ExecutiveError, Fault, Stopped
 from executive.events import FaultRaised, Observer, RunEnded, RunHalted, RunStarted
+from executive.run.garbage_collection import shorten_collections
 from executive.run.outcome import HALTED, LoopEnd, catch_problems, check_items, finalize_items, make_loop_end
 from executive.run.run_context import RunContext, brake_arm
 from executive.run.run_control import RunControl
@@ -109,7 +110,7 @@ class Run:
         If the tree succeeds, the final states of the items determine the status of the run.
         """
         context = self._context
-        with halt_on_signals(self.control):
+        with halt_on_signals(self.control), shorten_collections():
             loop_end = self._tick_until_end()
             problems = halt(self.root) + catch_problems(lambda: brake_arm(context.cell, context.advance))
         if loop_end.traceback:

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
-from executive.cell.workcell import CellOptions, KeyPath
+from executive.cell.workcell import CellOptions
 from executive.cells.ground_truth import FinalObject, count_outcomes
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.arm_occlusion import ArmOcclusion
 from executive.cells.sim.camera import SimCamera
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.command_log import CommandLog, read_commands
-from executive.cells.sim.min_times import SimMinTimes
-from executive.cells.sim.models import build_simulated_class, find_model_errors
-from executive.cells.sim.poses import find_places_out_of_reach, find_pose_errors
+from executive.cells.sim.kind import SimCellChecks, find_missing_depth_sensors
+from executive.cells.sim.models import build_simulated_class
 from executive.cells.sim.rebuild import WorldRebuilder
 from executive.cells.sim.scene_file import load_scene
-from executive.cells.sim.spawn import build_initial_world, derive_seeds, find_lack_of_room
+from executive.cells.sim.spawn import build_initial_world, derive_seeds
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.visuals import SimVisuals
 from executive.cells.sim.world import World
@@ -29,8 +28,7 @@ from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.text.file_search import get_shipped_folder
-from executive.motion.arms import build_planner, find_arm_errors
-from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
+from executive.motion.arms import build_planner
 from executive.perception.detectors.requests import ClosableDetector
 from executive.perception.detectors.screening import screen_detectors
 from executive.perception.envelope.rated_detectors import build_rated_detectors
@@ -40,7 +38,7 @@ MIN_CENTRE_HEIGHT = -0.05
 """Minimum height of the centre of an object that is still on the table [m]."""
 
 
-class SimCell(CellWithoutHardware):
+class SimCell(SimCellChecks, CellWithoutHardware):
     """The simulated cell of a cell file; implements `executive.cell.workcell.Workcell`.
 
     Args:
@@ -67,7 +65,7 @@ class SimCell(CellWithoutHardware):
         build_camera: Callable[..., SimCamera] = SimCamera,
         build_detectors: Callable[..., Mapping[str, ClosableDetector]] = build_rated_detectors,
     ) -> None:
-        for _, message in _find_missing_depth_sensors(config):
+        for _, message in find_missing_depth_sensors(config):
             raise InputError(f"cell {config.cell}: {message}")
         super().__init__(config, seed=seed, routes=routes, emit=emit, options=options)
         clock, bins = self.cell.clock, self.cell.bins.values()
@@ -110,36 +108,6 @@ class SimCell(CellWithoutHardware):
             localizer=localizer,
         )
 
-    @staticmethod
-    def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return key and message of each requirement of a cell file that the simulated cell cannot fulfil.
-
-        The requirements concern the arm and its reach, the models, the detectors, the room for the objects,
-        the clearance of the poses, and the view of the cameras.
-        """
-        if arm_errors := tuple(find_arm_errors(config)):
-            return arm_errors
-        model_errors = tuple(find_model_errors(config))
-        return (
-            *model_errors,
-            *_find_missing_depth_sensors(config),
-            *find_detector_errors(config.detectors, cell_folder),
-            *find_places_out_of_reach(config),
-            *find_lack_of_room(config),
-            # The check of the poses builds a world, which is impossible if a model is missing.
-            *(() if model_errors else find_pose_errors(config)),
-        )
-
-    @staticmethod
-    def labels(config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return the classes that each detector knows, or None if unknown; no detector model is loaded."""
-        return find_detectable_labels(config.detectors, cell_folder)
-
-    @staticmethod
-    def min_times(config: CellConfig) -> SimMinTimes:
-        """Return the minimum times of descent, transport and detection in a cell of this configuration."""
-        return SimMinTimes(config)
-
     def log_to(self, path: Path) -> None:
         """Record all later commands for the simulated world in a log file."""
         self._world.log = CommandLog(path, self._world.robot.joint_count)
@@ -177,14 +145,6 @@ class SimCell(CellWithoutHardware):
         self.steps, self.last_command_step = rebuilder.step_count, rebuilder.last_command_step
         self._world.log = CommandLog(log, self._world.robot.joint_count, resume=True)
         return rebuilder
-
-
-def _find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each camera without a depth sensor if the cell localizes by depth."""
-    for name, camera in config.cameras.items():
-        if config.localization == "depth" and camera.depth is None:
-            message = f'localization "depth" needs a camera with depth, and {name} has none; give it a '
-            yield ("localization",), message + 'section "depth: {}", or use "plane"'
 
 
 def list_final_objects(world: World, tool: SuctionTool, bins: Mapping[str, Bin]) -> Iterator[FinalObject]:

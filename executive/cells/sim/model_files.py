@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
@@ -77,6 +78,7 @@ def _normalize_name(urdf: Path, name: str) -> str:
     return name
 
 
+@lru_cache(maxsize=64)
 def _count_triangles(path: Path) -> int:
     """Return the number of triangles of a Wavefront or STL file; raise `InputError` if unreadable."""
     try:
