@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
+import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
@@ -40,6 +42,7 @@ class ResultsDatabase:
 
     def __init__(self, path: Path, settings: SweepSettings | None = None) -> None:
         self.path = path
+        self._folder: int | None = None
         if settings is None and not path.is_file():
             advice = f"name the file {FILE_NAME} of a sweep, or its folder"
             raise InputError(f'there is no file "{path}"; {advice}')
@@ -52,6 +55,19 @@ class ResultsDatabase:
             advice = f"this program reads version {SCHEMA_VERSION}; start a new sweep"
             raise InputError(f'"{path}" is no results of a sweep, or has version {version}; {advice}')
         (self.settings,) = self._read(SETTINGS)
+
+    def lock(self) -> None:
+        """Reserve the sweep for this process until the database is closed; other processes can read the file.
+
+        Raises:
+            InputError: Another process has reserved the sweep.
+        """
+        self._folder = os.open(self.path.parent, os.O_RDONLY)
+        try:
+            fcntl.flock(self._folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            advice = "wait until that process has ended; runs would be executed twice"
+            raise InputError(f'another process executes the sweep "{self.path}"; {advice}') from error
 
     def append(self, record: RunRecord) -> None:
         """Store the rows of a run in one transaction.
@@ -79,6 +95,9 @@ class ResultsDatabase:
     def close(self) -> None:
         """Close the file."""
         self._connection.close()
+        if self._folder is not None:
+            os.close(self._folder)
+            self._folder = None
 
     def _create_tables(self, settings: SweepSettings) -> None:
         with self._connection as connection:

@@ -54,14 +54,17 @@ def create_sweep(
     missions = _load_variants(settings)
     name, cell, inputs_hash = missions[0].mission.name, missions[0].cell_path, _hash_inputs(missions, scene)
     settings = replace(settings, mission_name=name, cell=str(cell), inputs_hash=inputs_hash)
-    return ResultsDatabase(make_dated_folder(runs, f"sweep_{name}", datetime.now()) / FILE_NAME, settings)
+    folder = make_dated_folder(runs, f"sweep_{name}", datetime.now())
+    database = ResultsDatabase(folder / FILE_NAME, settings)
+    database.lock()
+    return database
 
 
 def open_sweep(path: Path) -> ResultsDatabase:
     """Open the database of a sweep to resume the sweep; `path` is the file, or the folder of the sweep.
 
     Raises:
-        InputError: There is no such sweep, or an input has changed.
+        InputError: There is no such sweep, another process executes the sweep, or an input has changed.
     """
     database = ResultsDatabase(find_database(path))
     settings = database.settings
@@ -71,6 +74,7 @@ def open_sweep(path: Path) -> ResultsDatabase:
             f'after the sweep "{path}" began, and the results would mix both versions; restore the files, or '
             "start a new sweep without --resume"
         )
+    database.lock()
     return database
 
 

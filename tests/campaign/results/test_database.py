@@ -102,3 +102,14 @@ def test_another_file_is_refused(tmp_path: Path) -> None:
     ]:
         with pytest.raises(InputError, match=message):
             ResultsDatabase(tmp_path / name)
+
+
+def test_two_processes_do_not_execute_the_same_sweep(tmp_path: Path) -> None:
+    with closing(ResultsDatabase(tmp_path / "a", SETTINGS)) as first:
+        first.lock()
+        with closing(ResultsDatabase(tmp_path / "a")) as second:
+            assert second.read_runs() == [], "it can be read meanwhile"
+            with pytest.raises(InputError, match=r'another process executes the sweep ".*/a"; wait until'):
+                second.lock()
+    with closing(ResultsDatabase(tmp_path / "a")) as third:
+        third.lock()
