@@ -7,6 +7,7 @@ import math
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
 from executive.manipulation.tool_goals import choose_bin, sort_pickable_targets
+from executive.manipulation.tours import sort_by_tour
 from executive.perception.evidence import describe_unknown_labels
 from executive.skill import In, Out, Skill, SkillFailed, param, port
 
@@ -23,6 +24,8 @@ class SelectTarget(Skill):
     has a quota and is below this quota; without quotas, the bin with the fewest objects. A deferred item
     comes after all others (see `Defer`).
 
+    * `shortest_tour` prefers the target with which the travel to all targets, each from the bin of the last
+      one, is the shortest.
     * `nearest` prefers the target nearest to the tool or, while the arm moves, to the destination of the arm.
     * `surest` prefers the target with the highest confidence of the last detection.
     * `least_tried` prefers the fewest failed attempts and, of several such targets, the nearest.
@@ -39,9 +42,9 @@ class SelectTarget(Skill):
     item: Out[Item] = port(refers_to="item", doc="the item of the target")
     bin: Out[str] = port(refers_to="bin", doc="the bin for the target")
     prefer: str = param(
-        "nearest",
-        choices=("nearest", "surest", "least_tried"),
-        doc="the `nearest`, the `surest` or the `least_tried` target",
+        "shortest_tour",
+        choices=("shortest_tour", "nearest", "surest", "least_tried"),
+        doc="the first of the `shortest_tour`, the `nearest`, the `surest` or the `least_tried` target",
     )
     reasons = ("no_candidate", "unseen", "doubtful")
 
@@ -51,7 +54,9 @@ class SelectTarget(Skill):
         candidates = [target for target in pickable_targets if self._is_requested(cell, target.item)]
         if not candidates:
             raise self._make_failure_without_candidate(cell)
-        # The candidates are sorted by distance, and `min` returns the first of equal ones.
+        if self.prefer == "shortest_tour":
+            candidates = sort_by_tour(cell, candidates)
+        # The candidates are sorted by distance or tour, and `min` returns the first of equal ones.
         best = min(candidates, key=lambda target: self._make_sort_key(cell, target))
         if names := self._format_uncertain_items(cell, cell.ledger.describe(best.item).deferral_rank):
             message = f"{best.item} is deferred, and not enough looks agree on {names} yet; look again"

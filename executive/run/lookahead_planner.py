@@ -7,14 +7,15 @@ from executive.cell.protocols import Cell
 from executive.events import FrameSearched, MotionPlanned, TargetSelected, TimedEvent, ToolCommanded
 from executive.manipulation.motions import make_transport_task
 from executive.manipulation.tool_goals import make_approach, make_bin_goal, sort_pickable_targets
+from executive.manipulation.tours import sort_by_tour
 
 
 class LookaheadPlanner:
     """Lets the arm plan the motion that the mission will probably need next.
 
     When the tool holds an item, the planner plans the transit of the item to its bin. During a transit, the
-    planner plans the approach to the nearest target: in 60 runs of `sort_overhead` and `sort_wrist`, the
-    skill `SelectTarget` selected the nearest target after each of 222 transits.
+    planner plans the approach to the first target of the shortest tour, which the skill `SelectTarget`
+    prefers by default.
 
     The planner changes no decision, and its reads of the cell are not recorded: a replay needs no planner.
 
@@ -53,7 +54,8 @@ class LookaheadPlanner:
             cell.arm.plan_ahead(make_bin_goal(cell, bin, item), make_transport_task(cell, item))
         elif self._may_plan_approach and held_item is not None and self._is_moving_to_bin():
             self._may_plan_approach = False
-            if targets := sort_pickable_targets(cell, cell.ledger.find_targets()):
+            pickable_targets = sort_pickable_targets(cell, cell.ledger.find_targets())
+            if targets := sort_by_tour(cell, pickable_targets):
                 cell.arm.plan_ahead(*make_approach(cell, targets[0]))
 
     def _is_moving_to_bin(self) -> bool:

@@ -78,7 +78,7 @@ def test_an_object_between_near_neighbours_is_picked_after_they_are_gone() -> No
     substitutes = {"*/Approach": CarefulApproach}
 
     def put_a_corner(cell: FakeCell) -> None:
-        put(cell, ("cube", 0.43, 0.2), ("sphere", 0.51, 0.2), ("duck", 0.43, 0.12))
+        put(cell, ("cube", 0.43, -0.2), ("sphere", 0.51, -0.2), ("duck", 0.43, -0.12))
 
     result = run_mission("sort_with_second_chance", arrange=put_a_corner, substitutes=substitutes)
     assert (result.status, list_placed(result)[-1]) == ("SUCCESS", "cube-1")

@@ -28,6 +28,13 @@ def test_the_nearest_target_comes_first_with_its_bin(fake: FakeCell, look) -> No
     assert result.commands == ["decided duck-1 yellow_bin"]
 
 
+def test_without_a_preference_the_shortest_tour_decides(fake: FakeCell, look) -> None:
+    put(fake, cube=(0.5, 0.2), duck=(0.5, -0.15))
+    fake.arm.start(fake.arm.plan(Goal((0.5, 0.05, 0.3))).result())
+    assert select(fake, look(), prefer="nearest").outputs["item"] == "cube-1"
+    assert select(fake, look()).outputs["item"] == "duck-1"
+
+
 def test_while_the_arm_moves_the_nearest_is_the_one_nearest_to_where_it_will_be(fake: FakeCell, look) -> None:
     put(fake, cube=(0.45, 0.0), duck=(0.6, -0.2))
     targets = look()
