@@ -122,7 +122,7 @@ def run_crowded(
 
 def assert_ended_as_crowded(result: Mapping[str, Any], journal: str, count: int) -> None:
     assert (result.status, result.reason) == ("FAILURE", "Detect.crowded")
-    assert result.message.startswith(f"detector embedded found {count} boxes in the view table")
+    assert result.message.startswith(f"detector embedded found {count} boxes in the view")
     assert "at most 60 are allowed" in result.message
     assert result.wall_time_s < MAX_WALL_TIME
     entries = [json.loads(line)["kind"] for line in journal.splitlines()]

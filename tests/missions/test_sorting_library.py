@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from executive.events import FaultInjected
+from executive.events import FaultInjected, FrameSearched, MotionPlanned, ToolCommanded
 from executive.testing.faults import (
     ScheduledFault,
     after,
@@ -46,6 +46,16 @@ def test_a_sort_outlasts_the_restart_of_a_server(start: float, duration: float) 
     assert result.agrees
     assert result.items["placed"] == result.audit["right"] == result.items["seen"] >= 3
     assert result.robot_time > start + duration
+
+
+def test_the_last_look_needs_no_motion_and_is_later_than_the_last_release() -> None:
+    result = run_mission("sort_overhead", seed=1)
+    events = [one.event for one in result.events]
+    last_release = max(number for number, event in enumerate(events) if isinstance(event, ToolCommanded))
+    rest = events[last_release:]
+    assert result.status == "SUCCESS"
+    assert [event.view for event in rest if isinstance(event, FrameSearched)] == ["full"]
+    assert not [event for event in rest if isinstance(event, MotionPlanned)]
 
 
 COLLISION = during("*second*/do/MoveToScan", arm_collides(), activations=1)
