@@ -28,14 +28,22 @@ class Goal:
         position: Position of the tool centre point `(x, y, z)` [m].
         yaw: Rotation of the tool about the vertical axis [rad]; None: the planner chooses the rotation.
         guarded_length: Length of the guarded descent [m]; 0: no guarded descent. The guarded descent is the
-            slow vertical end of the motion, during which the tool may touch the target.
-        guarded_speed: Maximum tool speed of the guarded descent [m/s].
+            end of the motion, during which the tool may touch the target.
+        guarded_speed: Maximum tool speed of the slow end of the guarded descent [m/s].
+        fast_length: Length of the beginning of the guarded descent, in which the arm still brakes [m]; the
+            remaining, slow end is vertical.
     """
 
     position: tuple[float, float, float]
     yaw: float | None = None
     guarded_length: float = 0.0
     guarded_speed: float = math.inf
+    fast_length: float = 0.0
+
+    @property
+    def slow_length(self) -> float:
+        """Length of the slow, vertical end of the motion [m]."""
+        return self.guarded_length - self.fast_length
 
 
 @dataclass(frozen=True)

@@ -68,6 +68,9 @@ class Ledger(Protocol):
     def is_certain(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough to pick it."""
 
+    def is_height_confirmed(self, label: str) -> bool:
+        """Return True if the tool has touched an object of a class at the height of the class."""
+
     def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
         """Return True if almost certainly no object that the mission still sorts is visible on the table.
 

@@ -190,7 +190,9 @@ class Cell:
         localizer: The localizer, which computes the positions of detected objects.
         safe_place: Position on the table for putting down a held object `(3,)` [m].
         descent: Height above the expected surface at which the guarded descent of an approach starts [m].
-        descent_speed: Tool speed of the guarded descent [m/s].
+        slow_descent: Height above the expected surface from which the guarded descent is slow [m], if a touch
+            has confirmed the height of the class; else, the whole guarded descent is slow.
+        descent_speed: Tool speed of the slow part of the guarded descent [m/s].
         report_selection: Function that reports a selected target and the name of its bin to the run.
         quotas: Maximum numbers of objects in the bins, from the mission.
     """
@@ -208,6 +210,7 @@ class Cell:
     localizer: Localizer
     safe_place: Array
     descent: float
+    slow_descent: float
     descent_speed: float
     report_selection: Callable[[Target, str], None]
     quotas: Quotas

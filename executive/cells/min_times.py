@@ -25,7 +25,8 @@ class CellMinTimes:
     def descent_time(self) -> float:
         """Minimum time [s] of a guarded descent onto an object, which may be above its expected height."""
         motion = self._config.motion
-        return max(0.0, motion.descent - self._max_descent_shortening) / motion.descent_speed
+        slow_descent = min(motion.descent, motion.slow_descent)
+        return max(0.0, slow_descent - self._max_descent_shortening) / motion.descent_speed
 
     def get_transport_time(self, bin: str | None) -> float:
         """Return the minimum time [s] to transport an object to `bin`, or to the nearest bin if it is None.

@@ -68,6 +68,7 @@ class CellWithoutHardware:
             localizer=no_device,
             safe_place=np.array(config.safe_place),
             descent=config.motion.descent,
+            slow_descent=config.motion.slow_descent,
             descent_speed=config.motion.descent_speed,
             report_selection=emit_selection,
             quotas=options.quotas,

@@ -100,6 +100,10 @@ class LedgerQueries:
         """Return True if the existence, class and position of an item are certain enough to sort the item."""
         return self._certainty.is_certain(self._records.find(item))
 
+    def is_height_confirmed(self, label: str) -> bool:
+        """Return True if the tool has touched an object of a class at the height of the class."""
+        return any(record.touched_label == label for record in self.records)
+
     def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
         """Return True if almost certainly no object that the mission still sorts is visible on the table.
 

@@ -48,6 +48,8 @@ def make_approach(
 ) -> tuple[Goal, Task]:
     """Return goal and task of an approach to a target; the arm stops on contact in the last, guarded part.
 
+    The whole guarded part is slow until a touch confirms the height of the class.
+
     Each attempt has another horizontal offset. After `ATTEMPTS_BEFORE_PROBE` failed attempts, the motion ends
     `PROBE_CLEARANCE` above the table, because the item may be a false detection.
 
@@ -57,8 +59,10 @@ def make_approach(
         overtravel: Continuation below the expected surface [m], at most half the height of the object.
         spacing: Scale of the spiral of contact points [m].
     """
+    is_height_confirmed = cell.ledger.is_height_confirmed(target.label)
     goal = make_object_goal(
         cell.classes[target.label], target.position, cell.descent, cell.descent_speed,
+        slow_descent=cell.slow_descent if is_height_confirmed else cell.descent,
         failed_attempts=cell.ledger.describe(target.item).attempts, overtravel=overtravel, spacing=spacing,
     )  # fmt: skip
     return goal, Task(obstacles=list_obstacles(cell, target.item), target=make_obstacle(cell, target))
@@ -70,6 +74,7 @@ def make_object_goal(
     descent: float,
     descent_speed: float,
     *,
+    slow_descent: float = math.inf,
     failed_attempts: int = 0,
     overtravel: float = OVERTRAVEL,
     spacing: float = SPIRAL_SPACING,
@@ -80,7 +85,9 @@ def make_object_goal(
         object_class: Class of the object.
         position: Centre of the object `(3,)` [m].
         descent: Height above the expected surface at which the guarded part begins [m].
-        descent_speed: Tool speed in the guarded part [m/s].
+        descent_speed: Tool speed in the slow part of the guarded part [m/s].
+        slow_descent: Height above the expected surface from which the guarded part is slow [m]. After a
+            failed attempt, the whole guarded part is slow, because the expected height may be wrong.
         failed_attempts: Number of failed attempts before this approach.
         overtravel: Distance that the motion continues below the expected surface [m].
         spacing: Scale of the spiral of contact points [m].
@@ -91,7 +98,8 @@ def make_object_goal(
     if failed_attempts >= ATTEMPTS_BEFORE_PROBE:
         end_height = min(end_height, z - object_class.height / 2 + PROBE_CLEARANCE)
     guarded_length = z + object_class.height / 2 + descent - end_height
-    return Goal((x + dx, y + dy, end_height), guarded_length=guarded_length, guarded_speed=descent_speed)
+    fast_length = 0.0 if failed_attempts else max(0.0, descent - slow_descent)
+    return Goal((x + dx, y + dy, end_height), None, guarded_length, descent_speed, fast_length)
 
 
 def compute_min_contact_height(object_class: ObjectClass, centre_height: float, overtravel: float) -> float:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import contextlib
 import functools
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import islice
+from operator import itemgetter
 
 import numpy as np
 
 from executive.cell.arm import Goal, Task
+from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height
 from executive.errors import Unreachable
@@ -35,6 +37,8 @@ REFINEMENT_STEP_COUNT = 8
 """Number of further optimization steps for a detour before it is returned."""
 EXTRA_HEIGHTS = (0.0, 0.05, 0.10)
 """Heights of the corners above the travel height, in the order of the attempts [m]."""
+MAX_DURATION_FACTOR = 1.1
+"""Ratio of the duration of a motion to the cost of the next detour above which the next detour is refined."""
 LIFT_OFF_DISTANCE = 5e-4
 """Length of the straight motion upwards that separates a load from the surface below [m]."""
 MIN_RISE_COSINE = 0.99
@@ -108,37 +112,41 @@ class MotionSearch:
         if not isinstance(self._end, Goal):
             return self._kinematics.compute_tcps_and_axes(self._end[None])
         x, y, z = self._end.position
-        return np.array([[x, y, z + self._end.guarded_length]]), np.array([[0.0, 0.0, -1.0]])
+        return np.array([[x, y, z + self._end.slow_length]]), np.array([[0.0, 0.0, -1.0]])
 
     def _list_candidates(self) -> Iterator[Candidate]:
         """Return an iterator of candidates for the end of the motion, the fastest first."""
         if not isinstance(self._end, Goal):
             return iter([Candidate(0.0, JointState.at_rest(self._end), None, None)])
-        arrival_length = self._end.guarded_length or self._straight_length
+        arrival_length = self._end.slow_length or self._straight_length
         return find_candidates(self._kinematics, self._limits, self._start, self._end, arrival_length)
 
     def _list_direct_and_optimized(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
         """Yield direct motions without collision and optimized detours, the fastest first."""
-        direct_motions, optimizers = self._evaluate_candidates(candidates)
-        for candidate, optimizer in optimizers:
+        motions, optimizers = self._evaluate_candidates(candidates)
+        next_costs = [*(_compute_total_cost(*pair) for pair in optimizers), math.inf][1:]
+        for (candidate, optimizer), next_cost in zip(optimizers, next_costs, strict=True):
             optimizer.improve(REFINEMENT_STEP_COUNT)
-            while direct_motions and direct_motions[0][0] <= _compute_total_cost(candidate, optimizer):
-                yield direct_motions.pop(0)[1]
-            yield from self._sort_optimized(candidate, optimizer)
-        yield from (motion for _, motion in direct_motions)
+            while motions and motions[0][0] <= _compute_total_cost(candidate, optimizer):
+                yield motions.pop(0)[1]
+            motions = sorted([*motions, *self._list_optimized(candidate, optimizer)], key=itemgetter(0))
+            # The motion through the states of the optimizer may take much longer than the optimizer assumes.
+            while motions and motions[0][0] <= MAX_DURATION_FACTOR * next_cost:
+                yield motions.pop(0)[1]
+        yield from (motion for _, motion in motions)
 
-    def _sort_optimized(self, candidate: Candidate, optimizer: Optimizer) -> Iterable[Trajectory]:
-        """Return the optimized motions to a candidate; with a load, the fastest safe motion is first."""
-        motions, payload = self._list_optimized(candidate, optimizer), self._payload
-        if payload is None:
-            return motions
-        return sorted(motions, key=lambda motion: payload.make_safe_motion(motion).duration)
+    def _list_optimized(
+        self, candidate: Candidate, optimizer: Optimizer
+    ) -> Iterator[tuple[float, Trajectory]]:
+        """Yield duration [s] and motion: retimed to minimum time, then with the timing of the optimizer.
 
-    def _list_optimized(self, candidate: Candidate, optimizer: Optimizer) -> Iterator[Trajectory]:
-        """Yield the optimized motion, retimed to minimum time, then with the timing of the optimizer."""
+        The duration is that of the motion with which a load is safe.
+        """
         for is_exact in (False, True):
             with contextlib.suppress(JointLimitError):
-                yield self._build_motion(candidate, *optimizer.connect_states(is_exact=is_exact))
+                motion = self._build_motion(candidate, *optimizer.connect_states(is_exact=is_exact))
+                safe_motion = self._payload.make_safe_motion(motion) if self._payload else motion
+                yield safe_motion.duration, motion
 
     def _evaluate_candidates(
         self, candidates: Sequence[Candidate]
@@ -179,9 +187,14 @@ class MotionSearch:
     def _build_motion(self, candidate: Candidate, *free_part: MotionPiece) -> Trajectory:
         """Return the motion that consists of departure, free part, and arrival."""
         pieces = (self._departure, *free_part) if self._departure else free_part
-        guarded_start_time = math.inf
-        if isinstance(self._end, Goal) and self._end.guarded_length > 0:
-            guarded_start_time = sum(piece.duration for piece in pieces)
+        if not isinstance(self._end, Goal) or self._end.guarded_length == 0:
+            return Trajectory((*pieces, candidate.arrival) if candidate.arrival else pieces)
+        guarded_start_time = sum(piece.duration for piece in pieces)
+        if self._end.fast_length:
+            times = np.arange(0.0, guarded_start_time, STEP, dtype=np.float64)
+            tcps, _ = self._kinematics.compute_tcps_and_axes(sample_pieces(pieces, times).q)
+            is_above = tcps[:, 2] > self._end.position[2] + self._end.guarded_length
+            guarded_start_time = float(times[is_above].max(initial=0.0))
         return Trajectory((*pieces, candidate.arrival) if candidate.arrival else pieces, guarded_start_time)
 
     def _connect_with_corners(

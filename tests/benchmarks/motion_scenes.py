@@ -130,7 +130,9 @@ class SceneGenerator:
         kind = self._kind(first)
         target, *others = (self._make_obstacle(body, number) for number, body in enumerate(bodies, start=1))
         centre = np.array([target.x, target.y, target.top - kind.height / 2])
-        approach = make_object_goal(kind, centre, motion.descent, motion.descent_speed)
+        approach = make_object_goal(
+            kind, centre, motion.descent, motion.descent_speed, slow_descent=motion.slow_descent
+        )
         surface, force = self._measure_seal(first, approach.position[:2], target.top)
         drop = make_slot_goal(bin, slot, kind.height, self._tallest)
         return Scene(first, kind, surface + TOUCH_DISTANCE, force, target, tuple(others), approach, drop)
@@ -142,7 +144,9 @@ class SceneGenerator:
         corners = self._world.get_object_pose(body).apply(mesh.vertices)
         low, high = corners.min(axis=0), corners.max(axis=0)
         x, y = ((low[:2] + high[:2]) / 2).tolist()
-        return Obstacle(x, y, kind.radius, float(low[2]) + kind.height, f"{kind.label}-{number}")
+        # A run localizes each object on the table; the visual mesh of a duck begins 1 mm above the table.
+        bottom = float(low[2]) if low[2] > kind.height / 2 else 0.0
+        return Obstacle(x, y, kind.radius, bottom + kind.height, f"{kind.label}-{number}")
 
     def _kind(self, body: int) -> ObjectClass:
         label = self._world.labels[body]

@@ -15,12 +15,14 @@ from executive.cells.fake.cell import FakeCell
 from executive.manipulation.tool_goals import (
     DROP_HEIGHT,
     MIN_GAP,
+    OVERTRAVEL,
     make_approach,
     make_object_goal,
     make_put_down_goal,
     make_slot_goal,
 )
 from executive.testing.run_skill import run_skill
+from skills.approach import Approach
 from skills.put_down import PutDown
 
 SAFE = (0.45, -0.30)
@@ -75,6 +77,19 @@ def test_the_goal_of_an_approach_lies_below_the_surface_and_the_last_part_is_slo
     assert goal.position == pytest.approx((0.5, 0.0, 0.035))
     assert goal.position[2] + goal.guarded_length == pytest.approx(0.05 + fake.cell.descent)
     assert goal.guarded_speed == fake.cell.descent_speed
+
+
+def test_the_descent_is_fast_once_a_touch_confirmed_the_height_until_an_attempt_fails(fake: FakeCell) -> None:
+    for y in (-0.1, 0.1):
+        fake.world.put("cube", 0.5, y)
+    first, second = look(fake, "full")
+    assert make_approach(fake.cell, second)[0].fast_length == 0.0
+    run_skill(Approach(target=first), fake)
+    goal, _ = make_approach(fake.cell, second)
+    assert goal.fast_length == pytest.approx(fake.cell.descent - fake.cell.slow_descent)
+    assert goal.slow_length == pytest.approx(fake.cell.slow_descent + OVERTRAVEL)
+    fake.cell.ledger.record_failed_pick(second.item)
+    assert make_approach(fake.cell, second)[0].fast_length == 0.0
 
 
 def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -102,6 +103,23 @@ def test_the_guarded_part_is_straight_even_and_no_faster_than_asked(
     steady = tips[low, 2] > place[2] + 0.5 * guarded
     assert speeds[steady].min() > 0.5 * speed
     assert (low[1:] >= low[:-1]).all()  # it does not leave that part again
+
+
+def test_a_fast_beginning_of_the_guarded_part_saves_time_and_only_the_end_is_slow(planner, home) -> None:
+    target = Obstacle(0.5, 0.0, CUBE.radius, 0.05, "cube-1")
+    slow = Goal((0.5, 0.0, 0.035), guarded_length=0.02, guarded_speed=0.035)
+    motions = [
+        planner.plan(home, goal, Task(target=target)) for goal in (slow, replace(slow, fast_length=0.004))
+    ]
+    assert motions[1].duration < motions[0].duration - 0.07
+    tips = tips_of(planner, motions[1])
+    speeds = np.linalg.norm(tool_velocities(planner.kinematics, passed(motions[1])), axis=1)
+    assert speeds[tips[:, 2] < 0.035 + slow.guarded_length - 0.004].max() <= 0.035 * 1.001
+    start = planner.kinematics.compute_tool_pose(
+        motions[1].state_at(motions[1].guarded_start_time).q
+    ).position
+    assert 0.055 < start[2] < 0.057
+    assert start[:2] == pytest.approx((0.5, 0.0), abs=0.006)
 
 
 def neighbours(x: float, y: float, turn: float, count: int, top: float) -> tuple[Obstacle, ...]:

@@ -33,8 +33,8 @@ def test_every_part_that_can_answer_is_recorded() -> None:
     same = {name for name in vars(cell) if getattr(cell, name) is getattr(fake.cell, name)}
     # The content of a file, and the knowledge of the run itself.
     assert same == {
-        "ledger", "bins", "classes", "routes", "quotas", "safe_place", "descent", "descent_speed",
-        "report_selection",
+        "ledger", "bins", "classes", "routes", "quotas", "safe_place", "descent", "slow_descent",
+        "descent_speed", "report_selection",
     }  # fmt: skip
 
 

@@ -126,8 +126,13 @@ class MotionConfig(Section):
     used if no other motion is collision-free."""
     descent: float = Field(0.005, ge=MIN_LENGTH, le=0.1)
     """Height above the expected surface at which the guarded descent of an approach starts [m]."""
+    slow_descent: float = Field(0.001, ge=MIN_LENGTH, le=0.1)
+    """Height above the expected surface from which the guarded descent is slow [m], at most `descent`, if a
+    touch has confirmed the height of the class; else, the whole guarded descent is slow. The default is the
+    distance at which the simulated tool feels a surface."""
     descent_speed: float = Field(0.035, ge=0.001, le=0.25)
-    """Tool speed of the guarded descent [m/s]; the maximum is the reduced speed of ISO 10218."""
+    """Tool speed of the slow part of the guarded descent [m/s]; the maximum is the reduced speed of ISO
+    10218."""
     straight: float = Field(0.0, ge=0, le=0.2)
     """Length of the straight vertical segment at the end of a motion into a bin, and at the start of a motion
     that begins upwards [m]."""

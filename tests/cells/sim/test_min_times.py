@@ -70,12 +70,15 @@ def test_the_bins_differ_and_no_bin_means_the_nearest(overhead, least) -> None:
 
 def test_a_descent_may_end_early_on_an_object_higher_than_expected(overhead: CellConfig) -> None:
     """The objects differ by 10 mm in height, and the lip feels a surface 1 mm away."""
-    long = SimMinTimes(changed(overhead, "motion", descent=0.02, descent_speed=0.03))
+    slow = changed(overhead, "motion", descent=0.03, slow_descent=0.02, descent_speed=0.03)
+    long = SimMinTimes(slow)
     assert long.descent_time == pytest.approx((0.020 - 0.010 - 0.001) / 0.03)
-    assert SimMinTimes(changed(overhead, "motion", descent=0.008)).descent_time == 0.0
+    assert SimMinTimes(changed(overhead, "motion", descent=0.008, slow_descent=0.02)).descent_time == 0.0
     cubes = overhead.model_copy(update={"objects": {"cube": overhead.objects["cube"]}})
     motion = overhead.motion
-    assert SimMinTimes(cubes).descent_time == pytest.approx((motion.descent - 0.001) / motion.descent_speed)
+    assert SimMinTimes(cubes).descent_time == pytest.approx(
+        (motion.slow_descent - 0.001) / motion.descent_speed
+    )
 
 
 def test_a_detector_answers_after_its_latency(overhead) -> None:

@@ -106,7 +106,7 @@ def test_a_load_travels_over_stacks_and_starts_from_their_tops(overhead: CellCon
     tallest = max(kind.height for kind in overhead.objects.values())
     over_stack = compute_travel_height(stacks) - tallest - overhead.motion.clearance
     assert over_stack == pytest.approx(2 * tallest)
-    guarded = {"motion": overhead.motion.model_copy(update={"descent": 0.1})}
+    guarded = {"motion": overhead.motion.model_copy(update={"descent": 0.1, "slow_descent": 0.1})}
     one, two = (SimMinTimes(config.model_copy(update=guarded)).descent_time for config in (overhead, stacks))
     assert one - two == pytest.approx(tallest / overhead.motion.descent_speed)
 
