@@ -8,6 +8,8 @@ a motion, detectors have found all objects; only known obstacles count there.
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -70,7 +72,7 @@ class Prisms(NamedTuple):
     """`K` upright obstacles; each base is a rectangle or a point, enlarged by a radius.
 
     Attributes:
-        min_corners, max_corners: Smallest and largest coordinates of the rectangles, `(K, 2)` each [m].
+        min_x, min_y, max_x, max_y: Smallest and largest coordinates of the rectangles, `(K,)` each [m].
         radii: Enlargement of the bases `(K,)` [m].
         tops: Height of the upper sides above the world's origin `(K,)` [m].
         is_undetected: True for undetected objects, which do not count near the ends of a motion `(K,)`.
@@ -78,13 +80,36 @@ class Prisms(NamedTuple):
         names: Name of each obstacle in messages.
     """
 
-    min_corners: Array
-    max_corners: Array
+    min_x: Array
+    min_y: Array
+    max_x: Array
+    max_y: Array
     radii: Array
     tops: Array
     is_undetected: NDArray[np.bool_]
     is_support: NDArray[np.bool_]
     names: tuple[str, ...]
+
+    def select(self, indices: NDArray[np.intp]) -> Prisms:
+        """Return the fields of the prisms with the given indices; all names remain."""
+        return Prisms._make([*(values[indices] for values in self[:-1]), self.names])
+
+
+class NearestPairs(NamedTuple):
+    """For each of `N` states, the pair of disc and prism with the smallest slack.
+
+    Attributes:
+        slack: Smallest slack, including that of the tilt `(N,)` [m].
+        pair_slack: Slack of the pair `(N,)` [m].
+        required_distances: Required distance of the pair `(N,)` [m].
+        discs, prisms: Indices of the pair `(N,)`.
+    """
+
+    slack: Array
+    pair_slack: Array
+    required_distances: Array
+    discs: NDArray[np.intp]
+    prisms: NDArray[np.intp]
 
 
 class ClearanceModel:
@@ -107,41 +132,48 @@ class ClearanceModel:
 
         `tcps` `(E, 3)` [m] and `axes` `(E, 3)` are the tool centre points and tool axes at the ends.
         """
-        end_distances = self._compute_all_distances(tcps, axes, discs).min(axis=(0, 1))
+        every = np.arange(len(self._end_margins))
+        end_distances = self._compute_all_distances(tcps, axes, discs, every).min(axis=(0, 1))
         self._end_margins = np.minimum(end_distances, self._margin)
 
-    def compute_slack(self, tcps: Array, axes: Array, discs: Discs) -> Array:
-        """Return the smallest difference between distance and required distance in each state `(N,)` [m].
+    def find_nearest_pairs(
+        self, tcps: Array, axes: Array, discs: Discs, max_slack: float = math.inf
+    ) -> NearestPairs:
+        """Return the pair of disc and prism with the smallest slack in each state.
 
-        `tcps` `(N, 3)` [m] and `axes` `(N, 3)` are the tool centre points and the tool axes.
+        The slack is the difference between distance and required distance; a value over `max_slack` [m] may
+        be too large. `tcps` `(N, 3)` [m] and `axes` `(N, 3)` are the tool centre points and the tool axes.
         """
-        slack = self._compute_all_distances(tcps, axes, discs) - self._find_required_distances(tcps)[:, None]
-        return np.minimum(slack.min(axis=(1, 2)), _compute_tilt_slack(axes, discs))
+        near = self._find_near_prisms(tcps, axes, discs, max_slack)
+        required_distances = self._find_required_distances(tcps, near)
+        slack = self._compute_all_distances(tcps, axes, discs, near) - required_distances[:, None]
+        flat_slack = slack.reshape(len(tcps), -1)
+        pairs = flat_slack.argmin(axis=1)
+        states = np.arange(len(tcps))
+        pair_slack, (disc, prism) = flat_slack[states, pairs], np.divmod(pairs, len(near))
+        min_slack = np.minimum(pair_slack, _compute_tilt_slack(axes, discs))
+        return NearestPairs(min_slack, pair_slack, required_distances[states, prism], disc, near[prism])
 
     def compute_slack_changes(
-        self, tcps: Array, axes: Array, discs: Discs, displaced: tuple[Array, Array]
+        self, pairs: NearestPairs, displaced_tcps: Array, displaced_axes: Array, axes: Array, discs: Discs
     ) -> Array:
         """Return the change of the slack of each state for each of `M` small displacements `(N, M)` [m].
 
-        For each state, only the pair of disc and prism with the smallest slack counts. The states have the
-        tool centre points `tcps` `(N, 3)` [m] and the tool axes `axes` `(N, 3)`; `displaced` is a pair of
-        the displaced tool centre points and the displaced tool axes, `(N, M, 3)` each.
+        Args:
+            pairs: Pairs of the states; for each state, only the slack of this pair counts.
+            displaced_tcps: Displaced tool centre points `(N, M, 3)` [m].
+            displaced_axes: Displaced tool axes `(N, M, 3)`.
+            axes: Tool axes of the states `(N, 3)`.
+            discs: Tool and load.
         """
-        required_distances = self._find_required_distances(tcps)
-        slack = self._compute_all_distances(tcps, axes, discs) - required_distances[:, None]
-        state_count, disc_count, prism_count = slack.shape
-        pair_slack = slack.reshape(state_count, disc_count * prism_count)
-        disc, prism = np.divmod(pair_slack.argmin(axis=1), prism_count)  # Indices `(N,)` of the pairs.
-        old_slack = pair_slack.min(axis=1)
-        required_distances = required_distances[np.arange(state_count), prism]
+        disc, prism = pairs.discs, pairs.prisms
         nearest_disc = Discs(discs.offsets[disc, None], discs.radii[disc, None], discs.min_cosine)
-        prism_fields = [values[prism, None] for values in self._prisms[:-1]]
-        nearest_prism = Prisms._make([*prism_fields, self._prisms.names])
-        new_distance = self._compute_distances(*displaced, nearest_disc, nearest_prism)
-        slack_change = new_distance - required_distances[:, None] - old_slack[:, None]
-        old_tilt_slack = _compute_tilt_slack(axes, discs)
-        tilt_change = _compute_tilt_slack(displaced[1], discs) - old_tilt_slack[:, None]
-        return np.where((old_tilt_slack < old_slack)[:, None], tilt_change, slack_change)
+        nearest_prism = self._prisms.select(prism[:, None])
+        new_distance = self._compute_distances(displaced_tcps, displaced_axes, nearest_disc, nearest_prism)
+        slack_change = new_distance - (pairs.required_distances + pairs.pair_slack)[:, None]
+        tilt_slack = _compute_tilt_slack(axes, discs)
+        tilt_change = _compute_tilt_slack(displaced_axes, discs) - tilt_slack[:, None]
+        return np.where((tilt_slack < pairs.pair_slack)[:, None], tilt_change, slack_change)
 
     def require_clearance(self, tcps: Array, axes: Array, discs: Discs) -> None:
         """Check the distances from the obstacles at tool centre points `(N, 3)` [m] and axes `(N, 3)`.
@@ -156,8 +188,9 @@ class ClearanceModel:
         # Undetected objects need no margin. The load must not be pressed into the table or a floor.
         tolerances = np.where(self._prisms.is_undetected, self._margin, POSITION_TOLERANCE + SAMPLING_MARGIN)
         tolerances = np.where(self._prisms.is_support, MAX_PENETRATION, tolerances)
-        required_distances = self._find_required_distances(tcps)[:, None]
-        slack = self._compute_all_distances(tcps, axes, discs) - required_distances + tolerances
+        every = np.arange(len(tolerances))
+        required_distances = self._find_required_distances(tcps, every)[:, None]
+        slack = self._compute_all_distances(tcps, axes, discs, every) - required_distances + tolerances
         slack = slack.min(axis=1)
         state, prism = np.unravel_index(np.argmin(slack), slack.shape)
         if slack[state, prism] < 0:
@@ -167,32 +200,47 @@ class ClearanceModel:
                 f"{self._prisms.names[prism]}{_describe_tcp(tcps[state])}"
             )
 
-    def _find_required_distances(self, tcps: Array) -> Array:
-        """Return the required distance of each state from each prism `(N, K)` [m]."""
-        end_distances = np.linalg.norm(tcps[:, None, :2] - self._end_positions, axis=-1).min(axis=1)
-        return np.where((end_distances < OBSERVED_RADIUS)[:, None], self._end_margins, self._margin)
+    def _find_near_prisms(self, tcps: Array, axes: Array, discs: Discs, max_slack: float) -> NDArray[np.intp]:
+        """Return the indices of the prisms whose slack may be `max_slack` [m] or less in a state."""
+        tops_and_bottoms = np.concatenate([tcps + offset * axes for offset in discs.offsets])[:, :2]
+        reach = self._prisms.radii + (discs.radii.max() + self._margin + max_slack)
+        (x_min, y_min), (x_max, y_max) = tops_and_bottoms.min(axis=0), tops_and_bottoms.max(axis=0)
+        prisms = self._prisms
+        is_near_in_x = (prisms.min_x - reach < x_max) & (prisms.max_x + reach > x_min)
+        is_near_in_y = (prisms.min_y - reach < y_max) & (prisms.max_y + reach > y_min)
+        return np.flatnonzero(is_near_in_x & is_near_in_y)
 
-    def _compute_all_distances(self, tcps: Array, axes: Array, discs: Discs) -> Array:
-        """Return the distance of each disc from each prism in each state `(N, P, K)` [m], negative inside."""
+    def _find_required_distances(self, tcps: Array, prisms: NDArray[np.intp]) -> Array:
+        """Return the required distance of each state from each of `K` prisms `(N, K)` [m]."""
+        is_near_end = self._compute_end_distances(tcps[:, 0], tcps[:, 1]) < OBSERVED_RADIUS
+        return np.where(is_near_end[:, None], self._end_margins[prisms], self._margin)
+
+    def _compute_end_distances(self, x: Array, y: Array) -> Array:
+        """Return the horizontal distances of points from the nearest end of the motion [m]."""
+        squares = [(x - end_x) ** 2 + (y - end_y) ** 2 for end_x, end_y in self._end_positions]
+        return np.sqrt(functools.reduce(np.minimum, squares))
+
+    def _compute_all_distances(
+        self, tcps: Array, axes: Array, discs: Discs, prisms: NDArray[np.intp]
+    ) -> Array:
+        """Return the distance of each disc from each of `K` prisms in each state `(N, P, K)` [m]."""
         disc_columns = Discs(discs.offsets[:, None], discs.radii[:, None], discs.min_cosine)
         tcps, axes = tcps[:, None, None], axes[:, None, None]
-        return self._compute_distances(tcps, axes, disc_columns, self._prisms)
+        return self._compute_distances(tcps, axes, disc_columns, self._prisms.select(prisms))
 
     def _compute_distances(self, tcps: Array, axes: Array, discs: Discs, prisms: Prisms) -> Array:
         """Return the distances between discs and prisms [m], negative inside; all arrays broadcast."""
-        centres = tcps + discs.offsets[..., None] * axes
-        x, y = centres[..., 0], centres[..., 1]
-        squares = [(x - end_x) ** 2 + (y - end_y) ** 2 for end_x, end_y in self._end_positions]
-        end_distance = np.sqrt(np.min(squares, axis=0))
-        undetected_top = np.clip(UNDETECTED_HEIGHT_SLOPE * (end_distance - OBSERVED_RADIUS), 0.0, prisms.tops)
-        top = np.where(prisms.is_undetected, undetected_top, prisms.tops)
+        x, y, z = (tcps[..., i] + discs.offsets * axes[..., i] for i in range(3))
         sine_of_tilt = np.sqrt(np.maximum(0.0, 1 - axes[..., 2] ** 2))
-        vertical = centres[..., 2] - discs.radii * sine_of_tilt - top
-        (x_min, y_min), (x_max, y_max) = (np.moveaxis(corners, -1, 0) for corners in prisms[:2])
-        dx = np.maximum(np.maximum(x_min - x, x - x_max), 0.0)
-        dy = np.maximum(np.maximum(y_min - y, y - y_max), 0.0)
-        horizontal = np.sqrt(dx**2 + dy**2) - prisms.radii - discs.radii
-        outside = np.sqrt(np.maximum(horizontal, 0.0) ** 2 + np.maximum(vertical, 0.0) ** 2)
+        end_distance = self._compute_end_distances(x, y)
+        max_undetected_top = UNDETECTED_HEIGHT_SLOPE * np.maximum(end_distance - OBSERVED_RADIUS, 0.0)
+        top = np.where(prisms.is_undetected, np.minimum(max_undetected_top, prisms.tops), prisms.tops)
+        vertical = z - discs.radii * sine_of_tilt - top
+        dx = np.maximum(np.maximum(prisms.min_x - x, x - prisms.max_x), 0.0)
+        dy = np.maximum(np.maximum(prisms.min_y - y, y - prisms.max_y), 0.0)
+        horizontal = np.sqrt(dx * dx + dy * dy) - (prisms.radii + discs.radii)
+        outside_h, outside_v = np.maximum(horizontal, 0.0), np.maximum(vertical, 0.0)
+        outside = np.sqrt(outside_h * outside_h + outside_v * outside_v)
         return np.where(outside > 0, outside, np.maximum(horizontal, vertical))
 
 
@@ -232,5 +280,6 @@ def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:
     for obstacle in obstacles:
         centre, radius = (obstacle.x, obstacle.y), obstacle.radius + POSITION_TOLERANCE
         rows.append((centre, centre, radius, obstacle.top, False, False, obstacle.name))
-    *columns, names = zip(*rows, strict=True)
-    return Prisms._make([*map(np.array, columns), names])
+    min_corners, max_corners, *columns, names = zip(*rows, strict=True)
+    corners = np.array(min_corners), np.array(max_corners)
+    return Prisms._make([*corners[0].T, *corners[1].T, *map(np.array, columns), names])

@@ -8,14 +8,17 @@ obstacle.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
-from executive.motion.clearance_model import ClearanceModel, Discs
+from executive.motion.clearance_model import ClearanceModel, Discs, NearestPairs
 from executive.motion.joints import JointLimits, JointState
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import Connector, JointLimitError, PointToPoint
@@ -38,7 +41,31 @@ INITIAL_DURATION_FRACTION = 0.8
 """Duration of the initial motion as a fraction of the duration of the motion that stops at corners."""
 JOINT_RANGE_MARGIN = 0.01
 """Minimum distance from the position limits of the joints [rad]."""
+CONVERGENCE_TOLERANCE = 2e-3
+"""Change of the cost in an optimization step below which the optimization has converged [s]."""
 _FINITE_DIFFERENCE_STEP = 1e-4  # [rad]
+
+
+class SlackEvaluation(NamedTuple):
+    """Slack of `N` joint configurations.
+
+    The slack is the smallest of these margins: each clearance minus the required clearance [m], and the
+    distance of each joint from its range limits [rad].
+
+    Attributes:
+        slack: Slack of each configuration `(N,)`.
+        axes: Tool axes `(N, 3)`.
+        pairs: Pairs of disc and prism with the smallest slack.
+    """
+
+    slack: Array
+    axes: Array
+    pairs: NearestPairs
+
+    def select(self, indices: NDArray[np.intp]) -> SlackEvaluation:
+        """Return the values of the configurations with the given indices."""
+        pairs = NearestPairs._make(values[indices] for values in self.pairs)
+        return SlackEvaluation(self.slack[indices], self.axes[indices], pairs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,23 +90,25 @@ class OptimizationProblem:
     payload: PayloadLimit | None = None
 
     def compute_slack(self, qs: Array) -> Array:
-        """Return the slack `(N,)` of joint positions `(N, n)` [rad]; it is negative if a limit is violated.
+        """Return the slack `(N,)` of joint positions `(N, n)` [rad]; it is negative for a violation."""
+        return self.evaluate(qs, math.inf).slack
 
-        The slack is the smallest of these margins: each clearance minus the required clearance [m], and the
-        distance of each joint from its range limits [rad].
-        """
+    def evaluate(self, qs: Array, max_slack: float = MAX_SLACK) -> SlackEvaluation:
+        """Return the slack of joint positions `(N, n)` [rad]; a slack over `max_slack` may be too large."""
         tcps, axes = self.kinematics.compute_tcps_and_axes(qs)
-        distance_slack = self.clearance.compute_slack(tcps, axes, self.discs)
-        return np.minimum(distance_slack, self._compute_range_slack(qs).min(axis=1))
+        pairs = self.clearance.find_nearest_pairs(tcps, axes, self.discs, max_slack)
+        return SlackEvaluation(
+            np.minimum(pairs.slack, self._compute_range_slack(qs).min(axis=1)), axes, pairs
+        )
 
-    def compute_gradients(self, qs: Array, slack: Array) -> Array:
-        """Return the gradients `(N, n)` [m/rad] of the slack `(N,)` at joint positions `(N, n)` [rad]."""
-        tcps, axes = self.kinematics.compute_tcps_and_axes(qs)
+    def compute_gradients(self, qs: Array, evaluation: SlackEvaluation) -> Array:
+        """Return the gradients `(N, n)` [m/rad] of the slack at evaluated joint positions `(N, n)` [rad]."""
         joint_count = qs.shape[1]
         displaced_qs = (qs[:, None] + _FINITE_DIFFERENCE_STEP * np.eye(joint_count)).reshape(-1, joint_count)
         displaced = self.kinematics.compute_tcps_and_axes(displaced_qs)
         new_tcps, new_axes = (values.reshape(-1, joint_count, 3) for values in displaced)
-        changes = self.clearance.compute_slack_changes(tcps, axes, self.discs, (new_tcps, new_axes))
+        slack, axes, pairs = evaluation
+        changes = self.clearance.compute_slack_changes(pairs, new_tcps, new_axes, axes, self.discs)
         gradients = changes / _FINITE_DIFFERENCE_STEP
         range_slack = self._compute_range_slack(qs)
         # If a range limit determines the slack, the slack changes only with the joint at the limit.
@@ -116,18 +145,22 @@ class Optimizer:
         motion = self._transcription.fit(INITIAL_DURATION_FRACTION * duration / STEP_COUNT, initial_qs)
         if motion is None:
             raise JointLimitError("no motion inside the limits approximates the motion that stops at corners")
-        self._best_motion, self.cost, self._trust_radius = motion, np.inf, INITIAL_TRUST_RADIUS
+        self._best_motion, self._trust_radius = motion, INITIAL_TRUST_RADIUS
+        self.cost = self._last_cost = math.inf
+        self._has_converged = False
         self._payload_constraints: list[LinearizedConstraints] = []
         self._set_last_motion(motion)
 
     def improve(self, max_step_count: int) -> None:
-        """Take up to `max_step_count` optimization steps."""
+        """Take up to `max_step_count` optimization steps, fewer if the optimization converges."""
         for _ in range(max_step_count):
-            samples = np.flatnonzero(self._slack < MAX_SLACK)
-            slack = self._slack[samples]
-            gradients = self._problem.compute_gradients(self._last_motion.qs[samples], slack)
+            if self._has_converged:
+                return
+            samples = np.flatnonzero(self._evaluation.slack < MAX_SLACK)
+            evaluation = self._evaluation.select(samples)
+            gradients = self._problem.compute_gradients(self._last_motion.qs[samples], evaluation)
             distance_constraints = LinearizedConstraints(
-                slack, samples[:, None], gradients[:, None], np.zeros(len(samples))
+                evaluation.slack, samples[:, None], gradients[:, None], np.zeros(len(samples))
             )
             constraints = [distance_constraints, *self._payload_constraints]
             motion = self._transcription.shorten(self._last_motion, constraints, self._trust_radius)
@@ -138,14 +171,16 @@ class Optimizer:
 
     def _set_last_motion(self, motion: DiscreteMotion) -> None:
         """Make `motion` the last motion, and also the best motion if its cost is the lowest."""
-        self._last_motion, self._slack = motion, self._problem.compute_slack(motion.qs)
-        violations = [-float(self._slack.min())]
+        self._last_motion, self._evaluation = motion, self._problem.evaluate(motion.qs)
+        violations = [-float(self._evaluation.slack.min())]
         if self._problem.payload is not None:
             sample_time = motion.step / SAMPLES_PER_STEP
             constraints = self._problem.payload.linearize(motion.qs, sample_time, MAX_SLACK)
             violations.append(-float(constraints.slack.min(initial=MAX_SLACK)))
             self._payload_constraints = [constraints]
         cost = motion.duration + VIOLATION_COST * max(0.0, *violations)
+        self._has_converged = abs(cost - self._last_cost) < CONVERGENCE_TOLERANCE
+        self._last_cost = cost
         if cost < self.cost:
             self._best_motion, self.cost = motion, cost
 

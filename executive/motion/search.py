@@ -29,8 +29,10 @@ from executive.motion.point_to_point import Connector, JointLimitError
 from executive.motion.trajectory import MotionPiece, Trajectory, sample_pieces
 from executive.motion.transcription import SAMPLE_FRACTIONS
 
-MAX_CANDIDATES = 3
+MAX_CANDIDATES = 4
 """Maximum number of candidates for the end of a motion."""
+COMPARED_CANDIDATES = 2
+"""Number of candidates whose motions are compared; the next ones are used if all motions are blocked."""
 INITIAL_STEP_COUNT = 4
 """Number of optimization steps for the detour to each candidate."""
 REFINEMENT_STEP_COUNT = 8
@@ -91,8 +93,11 @@ class MotionSearch:
 
     def list_motions(self) -> Iterator[Trajectory]:
         """Plan and yield motions, the best first: direct and optimized motions, then motions with corners."""
-        candidates = list(islice(self._list_candidates(), MAX_CANDIDATES))
-        yield from self._list_direct_and_optimized(candidates)
+        remaining_candidates = islice(self._list_candidates(), MAX_CANDIDATES)
+        candidates: list[Candidate] = []
+        while group := list(islice(remaining_candidates, COMPARED_CANDIDATES)):
+            yield from self._list_direct_and_optimized(group)
+            candidates += group
         for extra_height in EXTRA_HEIGHTS:
             for candidate in candidates:
                 with contextlib.suppress(Unreachable, JointLimitError):

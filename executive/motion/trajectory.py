@@ -147,8 +147,9 @@ class _SlowPiece:
 def downsample_path(qs: Array, max_spacing: float) -> Array:
     """Return points of a path `(N, n)` [rad], between which joints move by up to `max_spacing` [rad]."""
     indices = [0]
+    points = qs.tolist()
     for index in range(1, len(qs) - 1):
-        if np.max(np.abs(qs[index + 1] - qs[indices[-1]])) > max_spacing:
+        if max(abs(a - b) for a, b in zip(points[index + 1], points[indices[-1]], strict=True)) > max_spacing:
             indices.append(index)
     return qs[[*indices, len(qs) - 1]]
 

@@ -59,7 +59,9 @@ def slack(clearance: ClearanceModel, tip, axis=DOWN, discs: Discs | None = None)
     """Of one state."""
     assert discs is not None
     return float(
-        clearance.compute_slack(np.array([tip], dtype=float), np.array([axis], dtype=float), discs)[0]
+        clearance.find_nearest_pairs(
+            np.array([tip], dtype=float), np.array([axis], dtype=float), discs
+        ).slack[0]
     )
 
 
@@ -204,9 +206,22 @@ def test_slopes_are_the_differences_of_slack(config, tip, tilt, turn, loaded: bo
     )
     h = 1e-5
     tips, axes = tip + h * np.eye(3), np.broadcast_to(axis, (3, 3))
-    found = clearance.compute_slack_changes(tip[None], axis[None], discs, (tips[None], axes[None]))[0] / h
+    pairs = clearance.find_nearest_pairs(tip[None], axis[None], discs)
+    found = clearance.compute_slack_changes(pairs, tips[None], axes[None], axis[None], discs)[0] / h
     here = slack(clearance, tip, axis, discs)
-    forward = (clearance.compute_slack(tips, axes, discs) - here) / h
-    backward = (here - clearance.compute_slack(2 * tip - tips, axes, discs)) / h
+    forward = (clearance.find_nearest_pairs(tips, axes, discs).slack - here) / h
+    backward = (here - clearance.find_nearest_pairs(2 * tip - tips, axes, discs).slack) / h
     smooth = np.abs(forward - backward) < 1e-2  # no kink between
     assert np.allclose(found[smooth], forward[smooth], atol=1e-6)
+
+
+@given(st.lists(near_the_post, min_size=2, max_size=5), st.booleans())
+@settings(max_examples=40)
+def test_far_obstacles_are_left_out_only_where_the_slack_is_large(config, tips, loaded: bool) -> None:
+    discs = make_tool_discs(config, CUBE if loaded else None)
+    clearance = ClearanceModel(config, (POST,), AWAY)
+    axes = np.broadcast_to(DOWN, (len(tips), 3))
+    exact = clearance.find_nearest_pairs(np.array(tips), axes, discs).slack
+    quick = clearance.find_nearest_pairs(np.array(tips), axes, discs, 0.03).slack
+    assert np.array_equal(quick[exact < 0.03], exact[exact < 0.03])
+    assert np.all(quick >= exact)

@@ -7,24 +7,41 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
+import numpy as np
 import pybullet
 
 from executive.cell.arm import Task
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
 from executive.cell.objects import Load, ObjectClass, Obstacle
-from executive.cells.sim.world import DISTANCE, LINK_A, LINK_B, POSITION_B, World, name_load
+from executive.cells.sim.world import DISTANCE, LINK_A, POSITION_B, World, name_load
 from executive.errors import Blocked
-from executive.geometry import Array, Pose
+from executive.geometry import Array
 
 ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
+SEARCH_DISTANCE = 0.15
+"""Distance beyond the margin up to which the distances of bodies are computed [m]."""
 SUPPORT_TOLERANCE = 0.001
 """Maximum height [m] above the floor of a bin at which a contact of the load is a contact with the floor."""
+
+
+class ClosestPoints(NamedTuple):
+    """Closest points of two bodies A and B.
+
+    Attributes:
+        link: Link of body A.
+        height_b: Height of the point on body B above the world's origin [m].
+        distance: Distance between the points [m], negative for a penetration.
+    """
+
+    link: int
+    height_b: float
+    distance: float
 
 
 class ClosestApproach(NamedTuple):
@@ -58,6 +75,10 @@ class ClearanceChecker:
     The distance from this body must then not decrease. A held object is modelled by an upright cylinder
     under the tool, which may touch the table and the floors of bins.
 
+    Two bodies whose distance is known need no further query until a part of the arm may have moved by that
+    distance. The upper bound of the movement is the sum of all joint movements, each multiplied by the length
+    of the arm beyond the joint.
+
     Attributes:
         world: World of the check, whose arm is at the last checked joint positions.
     """
@@ -69,6 +90,13 @@ class ClearanceChecker:
         """Returns the body of the load (number 0) or of an obstacle, by radius [m], height [m] and number."""
         self._obstacles: dict[str, tuple[int, ...]] = {}
         """Bodies of the current obstacles, by name."""
+        # The functions are looked up once, because a look-up takes as long as a call.
+        self._get_points = self.world.client.getClosestPoints
+        self._reach = self._compute_reach()
+        self._movement = 0.0
+        """Upper bound of the movement of a point of arm or load since the start of the path [m]."""
+        self._clear_until: dict[tuple[int, ...], float] = {}
+        """Movement [m] up to which two bodies are farther apart than the margin, by bodies and links."""
 
     def check(self, path: Array, task: Task = Task()) -> None:
         """Check that the joint positions along a path `(N, n)` [rad] keep the margin of the cell file.
@@ -79,9 +107,13 @@ class ClearanceChecker:
         with self._place_obstacles(task.obstacles):
             # A pair that starts closer than the margin must keep its initial distance until the pair has been
             # apart by the margin once. Every other pair must keep the margin.
+            self._movement, self._clear_until = 0.0, {}
+            load = task.load.object_class if task.load else None
+            reach = self._reach + (load.height + load.radius if load else 0.0)
             start_approaches = self._find_closest_approaches(path[0], task.load)
             start_distances = {pair: approach.distance for pair, approach in start_approaches.items()}
-            for q in path[1:]:
+            for q, last_q in zip(path[1:], path, strict=False):
+                self._movement += float(np.abs(q - last_q) @ reach)
                 approaches = self._find_closest_approaches(q, task.load)
                 for pair, approach in approaches.items():
                     min_distance = min(approach.min_distance, start_distances.get(pair, math.inf))
@@ -100,6 +132,7 @@ class ClearanceChecker:
 
     def find_violation(self, q: Array) -> ClosestApproach | None:
         """Return the closest approach of the unloaded arm at `q` `(n,)` [rad], or None if it is allowed."""
+        self._movement, self._clear_until = 0.0, {}
         closest = min(self._find_approaches(q, None), key=lambda approach: approach.distance, default=None)
         return closest if closest and closest.distance < closest.min_distance - ROUNDING_ERROR else None
 
@@ -116,41 +149,69 @@ class ClearanceChecker:
 
     def _find_approaches(self, q: Array, load: Load | None) -> Iterator[ClosestApproach]:
         """Yield the approaches of arm, tool and load within the margin at `q` `(n,)` [rad]."""
-        client, arm = self.world.client, self.world.arm
-        get_points = client.getClosestPoints  # looked up once, because a look-up takes as long as a call
-        client.resetJointStatesMultiDof(arm, range(len(q)), [[angle] for angle in q])
-        name_link = self.world.name_link
-        bodies = [("the table", self.world.table), *self.world.bin_bodies.items()]
+        world, arm = self.world, self.world.arm
+        first_link, name_link = world.robot.first_collision_link, world.name_link
+        world.client.resetJointStatesMultiDof(arm, range(len(q)), [[angle] for angle in q])
+        bodies = [("the table", world.table), *world.bin_bodies.items()]
         bodies += [(name, body) for name, cylinders in self._obstacles.items() for body in cylinders]
         for name, body in bodies:
-            for point in get_points(arm, body, self._margin):
-                if point[LINK_A] >= self.world.robot.first_collision_link:
-                    yield ClosestApproach(name_link(point[LINK_A]), name, point[DISTANCE], self._margin)
-        for link_a, link_b in self.world.robot.self_collision_pairs:
-            for point in get_points(arm, arm, self._margin, linkIndexA=link_a, linkIndexB=link_b):
-                yield ClosestApproach(name_link(link_a), name_link(link_b), point[DISTANCE], self._margin)
+            for points in self._find_points((arm, body), range(first_link, world.tool_index + 1)):
+                yield ClosestApproach(name_link(points.link), name, points.distance, self._margin)
+        for link_a, link_b in world.robot.self_collision_pairs:
+            for points in self._find_points((arm, arm, link_a, link_b)):
+                yield ClosestApproach(name_link(link_a), name_link(link_b), points.distance, self._margin)
         if load is not None:
             yield from self._find_load_approaches(load.object_class, bodies)
+
+    def _find_points(
+        self, pair: tuple[int, ...], links: Container[int] | None = None
+    ) -> Sequence[ClosestPoints]:
+        """Return the closest points within the margin of two bodies, or of one link of each body.
+
+        With `links`, only these links of the first body count. No query is needed while the bodies cannot
+        have moved to within the margin since the last query.
+        """
+        if self._movement < self._clear_until.get(pair, -math.inf):
+            return ()
+        body_a, body_b, *link_pair = pair
+        max_distance = self._margin + SEARCH_DISTANCE
+        points = [
+            ClosestPoints(values[LINK_A], values[POSITION_B][2], values[DISTANCE])
+            for values in self._get_points(body_a, body_b, max_distance, *link_pair)
+            if links is None or values[LINK_A] in links
+        ]
+        distance = min((point.distance for point in points), default=max_distance)
+        self._clear_until[pair] = self._movement + distance - self._margin - ROUNDING_ERROR
+        return [point for point in points if point.distance <= self._margin]
 
     def _find_load_approaches(
         self, load: ObjectClass, bodies: Sequence[tuple[str, int]]
     ) -> Iterator[ClosestApproach]:
         """Yield the approaches within the margin of the load to the arm and to the named `bodies`."""
+        world, client, robot = self.world, self.world.client, self.world.robot
         load_body = self._get_cylinder(load.radius + load.contact_radius, load.height, 0)
-        get_points = self.world.client.getClosestPoints
-        X_WH = self.world.get_tool_pose() @ Pose.of([0, 0, load.height / 2])
-        self.world.client.resetBasePositionAndOrientation(load_body, X_WH.position, X_WH.quaternion)
+        flange = client.getLinkState(world.arm, world.flange_index, computeForwardKinematics=True)[4:6]
+        offset = robot.flange_offset + world.config.tool.length + load.height / 2
+        load_pose = client.multiplyTransforms(*flange, [0, 0, offset], [0, 0, 0, 1])
+        client.resetBasePositionAndOrientation(load_body, *load_pose)
         part = name_load(load.label)
         for name, body in bodies:
-            bin = self.world.config.bins.get(name)
+            bin = world.config.bins.get(name)
             max_support_height = (bin.position[2] if bin else 0.0) + BIN_THICKNESS + SUPPORT_TOLERANCE
-            for point in get_points(load_body, body, self._margin):
-                is_support = point[POSITION_B][2] <= max_support_height and name not in self._obstacles
-                yield ClosestApproach(part, name, point[DISTANCE], 0.0 if is_support else self._margin)
-        for point in get_points(load_body, self.world.arm, self._margin):
-            if self.world.robot.first_collision_link <= point[LINK_B] < self.world.robot.wrist_link:
-                link_name = self.world.name_link(point[LINK_B])
-                yield ClosestApproach(part, link_name, point[DISTANCE], self._margin)
+            for points in self._find_points((load_body, body)):
+                is_support = points.height_b <= max_support_height and name not in self._obstacles
+                yield ClosestApproach(part, name, points.distance, 0.0 if is_support else self._margin)
+        links = range(robot.first_collision_link, robot.wrist_link)
+        for points in self._find_points((world.arm, load_body), links):
+            yield ClosestApproach(part, world.name_link(points.link), points.distance, self._margin)
+
+    def _compute_reach(self) -> Array:
+        """Return the maximum distance of a point of the arm from the axis of each joint `(n,)` [m]."""
+        world = self.world
+        states = world.client.getLinkStates(world.arm, range(world.robot.joint_count))
+        origins = np.array([*(state[4] for state in states), world.get_tool_pose().position])
+        lengths = np.linalg.norm(np.diff(origins, axis=0), axis=1)
+        return np.cumsum(lengths[::-1])[::-1] + world.robot.link_radius
 
     @contextmanager
     def _place_obstacles(self, obstacles: Sequence[Obstacle]) -> Iterator[None]:

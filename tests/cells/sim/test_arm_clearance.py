@@ -9,6 +9,7 @@ import pytest
 from executive.cell.arm import Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import Load, ObjectClass, Obstacle
+from executive.cells.sim import collision
 from executive.cells.sim.collision import ClearanceChecker
 from executive.errors import Blocked
 from executive.motion.arms import build_kinematics
@@ -127,6 +128,33 @@ def test_a_held_object_keeps_clear_of_the_arm(clearance: ClearanceChecker) -> No
     clearance.check(path)
     with pytest.raises(Blocked, match=r"the held rod 0\.004 m into link 2, with the tool at"):
         clearance.check(path, Task(Load(ObjectClass("rod", 0.2, 0.03))))
+
+
+def test_queries_are_left_out_only_while_nothing_can_be_near(
+    clearance: ClearanceChecker, overhead: CellConfig, monkeypatch
+) -> None:
+    rng, query_counts, answers = np.random.default_rng(3), [], []
+    get_points, (home, limits) = clearance._get_points, (np.radians(overhead.arm.poses_deg["home"]), 0.9)
+    paths = [np.linspace(home, home + rng.uniform(-limits, limits, 7), 40) for _ in range(25)]
+    for search_distance in (0.0, collision.SEARCH_DISTANCE):
+        monkeypatch.setattr(collision, "SEARCH_DISTANCE", search_distance)
+        query_counts.append(0)
+        answers.append([])
+
+        def count(*args):
+            query_counts[-1] += 1
+            return get_points(*args)
+
+        monkeypatch.setattr(clearance, "_get_points", count)
+        for path in paths:
+            try:
+                clearance.check(path, Task(DUCK.load, (TOWER,)))
+                answers[-1].append("")
+            except Blocked as error:
+                answers[-1].append(str(error))
+    assert answers[0] == answers[1]
+    assert 5 < answers[0].count("") < 20
+    assert query_counts[1] < 0.7 * query_counts[0]
 
 
 @pytest.mark.parametrize("distance", [-0.01, 0.0, 0.0035, 0.006, 0.012, 0.02])
