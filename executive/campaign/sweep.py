@@ -63,6 +63,7 @@ def run_sweep(
     database: ResultsDatabase,
     *,
     workers: int = 2,
+    cluster: str | None = None,
     progress: Callable[[int, int], None] = lambda *_: None,
     on_halt: Callable[[], None] = lambda: None,
 ) -> None:
@@ -70,7 +71,8 @@ def run_sweep(
 
     A run whose process dies twice has the status `FAULT`. After Ctrl-C or SIGTERM no further run starts, and
     current runs are halted; halted runs are not stored. `workers`, `progress` and `on_halt` have the same
-    meaning as in `executive.campaign.pool.run_jobs`.
+    meaning as in `executive.campaign.pool.run_jobs`. `cluster` is the address of a dask scheduler, whose
+    workers execute the jobs, or None.
     """
     crash_counts: Counter[int] = Counter()
 
@@ -79,8 +81,13 @@ def run_sweep(
             run = replace(record.run, crashes=crash_counts[index])
             database.append(replace(record, run=run))
 
-    run_jobs(
-        jobs, run_job, make_fault_record, workers=workers, progress=progress, on_result=store,
+    execute_jobs: Callable[..., object] = functools.partial(run_jobs, workers=workers)
+    if cluster is not None:
+        from executive.campaign.cluster.cluster import run_jobs_on_cluster
+
+        execute_jobs = functools.partial(run_jobs_on_cluster, address=cluster)
+    execute_jobs(
+        jobs, run_job, make_fault_record, progress=progress, on_result=store,
         on_crash=lambda index: crash_counts.update([index]), on_halt=on_halt,
     )  # fmt: skip
 

@@ -29,6 +29,7 @@ MIN_PYTHON, MAX_PYTHON = (3, 10), (3, 11)
 EXTRAS = {
     "view": "watch a run in the browser",
     "export": "export the results of a sweep to Parquet",
+    "cluster": "run a sweep on several computers",
     "train": "train a detector of your own",
 }
 """Purpose of each extra of this project (an optional group of packages), by the name of the extra."""

@@ -93,6 +93,10 @@ scene_option = click.option(
     help="Scene file: differences of the simulated world from the cell file (light, table, objects, camera).",
 )  # fmt: skip
 workers_option = click.option("--workers", type=COUNT, default=2, help="Number of parallel processes.")
+cluster_option = click.option(
+    "--cluster", metavar="ADDRESS",
+    help="Run on the workers of a dask scheduler, for example tcp://scheduler:8786 (extra: cluster).",
+)  # fmt: skip
 oracle_option = click.option(
     "--oracle", is_flag=True,
     help="Take detections from the simulated world instead of images; sorting then takes about two seconds.",

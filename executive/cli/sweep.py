@@ -40,6 +40,7 @@ def parse_seed_range(text: str) -> range:
     help="Execute the missing runs of an interrupted sweep: its folder, or its file results.sqlite.",
 )  # fmt: skip
 @options.workers_option
+@options.cluster_option
 @click.option("--frames", is_flag=True, help="Save the camera images on which decisions are based.")
 @options.overrides_option
 @options.scene_option
@@ -54,8 +55,9 @@ def parse_seed_range(text: str) -> range:
 @click.pass_context
 def command(
     ctx: click.Context, mission: str | None, seeds: range | None, variations: dict[str, tuple[str, ...]],
-    resume: Path | None, workers: int, frames: bool, overrides: dict[str, str], scene: Path | None,
-    runs: Path, require: str | None, junit: Path | None, export: Path | None, as_json: bool,
+    resume: Path | None, workers: int, cluster: str | None, frames: bool, overrides: dict[str, str],
+    scene: Path | None, runs: Path, require: str | None, junit: Path | None, export: Path | None,
+    as_json: bool,
 ) -> int:  # fmt: skip
     """Run a mission once for every seed and variant, and summarize the runs.
 
@@ -106,7 +108,9 @@ def command(
             stored = {run.job for run in database.read_runs()}
             missing = [job for job in jobs if job.index not in stored]
             with show_progress(settings.mission, print_lines=True) as progress:
-                run_sweep(missing, database, workers=workers, progress=progress, on_halt=print_halt)
+                run_sweep(
+                    missing, database, workers=workers, cluster=cluster, progress=progress, on_halt=print_halt
+                )
             rows = database.read_runs()
             repeat = functools.partial(make_repeat_command, settings)
             summaries = summarize_runs(rows, database.read_phases(), repeat)

@@ -111,7 +111,7 @@ def make_dated_folder(runs: Path, name: str, start_time: datetime) -> Path:
     day = runs / start_time.strftime("%Y-%m-%d")
     with convert_os_errors(f'make a run directory below "{runs}"'):
         day.mkdir(parents=True, exist_ok=True)
-        return _make_unique_folder(day, f"{start_time.strftime('%H-%M-%S')}_{name}")
+        return make_unique_folder(day, f"{start_time.strftime('%H-%M-%S')}_{name}")
 
 
 @contextlib.contextmanager
@@ -144,7 +144,7 @@ def find_run(name: str, runs: Path) -> Path:
     )
 
 
-def _make_unique_folder(day: Path, name: str) -> Path:
+def make_unique_folder(day: Path, name: str) -> Path:
     """Make and return the folder `day/name`, or the first of `day/name-2`, `-3`, ... that does not exist."""
     number = 1
     while True:

@@ -1,0 +1,1 @@
+"""Execution of the jobs of a sweep by the workers of a dask scheduler."""
