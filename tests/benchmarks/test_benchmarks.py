@@ -28,7 +28,17 @@ from executive.motion.point_to_point import Connector
 from executive.motion.trajectory import Trajectory
 from executive.record.audit_comparison import Audit, ItemCounts
 from executive.record.result import Result
-from tests.benchmarks import damaged_records, halts, journal, kills, report, soak, suction_map, tick
+from tests.benchmarks import (
+    damaged_records,
+    halts,
+    journal,
+    kills,
+    longest_step,
+    report,
+    soak,
+    suction_map,
+    tick,
+)
 from tests.benchmarks.forks import ForkRunner
 
 FAKE = {"cell.kind": "fake", "cell.table.objects": "[2, 2]"}
@@ -80,6 +90,17 @@ def test_figures_are_a_table_or_json_and_problems_an_exit_code(
     lines = [line.split() for line in out.splitlines()]
     for line in (["runs", "2"], ["a", "0.1235"], ["problems", "2"], ["2", "x", "bad"]):
         assert line in lines
+
+
+def test_planning_images_and_detection_do_not_count_as_parts_of_a_control_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(longest_step, "EXCLUDED_ACCESSES", ("arm.", "camera.", "detector.", "request."))
+    figures = longest_step.measure(load(), tmp_path, run_count=1)
+    monkeypatch.setattr(longest_step, "EXCLUDED_ACCESSES", ())
+    (row,), (other_row,) = figures["runs"], longest_step.measure(load(), tmp_path, run_count=1)["runs"]
+    assert row["steps"] == other_row["steps"] > 100
+    assert 0 < row["longest_cpu_ms"] <= row["longest_ms"] * 1.1
 
 
 class Coasting(FakeCell):

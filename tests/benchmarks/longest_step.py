@@ -1,0 +1,134 @@
+"""Longest control step of recorded runs, without planning, images and detection.
+
+A control step is a tick of the tree with its events and their record, and one physics step. Wall times
+contain the syncs of the journal and the delays by other processes; CPU times of the thread contain neither.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import click
+from py_trees.trees import BehaviourTree
+
+from executive.campaign.mission_under_test import MissionUnderTest
+from executive.cell.proxy import Access, intercept
+from executive.cell.workcell import Workcell
+from executive.cli.options import runs_option
+from executive.events import TimedEvent
+from executive.record.recorded_run import RecordOptions, record_run
+from executive.run.assembly import RunOptions
+from executive.run.run import Run
+from tests.benchmarks.report import Figures, describe, run_mission_command, show_progress
+
+MAX_STEP_TIME = 0.005
+"""Limit of the wall time of a control step [s]."""
+EXCLUDED_ROLES = ("arm", "camera", "detector")
+"""Parts of the cell that plan motions, capture images and detect objects."""
+EXCLUDED_ACCESSES = ("arm.plan", "camera.", "detector.", "request.", "planning.")
+"""Beginnings of the names of the accesses whose times do not count."""
+
+
+@dataclass
+class StepTimer:
+    """View of a run that measures its control steps.
+
+    Attributes:
+        steps: For each step: wall time and CPU time [s], without the excluded accesses.
+    """
+
+    steps: list[tuple[float, float]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._excluded = 0.0, 0.0
+        self._start: tuple[float, float] | None = None
+
+    def open(self, run: Run) -> None:
+        """Measure the time between the starts of all ticks."""
+        run.behaviour_tree.add_pre_tick_handler(self._begin_step)
+
+    def __call__(self, timed: TimedEvent) -> None:
+        """Ignore an event."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+    def show_message(self, message: str) -> None:
+        """Ignore a message."""
+
+    def intercept(self, access: Access) -> Any:
+        """Execute an access to the cell, and exclude its time if it plans, captures or detects."""
+        if not access.name.startswith(EXCLUDED_ACCESSES):
+            return access.proceed()
+        start = _read_clocks()
+        try:
+            return access.proceed()
+        finally:
+            self._excluded = _add(self._excluded, _subtract(_read_clocks(), start))
+
+    def _begin_step(self, tree: BehaviourTree) -> None:
+        del tree
+        now = _read_clocks()
+        if self._start is not None:
+            self.steps.append(_subtract(_subtract(now, self._start), self._excluded))
+        self._start, self._excluded = now, (0.0, 0.0)
+
+
+def measure(subject: MissionUnderTest, runs: Path, run_count: int) -> Figures:
+    """Measure the control steps of `--count` runs of MISSION, which are recorded below `--runs`."""
+    rows = []
+    for seed in show_progress(range(subject.seed, subject.seed + run_count), "runs"):
+        timer = StepTimer()
+
+        def make_cell(*arguments: Any, timer: StepTimer = timer, **options: Any) -> Workcell:
+            workcell: Any = subject.make_cell(*arguments, **options)
+            workcell.cell = intercept(workcell.cell, timer.intercept, EXCLUDED_ROLES)
+            return workcell
+
+        options = RunOptions(seed, subject.requests, make_cell=make_cell)
+        record_run(subject.loaded, subject.skills, options, runs, RecordOptions([timer]))
+        walls, cpus = zip(*timer.steps, strict=True)
+        row = {
+            "seed": seed,
+            "steps": len(walls),
+            "longest_ms": 1e3 * max(walls),
+            "longest_cpu_ms": 1e3 * max(cpus),
+        }
+        rows.append({**row, "tick": walls.index(max(walls)), "cpu_tick": cpus.index(max(cpus))})
+    longest = max(row["longest_ms"] for row in rows)
+    limit = 1e3 * MAX_STEP_TIME
+    return {
+        **describe(subject),
+        "runs": rows,
+        "longest_ms": longest,
+        "longest_cpu_ms": max(row["longest_cpu_ms"] for row in rows),
+        "problems": [f"a control step took more than {limit:g} ms"] if longest > limit else [],
+    }
+
+
+def _read_clocks() -> tuple[float, float]:
+    """Return wall time and CPU time of this thread [s]."""
+    return time.perf_counter(), time.thread_time()
+
+
+def _add(times: tuple[float, float], others: tuple[float, float]) -> tuple[float, float]:
+    return times[0] + others[0], times[1] + others[1]
+
+
+def _subtract(times: tuple[float, float], others: tuple[float, float]) -> tuple[float, float]:
+    return times[0] - others[0], times[1] - others[1]
+
+
+if __name__ == "__main__":
+    count_option = click.option(
+        "--count",
+        "run_count",
+        type=click.IntRange(min=1),
+        default=20,
+        show_default=True,
+        help="Number of runs.",
+    )
+    run_mission_command(measure, runs_option, count_option)
