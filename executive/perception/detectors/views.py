@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from executive.cell.detection import Detection
 from executive.cell.frame import Box
 from executive.errors import InputError
+from executive.geometry import Array
 
 Region = tuple[int, int, int, int]
 """Left, top, right and bottom side [pixel] of a region of an image."""
@@ -28,6 +29,8 @@ MIN_TILE_IOU = 0.5
 """Minimum intersection over union of the boxes of one object in two tiles."""
 MIN_CONTAINED_FRACTION = 0.7
 """Minimum intersection of the boxes of one object in two tiles, as a fraction of the smaller box."""
+MIN_AREA = 1e-9
+"""Area that replaces the area of an empty box in a division [pixel²]."""
 
 
 def list_regions(view: str, table_view: Region, size: tuple[int, int]) -> list[Region]:
@@ -97,23 +100,37 @@ def remove_duplicates(detections: Sequence[Detection]) -> list[Detection]:
     """Return the detections without duplicates of more confident ones; the input is most confident first."""
     if len(detections) < 2:
         return list(detections)
-    from supervision import box_non_max_suppression
+    ious, _ = compute_overlaps(np.array([detection.box for detection in detections]))
+    kept: list[int] = []
+    for index in range(len(detections)):
+        if not (ious[index, kept] > MIN_DUPLICATE_IOU).any():
+            kept.append(index)
+    return [detections[index] for index in kept]
 
-    # The negative index replaces the confidence: the first of several equally confident boxes must remain.
-    scored_boxes = np.array([(*detection.box, -index) for index, detection in enumerate(detections)])
-    is_unique = box_non_max_suppression(scored_boxes, MIN_DUPLICATE_IOU)
-    return [detection for detection, is_kept in zip(detections, is_unique, strict=True) if is_kept]
+
+def compute_overlaps(boxes: Array) -> tuple[Array, Array]:
+    """Return the area of the intersection of each pair of boxes, divided by the union and by the smaller box.
+
+    The arrays have the shape `(N, N)`. The import of `supervision`, which has this function, takes 0.5 s.
+
+    Args:
+        boxes: Left, top, right and bottom side of each box `(N, 4)`.
+    """
+    low = np.maximum(boxes[:, None, :2], boxes[:, :2])
+    high = np.minimum(boxes[:, None, 2:], boxes[:, 2:])
+    intersections = (high - low).clip(0.0).prod(axis=2)
+    areas = (boxes[:, 2:] - boxes[:, :2]).prod(axis=1)
+    unions = areas[:, None] + areas - intersections
+    smaller_areas = np.minimum(areas[:, None], areas)
+    return intersections / unions.clip(MIN_AREA), intersections / smaller_areas.clip(MIN_AREA)
 
 
 def _compare_objects(boxes: Sequence[Box]) -> NDArray[np.bool_]:
     """Return a matrix `(N, N)` that is True for each pair of boxes that show one object."""
     if len(boxes) < 2:
         return np.zeros((len(boxes), len(boxes)), dtype=np.bool_)
-    from supervision import OverlapMetric, box_iou_batch
-
-    corners = np.array(boxes)
-    is_contained = box_iou_batch(corners, corners, OverlapMetric.IOS) > MIN_CONTAINED_FRACTION
-    return np.asarray((box_iou_batch(corners, corners) > MIN_TILE_IOU) | is_contained)
+    ious, contained_fractions = compute_overlaps(np.array(boxes))
+    return np.asarray((ious > MIN_TILE_IOU) | (contained_fractions > MIN_CONTAINED_FRACTION))
 
 
 def _is_truncated(located_detection: LocatedDetection, size: tuple[int, int]) -> bool:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.frame import Box
+from executive.record.pictures.captions import draw_captions
 from executive.record.pictures.palette import BACKGROUND, OUTLINE, choose_class_colour, to_bgr
 from executive.record.pictures.picture_content import PictureContent
 from executive.record.pictures.status_bar import STATUS_BAR_HEIGHT, draw_status_bar
@@ -24,9 +23,6 @@ CLOSE_UP_SCALE = 2.0
 
 LINE_WIDTH, SELECTED_LINE_WIDTH, OUTLINE_WIDTH = 2, 3, 1
 """Line widths of a box, of the selected box, and of the outline around the selected box [pixel]."""
-
-TEXT_SCALE, PADDING = 0.36, 2
-"""Font scale of captions in OpenCV, and padding around captions [pixel]."""
 
 
 def draw_picture(content: PictureContent) -> NDArray[np.uint8]:
@@ -74,26 +70,18 @@ def _draw_close_up(image: NDArray[np.uint8], box: Box, colour: str) -> NDArray[n
 
 def _draw_boxes(image: NDArray[np.uint8], content: PictureContent, scale: float) -> NDArray[np.uint8]:
     """Return `image`, which is already scaled by `scale`, with all boxes; the selected box is drawn last."""
-    import supervision as sv
-
-    if not content.detections:
-        return image
-    indices = np.arange(len(content.detections))
-    boxes = np.array([detection.box for detection in content.detections]) * scale
-    class_colours = [choose_class_colour(each.label, content.classes) for each in content.detections]
-    colours = sv.ColorPalette.from_hex(class_colours)
-    detections = sv.Detections(boxes, class_id=indices)
-    unselected = cast("sv.Detections", detections[indices != content.selected_index])
-    selected = cast("sv.Detections", detections[indices == content.selected_index])
-    outline = sv.Color.from_hex(OUTLINE)
-    for layer, colour, line_width in (
-        (unselected, colours, LINE_WIDTH), (selected, outline, SELECTED_LINE_WIDTH + 2 * OUTLINE_WIDTH),
-        (selected, colours, SELECTED_LINE_WIDTH),
-    ):  # fmt: skip
-        image = sv.BoxAnnotator(colour, line_width).annotate(image, layer)
-    return sv.LabelAnnotator(
-        colours, text_color=sv.Color.BLACK, text_scale=TEXT_SCALE, text_padding=PADDING, smart_position=True
-    ).annotate(image, detections, make_captions(content))
+    colours = [to_bgr(choose_class_colour(each.label, content.classes)) for each in content.detections]
+    boxes = [[int(side * scale) for side in each.box] for each in content.detections]
+    chosen = content.selected_index
+    layers = [(index, colours[index], LINE_WIDTH) for index in range(len(boxes)) if index != chosen]
+    if chosen is not None:
+        layers.append((chosen, to_bgr(OUTLINE), SELECTED_LINE_WIDTH + 2 * OUTLINE_WIDTH))
+        layers.append((chosen, colours[chosen], SELECTED_LINE_WIDTH))
+    for index, colour, line_width in layers:
+        left, top, right, bottom = boxes[index]
+        cv2.rectangle(image, (left, top), (right, bottom), colour, line_width)
+    draw_captions(image, [(left, top) for left, top, _, _ in boxes], make_captions(content), colours)
+    return image
 
 
 def make_captions(content: PictureContent) -> list[str]:
