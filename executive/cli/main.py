@@ -28,8 +28,8 @@ PATH_ERROR_NUMBERS = (
 """Error numbers of the operating system that mean an invalid path."""
 
 COMMANDS = (
-    "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "sweep", "faults",
-    "replay", "report", "film", "doctor", "init",
+    "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "sweep",
+    "compare", "faults", "replay", "report", "film", "doctor", "init",
 )  # fmt: skip
 """Names of all commands in the order of `--help`; the module of a command has the name of the command."""
 

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
+
+CommandT = TypeVar("CommandT", bound=Callable[..., Any])
+"""Type of a command function."""
 
 
 def _parse_overrides(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
@@ -77,10 +81,18 @@ def check_usage(*errors: tuple[object, str]) -> None:
             raise click.UsageError(message)
 
 
-overrides_option = click.option(
-    "--set", "overrides", metavar="KEY=VALUE", multiple=True, callback=_parse_overrides,
-    help="Set a param of the mission, or a key of the cell: cell.KEY.KEY=VALUE; repeatable.",
-)  # fmt: skip
+def make_overrides_option(option: str, name: str, text: str) -> Callable[[CommandT], CommandT]:
+    """Return a repeatable option KEY=VALUE for the argument `name`, with the help `text`."""
+    return click.option(
+        option, name, metavar="KEY=VALUE", multiple=True, callback=_parse_overrides, help=text
+    )
+
+
+overrides_option = make_overrides_option(
+    "--set",
+    "overrides",
+    "Set a param of the mission, or a key of the cell: cell.KEY.KEY=VALUE; repeatable.",
+)
 variations_option = click.option(
     "--vary", "variations", metavar="KEY=[VALUE, ...]", multiple=True, callback=_parse_variations,
     help="Run every seed with each of the values, named as in --set; repeatable: all combinations are run.",

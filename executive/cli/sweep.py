@@ -86,6 +86,7 @@ def command(
         from executive.campaign.results.export import check_exporter, export_tables
         from executive.campaign.results.junit import write_junit
         from executive.campaign.results.requirement import list_unmet, parse_requirement
+        from executive.campaign.results.results_page import Side, write_page
         from executive.campaign.results.sweep_folder import create_sweep, open_sweep
         from executive.campaign.results.sweep_summary import summarize_runs
         from executive.campaign.sweep import list_jobs, make_repeat_command, run_sweep
@@ -115,6 +116,9 @@ def command(
             repeat = functools.partial(make_repeat_command, settings)
             summaries = summarize_runs(rows, database.read_phases(), repeat)
             print_summary(summaries, len(jobs))
+            side = Side("", settings, rows, database.read_items(), summaries, len(rows) < len(jobs))
+            page = write_page(folder, [side])
+            click.echo(f"page: {page}", err=True)
             if junit is not None:
                 write_junit(junit, settings.mission_name, rows, repeat)
             if export is not None:
@@ -124,7 +128,8 @@ def command(
             click.echo(message, err=True)
     if as_json:
         print_json(to_json({
-            "settings": settings, "results": str(database.path), "asked": len(jobs),
-            "cut_off": len(rows) < len(jobs), "variants": summaries, "unmet": unmet, "runs": rows,
+            "settings": settings, "results": str(database.path), "page": str(page),
+            "asked": len(jobs), "cut_off": len(rows) < len(jobs), "variants": summaries, "unmet": unmet,
+            "runs": rows,
         }))  # fmt: skip
     return ExitCode.HALTED if len(rows) < len(jobs) else ExitCode(int(bool(unmet)))

@@ -33,6 +33,29 @@ def create_sweep(
 ) -> ResultsDatabase:
     """Check the inputs, and create the folder `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_sweep_<mission>` with a database.
 
+    `runs` is the folder of runs; the other arguments are those of `make_settings`.
+
+    Raises:
+        MissionError: A variant has errors.
+        InputError: An input does not exist, or the folder cannot be made.
+    """
+    settings = make_settings(mission, seeds, overrides, variations, scene, saves_pictures)
+    folder = make_dated_folder(runs, f"sweep_{settings.mission_name}", datetime.now())
+    database = ResultsDatabase(folder / FILE_NAME, settings)
+    database.lock()
+    return database
+
+
+def make_settings(
+    mission: str,
+    seeds: range,
+    overrides: Mapping[str, str],
+    variations: Mapping[str, tuple[str, ...]],
+    scene: Path | None,
+    saves_pictures: bool,
+) -> SweepSettings:
+    """Check the inputs of a sweep, and return its settings.
+
     Args:
         mission: Mission file, or name of a shipped mission.
         seeds: Seeds of each variant.
@@ -40,11 +63,10 @@ def create_sweep(
         variations: Values as given with `--vary`, by the same names.
         scene: Scene file; None: no change of the simulated world.
         saves_pictures: True to save the images on which decisions are based.
-        runs: Folder of runs.
 
     Raises:
         MissionError: A variant has errors.
-        InputError: An input does not exist, or the folder cannot be made.
+        InputError: An input does not exist.
     """
     settings = SweepSettings(
         mission=mission, mission_name="", cell="", overrides=overrides, variations=variations,
@@ -53,11 +75,7 @@ def create_sweep(
     )  # fmt: skip
     missions = _load_variants(settings)
     name, cell, inputs_hash = missions[0].mission.name, missions[0].cell_path, _hash_inputs(missions, scene)
-    settings = replace(settings, mission_name=name, cell=str(cell), inputs_hash=inputs_hash)
-    folder = make_dated_folder(runs, f"sweep_{name}", datetime.now())
-    database = ResultsDatabase(folder / FILE_NAME, settings)
-    database.lock()
-    return database
+    return replace(settings, mission_name=name, cell=str(cell), inputs_hash=inputs_hash)
 
 
 def open_sweep(path: Path) -> ResultsDatabase:

@@ -1,0 +1,158 @@
+"""Page of a sweep or a comparison: one self-contained HTML file without scripts."""
+
+from __future__ import annotations
+
+import os.path
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from urllib.parse import quote
+
+import numpy as np
+
+from executive.campaign.results.differences import Difference, RunPair
+from executive.campaign.results.rows import ItemRow, RunRow, SweepSettings
+from executive.campaign.results.sweep_summary import VariantSummary
+from executive.record.atomic_file import write_atomically
+from executive.record.run_directory import RunDirectory, convert_os_errors
+from executive.view.text import render_template
+
+PAGE_NAME = "results.html"
+"""Name of the page in the folder of a sweep or a comparison."""
+BIN_COUNT = 24
+"""Number of bars of a histogram."""
+MAX_LISTED_RUNS = 500
+"""Maximum number of runs in a table of the page."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """Results of a sweep.
+
+    Attributes:
+        name: `A` or `B` in a comparison, else "".
+        settings: Settings of the sweep.
+        runs, items: Rows of the runs and of the items.
+        summaries: Summary of each variant.
+        is_halted: True if runs are missing.
+    """
+
+    name: str
+    settings: SweepSettings
+    runs: Sequence[RunRow]
+    items: Sequence[ItemRow]
+    summaries: Sequence[VariantSummary]
+    is_halted: bool
+
+
+@dataclass(frozen=True)
+class Group:
+    """Runs with equal inputs except the seed: a column of the tables.
+
+    Attributes:
+        label: Name of the side and values of the variant, or `all runs`.
+        summary: Summary of the runs.
+        robot_times: Duration of each run [s].
+        object_times: Time from the selection of each placed object to its end [s].
+    """
+
+    label: str
+    summary: VariantSummary
+    robot_times: Sequence[float]
+    object_times: Sequence[float]
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """Histogram of the values of a group.
+
+    Attributes:
+        label: Label of the group.
+        description: Text for readers who do not see the plot.
+        counts: Number of values in each bin.
+        low, high: Limits of the first and the last bin, equal for all groups.
+    """
+
+    label: str
+    description: str
+    counts: Sequence[int]
+    low: float
+    high: float
+
+
+def write_page(
+    folder: Path,
+    sides: Sequence[Side],
+    differences: Sequence[Difference] = (),
+    changed: Sequence[RunPair] = (),
+) -> Path:
+    """Write the page of a sweep (one side) or of a comparison (two sides) into `folder`; return its path.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    groups = [group for side in sides for group in _list_groups(side)]
+    problems = [(side, run) for side in sides for run in side.runs if run.problem]
+    path = folder / PAGE_NAME
+    page = render_template(
+        "results/results.html",
+        sides=sides,
+        groups=groups,
+        plots={
+            "Robot time of a run [s]": _make_histograms({each.label: each.robot_times for each in groups}),
+            "Time per placed object [s]": _make_histograms(
+                {each.label: each.object_times for each in groups}
+            ),
+        },
+        phases=list(dict.fromkeys(phase.phase for each in groups for phase in each.summary.phases)),
+        differences=differences,
+        changed=changed,
+        problems=problems,
+        limit=MAX_LISTED_RUNS,
+        link=lambda run: _make_link(run, folder),
+        describe_variant=_describe_variant,
+    )
+    with convert_os_errors(f'write the page "{path}"', "free some space, or make the folder writable"):
+        write_atomically(path, page)
+    return path
+
+
+def _list_groups(side: Side) -> list[Group]:
+    """Return one group for each variant of a side."""
+    groups = []
+    for summary in side.summaries:
+        runs = {run.job: run for run in side.runs if run.variant == summary.variant}
+        items = [item for item in side.items if item.job in runs and item.state == "placed"]
+        label = " ".join(filter(None, (side.name, _describe_variant(summary.variant)))) or "all runs"
+        times = [run.robot_time_s for run in runs.values()]
+        groups.append(Group(label, summary, times, [item.robot_time_s for item in items]))
+    return groups
+
+
+def _make_histograms(values_by_label: Mapping[str, Sequence[float]]) -> list[Histogram]:
+    """Return one histogram for each group with values, all with the same bins."""
+    values = [value for each in values_by_label.values() for value in each]
+    edges = np.histogram_bin_edges(values, BIN_COUNT) if values else np.zeros(2)
+    return [
+        Histogram(
+            label,
+            f"{label}: {len(each)} values from {min(each):.2f} to {max(each):.2f}, median {median(each):.2f}",
+            np.histogram(each, edges)[0].tolist(),
+            float(edges[0]),
+            float(edges[-1]),
+        )
+        for label, each in values_by_label.items()
+        if each
+    ]
+
+
+def _make_link(run: str, folder: Path) -> str:
+    """Return the address of the report in the run directory `run`, relative to `folder`; "" if none."""
+    report = RunDirectory(Path(run)).report
+    return quote(os.path.relpath(report, folder)) if run and report.is_file() else ""
+
+
+def _describe_variant(variant: Mapping[str, str]) -> str:
+    """Return the values of a variant as text."""
+    return ", ".join(f"{key}={value}" for key, value in variant.items())
