@@ -13,11 +13,11 @@ from executive.events.event import Event
 
 @dataclass(frozen=True)
 class MotionPlanned(Event):
-    """The arm planned a motion.
+    """The plan of a motion that a skill requested is ready.
 
     Attributes:
         planned_ahead: True if the motion was planned before a skill requested the motion.
-        delay: Time from this event until the motion may start [s].
+        delay: Time from the request of the skill until the plan is ready [s].
         duration: Duration of the motion [s]; 0 if there is no motion.
     """
 

@@ -1,14 +1,15 @@
-"""Motion plans that are computed immediately and become ready after the planning time of the cell."""
+"""Motion plans that a worker thread computes, and that become ready after the planning time of the cell."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from executive.cell.arm import Goal, Motion, Task
+from executive.cell.futures import wait_until_done
 from executive.cell.protocols import Clock
-from executive.errors import Blocked, Unreachable
 from executive.events import Emit, MotionPlanned
 from executive.geometry import Array
 
@@ -16,24 +17,39 @@ M = TypeVar("M", bound=Motion)
 """Type of the motions of an arm."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Plan(Generic[M]):
     """Planning of a motion, in progress or finished; implements `executive.cell.arm.Planning`.
 
     Attributes:
         clock: Clock of the run.
-        ready_time: Time at which the planning is finished [s].
-        outcome: Planned motion, or error of the planner.
+        ready_time: Time before which the plan is not ready [s].
+        future: Planned motion, or exception of the planner, from the worker thread.
+        is_realtime: True if the clock of the run does not wait for the worker thread.
+        report: Function that is called once when the plan is ready, or None.
     """
 
     clock: Clock
     ready_time: float
-    outcome: M | Unreachable | Blocked
+    future: Future[M]
+    is_realtime: bool
+    report: Callable[[], None] | None = None
 
     @property
     def ready(self) -> bool:
-        """True from the control step at `ready_time`."""
-        return self.clock.now >= self.ready_time - self.clock.step / 2
+        """True from the control step at `ready_time`, in real time not before the worker has finished.
+
+        In simulation, this property waits for the worker at `ready_time`, so that the time at which a motion
+        becomes available does not depend on the speed of the computer.
+        """
+        if self.clock.now < self.ready_time - self.clock.step / 2:
+            return False
+        if not self.is_realtime:
+            wait_until_done(self.future)
+        if self.report is not None and self.future.done():
+            report, self.report = self.report, None
+            report()
+        return self.future.done()
 
     def result(self) -> M:
         """Return the motion.
@@ -42,26 +58,33 @@ class Plan(Generic[M]):
             Unreachable: The goal has no joint solution inside the limits.
             Blocked: Every candidate comes too close to an obstacle.
         """
-        if isinstance(self.outcome, Exception):
-            raise self.outcome
-        return self.outcome
+        return self.future.result()
 
 
 class PlanFactory(Generic[M]):
-    """Makes plans, stores at most one plan for a later request, and emits an event for each request.
+    """Makes plans in a worker, stores at most one plan for a later request, and emits events.
 
     Args:
-        plan: Function that plans a motion from joint positions at rest; raises Unreachable and Blocked.
+        plan: Function that plans a motion from joint positions at rest; called by the worker.
+        worker: Executor of the planning, with one thread; the caller closes it.
         clock: Clock of the run.
         planning_time: Time from the request of a plan until the plan is ready [s].
-        emit: Function that receives the events.
+        emit: Function that receives an event for each requested plan when the plan is ready.
+        is_realtime: True if the clock of the run does not wait for the worker thread.
     """
 
     def __init__(
-        self, plan: Callable[[Array, Goal | str, Task], M], clock: Clock, planning_time: float, emit: Emit
+        self,
+        plan: Callable[[Array, Goal | str, Task], M],
+        worker: Executor,
+        clock: Clock,
+        planning_time: float,
+        emit: Emit,
+        *,
+        is_realtime: bool = False,
     ) -> None:
-        self._plan_motion, self._planning_time = plan, planning_time
-        self._clock, self._emit = clock, emit
+        self._plan_motion, self._worker, self._planning_time = plan, worker, planning_time
+        self._clock, self._emit, self._is_realtime = clock, emit, is_realtime
         self._stored_query: tuple[bytes, Goal | str, Task] | None = None
         self._stored_plan: Plan[M] | None = None
 
@@ -69,24 +92,32 @@ class PlanFactory(Generic[M]):
         """Plan a motion from `start` `(n,)` [rad], and store the plan for a later call of `plan`."""
         query = start.tobytes(), goal, task
         if query != self._stored_query:
+            self._drop_stored_plan()
             self._stored_query, self._stored_plan = query, self._make_plan(start, goal, task)
 
     def plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
         """Return the plan of a motion from `start` `(n,)` [rad], if possible the plan of `plan_ahead`."""
-        is_stored = (start.tobytes(), goal, task) == self._stored_query
-        stored_plan = self._stored_plan if is_stored else None
-        plan = stored_plan or self._make_plan(start, goal, task)
+        plan, is_planned_ahead = self._stored_plan, True
+        if plan is None or (start.tobytes(), goal, task) != self._stored_query:
+            self._drop_stored_plan()
+            plan, is_planned_ahead = self._make_plan(start, goal, task), False
         self._stored_query = self._stored_plan = None
-        duration = 0.0 if isinstance(plan.outcome, Exception) else plan.outcome.duration
-        wait_time = max(0.0, plan.ready_time - self._clock.now)
-        self._emit(MotionPlanned(is_stored, round(wait_time, 4), round(duration, 4)))
+        request_time, future = self._clock.now, plan.future
+
+        def report() -> None:
+            duration = 0.0 if future.exception() else future.result().duration
+            delay = self._clock.now - request_time
+            self._emit(MotionPlanned(is_planned_ahead, round(delay, 4), round(duration, 4)))
+
+        plan.report = report
         return plan
 
+    def _drop_stored_plan(self) -> None:
+        """Cancel the stored plan if the worker has not started it; otherwise, nobody reads its result."""
+        if self._stored_plan is not None:
+            self._stored_plan.future.cancel()
+
     def _make_plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
-        """Return the plan of a motion, which becomes ready after the planning time."""
-        outcome: M | Unreachable | Blocked
-        try:
-            outcome = self._plan_motion(start, goal, task)
-        except (Unreachable, Blocked) as error:
-            outcome = error
-        return Plan(self._clock, self._clock.now + self._planning_time, outcome)
+        """Return the plan of a motion, which the worker computes."""
+        future = self._worker.submit(self._plan_motion, start.copy(), goal, task)
+        return Plan(self._clock, self._clock.now + self._planning_time, future, self._is_realtime)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import random
 import signal
 from collections.abc import Sequence
+from concurrent.futures import Future
 from dataclasses import replace
 from typing import Any
 
 from executive.cell.config import CellConfig
 from executive.cell.detection import Detection
+from executive.cells.fake.arm import FakeMotion
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Unreachable
 
@@ -47,7 +49,11 @@ class UnkindCell(FakeCell):
         if self._happens(0.02):
             self.arm.next_obstacle = "the arm ran into something"
         plan = self._plan(*args, **more)
-        return replace(plan, outcome=Unreachable("the arm does not like it")) if self._happens(0.03) else plan
+        if not self._happens(0.03):
+            return plan
+        future = Future[FakeMotion]()
+        future.set_exception(Unreachable("the arm does not like it"))
+        return replace(plan, future=future)
 
     def _open_or_not(self) -> None:
         # A grasp that is taken back lets go for sure: no skill looks whether it did.

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
 
 import pytest
 
+from executive.cells.fake.arm import FakeMotion
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Blocked, Unreachable
 from executive.skill import EMPTY, SkillFailed
@@ -83,12 +85,18 @@ def test_the_check_knows_that_the_tool_is_empty_after_a_drop_alone() -> None:
     assert not {"unreachable", "blocked", "stuck"} & PutDown.tool_state_after_failure.keys()
 
 
+def make_failed(error: Exception) -> Future[FakeMotion]:
+    future = Future[FakeMotion]()
+    future.set_exception(error)
+    return future
+
+
 @pytest.fixture
 def nowhere(fake: FakeCell, monkeypatch: pytest.MonkeyPatch) -> Callable[[Exception], None]:
     """Makes every plan from now on end with an error."""
     plan = fake.arm.plan
     return lambda error: monkeypatch.setattr(
-        fake.arm, "plan", lambda *asked: replace(plan(*asked), outcome=error)
+        fake.arm, "plan", lambda *asked: replace(plan(*asked), future=make_failed(error))
     )
 
 

@@ -16,6 +16,7 @@ from executive.cell.layout import compute_travel_height, find_unreachable_places
 from executive.cell.protocols import Clock
 from executive.cell.workcell import KeyPath
 from executive.cells.fake.fake_obstacles import Collision, FakeObstacles
+from executive.cells.fake.immediate_executor import ImmediateExecutor
 from executive.cells.fake.world import FakeWorld
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit
@@ -76,7 +77,8 @@ class FakeArm:
         self._travel_height = compute_travel_height(config)
         self._joint_count = config.arm.joint_count
         self._obstacles = FakeObstacles(config)
-        self._plans = PlanFactory(self._plan_motion, clock, config.motion.planning_time, emit)
+        worker = ImmediateExecutor()
+        self._plans = PlanFactory(self._plan_motion, worker, clock, config.motion.planning_time, emit)
         self._path: list[Pose] = []
         self._half_pose_count = 0
 

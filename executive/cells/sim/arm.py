@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -65,7 +66,8 @@ class SimArm:
         self.collision: str | None = None
         self._world = world
         self._poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
-        self._plans = PlanFactory(self._plan_motion, clock, config.motion.planning_time, emit)
+        self._worker = ThreadPoolExecutor(1, "planner")
+        self._plans = PlanFactory(self._plan_motion, self._worker, clock, config.motion.planning_time, emit)
         self._contact_monitor = ContactMonitor(world, get_held_body)
         self._motion: Trajectory | None = None
         self._motion_time = 0.0
@@ -124,6 +126,7 @@ class SimArm:
             Fault: The arm is moving, or the cell file has no such pose.
         """
         self._require_rest("plan a motion")
+        self._require_pose(goal)
         return self._plans.plan(self._commanded_q, goal, task)
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
@@ -132,6 +135,7 @@ class SimArm:
         Raises:
             Fault: The cell file has no such pose.
         """
+        self._require_pose(goal)
         if self._braking_times is None:  # a braking arm does not reach the end of the motion
             self._plans.plan_ahead(self._end_q, goal, task)
 
@@ -162,6 +166,10 @@ class SimArm:
         if self._motion is not None and self._braking_times is None:
             self.collision = message
             self.stop()
+
+    def close(self) -> None:
+        """End the thread that plans motions after the running plan; cancel plans that have not started."""
+        self._worker.shutdown(cancel_futures=True)
 
     def send_command(self) -> None:
         """Send the current command to the motors."""
@@ -197,11 +205,12 @@ class SimArm:
         return self._commanded_q if self._motion is None else self._motion.end
 
     def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> Trajectory:
-        if isinstance(goal, Goal):
-            return self.planner.plan(start, goal, task)
-        if goal not in self._poses:
+        """Plan a motion; called in the worker thread, which alone uses the collision check of the planner."""
+        return self.planner.plan(start, goal if isinstance(goal, Goal) else self._poses[goal], task)
+
+    def _require_pose(self, goal: Goal | str) -> None:
+        if isinstance(goal, str) and goal not in self._poses:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
-        return self.planner.plan(start, self._poses[goal], task)
 
     def _check_positions(self, q: Array, tolerance: float, description: str) -> None:
         """Store a fault message with `description` if a joint is over `tolerance` [rad] away from `q`."""

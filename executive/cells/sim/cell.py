@@ -131,9 +131,10 @@ class SimCell(SimCellChecks, CellWithoutHardware):
         return count_outcomes(objects, records, bins, self.routes, max_distance)
 
     def close(self) -> None:
-        """Close the detectors and the physics servers."""
+        """Close the detectors, the planner and the physics servers."""
         for detector in self._detectors.values():
             detector.close()
+        self._arm.close()
         self._clearance_checker.close()
         self._world.close()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -16,12 +16,11 @@ from executive.cell.config import CameraConfig, DetectorConfig
 from executive.cell.detection import Answer, Detection
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
+from executive.cell.futures import wait_until_done
 from executive.cell.protocols import Clock, Detector, Request
 from executive.errors import DeadlinePassed, Unavailable
 from executive.perception.detectors.views import Region, list_regions
 
-MAX_BLOCKING_TIME = 0.05
-"""Maximum uninterrupted wait for an overdue answer [s], which is the maximum delay of a second Ctrl-C."""
 CLOCK_ROUNDING_ERROR = 1e-9
 """Maximum rounding error of a time on the clock [s]."""
 
@@ -117,8 +116,7 @@ class PendingSearch:
         """
         if self.clock.now < self.due_time - CLOCK_ROUNDING_ERROR:
             return False
-        while not self.future.done():
-            wait([self.future], MAX_BLOCKING_TIME)
+        wait_until_done(self.future)
         is_late = isinstance(self.future.exception(), DeadlinePassed)
         return not is_late or self.clock.now >= self.expiry_time - CLOCK_ROUNDING_ERROR
 

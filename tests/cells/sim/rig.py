@@ -97,6 +97,7 @@ class Rig:
         return float(sum(point[9] for point in points))
 
     def close(self) -> None:
-        """Give both worlds back."""
+        """End the planner and give both worlds back."""
+        self.arm.close()
         self.clearance.close()
         self.world.close()

@@ -61,7 +61,10 @@ def test_a_motion_planned_ahead_too_late_is_waited_for_as_long_as_it_takes(rig: 
     rig.run()
     rig.arm.plan_ahead("home")
     rig.step(4)
-    assert not rig.arm.plan("home").ready
+    planning = rig.arm.plan("home")
+    assert not planning.ready
+    rig.step(20)
+    assert planning.ready
     assert rig.events[-1].delay == pytest.approx(20 / 240, abs=1e-4)
 
 
@@ -78,7 +81,10 @@ def test_a_motion_planned_ahead_too_late_is_waited_for_as_long_as_it_takes(rig: 
 def test_what_was_planned_ahead_answers_no_other_question(rig: Rig, goal: Goal | str, task: Task) -> None:
     rig.arm.plan_ahead(BESIDE)
     rig.step(20)
-    assert not rig.arm.plan(goal, task).ready
+    planning = rig.arm.plan(goal, task)
+    assert not planning.ready
+    rig.step(24)
+    assert planning.ready
     assert rig.events[-1].planned_ahead is False
 
 
@@ -169,3 +175,18 @@ def test_its_tool_velocity_is_how_far_the_tool_gets_in_a_control_step(rig: Rig) 
     assert fastest > 0.3
     rig.step(30)
     assert rig.arm.tool_velocity == pytest.approx(np.zeros(3), abs=1e-3)
+
+
+def test_a_thread_plans_the_motion_that_the_planner_returns_directly_and_ends_with_the_arm(rig: Rig) -> None:
+    task = Task(obstacles=(Obstacle(0.6, 0.2, 0.03, 0.05, "cube-1"),))
+    planning = rig.arm.plan(OVER, task)
+    (worker,) = rig.arm._worker._threads
+    rig.step(24)
+    assert planning.ready
+    direct = rig.planner.plan(rig.arm._commanded_q, OVER, task)
+    assert np.array_equal(planning.result().samples.q, direct.samples.q)
+    running, waiting = rig.arm.plan(BESIDE), rig.arm.plan("home")
+    rig.arm.close()
+    assert not worker.is_alive()
+    assert running.future.done()
+    assert waiting.future.done()
