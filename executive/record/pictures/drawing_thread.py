@@ -29,6 +29,8 @@ class PictureDrawer:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="pictures")
+        # Any first task starts the thread; the first picture would start it during a control step.
+        self._thread.submit(int)
         self._futures: list[Future[None]] = []
         self.problem = ""
         """Message about missing pictures, or ""."""

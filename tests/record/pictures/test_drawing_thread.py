@@ -33,6 +33,12 @@ def test_a_scene_becomes_a_small_file(tmp_path):
     assert 0 < (tmp_path / "frames" / "b.jpg").stat().st_size < 100_000
 
 
+def test_the_thread_starts_before_the_first_picture(tmp_path):
+    drawer = PictureDrawer(tmp_path)
+    assert any(thread.name.startswith("pictures") for thread in threading.enumerate())
+    drawer.close()
+
+
 def test_a_picture_that_cannot_be_written_is_a_problem_and_the_others_are_drawn(tmp_path):
     (tmp_path / "b.jpg").mkdir()
     drawer = PictureDrawer(tmp_path)
