@@ -55,6 +55,9 @@ def project(tmp_path: Path, missions: Path, monkeypatch: pytest.MonkeyPatch) -> 
         (folder / name).write_text(text, encoding="utf-8")
     monkeypatch.chdir(folder)
     monkeypatch.setattr(sys, "path", [*sys.path])
+    # A module of the project of the previous test would be found in that project.
+    for module in ("mine_wave", "mine_wave.wave"):
+        monkeypatch.delitem(sys.modules, module, raising=False)
     return folder
 
 
@@ -104,6 +107,7 @@ def test_a_worker_runs_a_skill_of_another_package(project: Path, tmp_path: Path,
         first, second = (plugin.execute(pickle.dumps((run_job, job))) for job in (jobs[0], jobs[0]))
     finally:
         plugin.teardown(worker)  # type: ignore[arg-type]
+    assert first.error == ""
     remote = unpack_returned_run(first)
     assert local.run.status == "SUCCESS"
     assert (remote.run.status, remote.run.trace) == (local.run.status, local.run.trace)
