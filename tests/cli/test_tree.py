@@ -154,11 +154,11 @@ def test_a_mission_with_mistakes_has_no_tree(tmp_path):
 
 def test_a_folded_tree_shows_every_subtree_once():
     text = shown("sort_overhead", "--fold").stdout
-    assert text.count("view: table, doubtful: pass") == 1, "the only one of its kind is in look"
+    assert text.count("view: full, doubtful: pass") == 1, "the only one of its kind is in look"
     assert [line.strip("│├└─ ") for line in text.splitlines() if "as above" in line] == [
-        "recover look: try  (as above)",
-        "1:look: try  (as above, other params)", "2:look: try  (as above, other params)",
-        "look: try  (as above)", "recover find_again: retry  (as above)",
+        "recover look: try  (as above, other params)",
+        "look: try  (as above)", "look: try  (as above, other params)",
+        "look: try  (as above, other params)", "recover find_again: retry  (as above)",
     ]  # fmt: skip
     picture = ElementTree.fromstring(shown("sort_overhead", "--fold", "--svg").stdout)
     assert [part.attrib["data-kind"] for part in picture if "use" in part.attrib.get("class", "")] == [
