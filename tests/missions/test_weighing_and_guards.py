@@ -12,7 +12,7 @@ from executive.testing.run_mission import run_mission
 def put_objects(fake: FakeCell) -> None:
     """Leave three objects on the table."""
     fake.world.objects.clear()
-    for label, y in (("sphere", -0.15), ("cube", 0.0), ("cube", 0.15)):
+    for label, y in (("sphere", -0.2), ("cube", 0.1), ("cube", 0.2)):
         fake.world.put(label, 0.5, y)
 
 
