@@ -1,8 +1,8 @@
 """Straight motion of the tool, up or down, in one branch of the inverse kinematics.
 
-The joint path `q(s)` is a spline through inverse-kinematics solutions; its parameter `s` is the distance that
-the tool has moved. `q_s`, `q_ss` and `q_sss` are the derivatives of `q` by `s`. With speed `v`, acceleration
-`a` and jerk `j` of the tool, the chain rule gives velocity, acceleration and jerk of the joints:
+The joint path `q(s)` is a polynomial through inverse-kinematics solutions; its parameter `s` is the distance
+that the tool has moved. `q_s`, `q_ss` and `q_sss` are the derivatives of `q` by `s`. With speed `v`,
+acceleration `a` and jerk `j` of the tool, the chain rule gives velocity, acceleration and jerk of the joints:
 
     q' = q_s v,  q'' = q_s a + q_ss v²,  q''' = q_s j + 3 q_ss v a + q_sss v³.
 
@@ -14,9 +14,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.polynomial import polynomial
 from ruckig import InputParameter, Ruckig
 from ruckig import Trajectory as Profile
-from scipy.interpolate import CubicSpline
 
 from executive.geometry import Array
 from executive.motion.joints import JointLimits, JointState
@@ -33,7 +33,8 @@ class CartesianLine:
     At an end where the tool moves, its speed is the highest from which the tool can stop on the line.
 
     Args:
-        waypoints: Joint positions `(N, n)` [rad] at `N` evenly spaced points of the line, `N` > 3.
+        waypoints: Joint positions `(N, n)` [rad] at `N` evenly spaced points of the line; the degree of the
+            polynomial is `N` - 1.
         length: Length of the line [m].
         limits: Joint limits.
         max_speed: Maximum speed of the tool [m/s].
@@ -56,8 +57,10 @@ class CartesianLine:
         starts_in_motion: bool = False,
         ends_in_motion: bool = False,
     ) -> None:
-        self._spline = CubicSpline(np.linspace(0.0, length, len(waypoints)), waypoints)
-        self._derivatives = [self._spline.derivative(order) for order in (1, 2)]
+        degree, distances = len(waypoints) - 1, np.linspace(0.0, length, len(waypoints))
+        coefficients = polynomial.polyfit(distances, waypoints, degree)
+        self._coefficients = [polynomial.polyder(coefficients, order) for order in range(4)]
+        """Coefficients `(degree + 1 - k, n)` of the `k`-th derivative of the joint path."""
         speed, acceleration, jerk = self._compute_tool_limits(limits, max_speed, length)
         self.max_acceleration = acceleration = min(max_acceleration, acceleration)
         end_speed = _find_max_end_speed(length, speed, acceleration, jerk)
@@ -73,15 +76,19 @@ class CartesianLine:
     def state_at(self, time: float) -> JointState:
         """Return the state at `time`, 0 to `duration` [s]."""
         (distance,), (speed,), (acceleration,) = self._profile.at_time(time)
-        q_s, q_ss = (derivative(distance) for derivative in self._derivatives)
-        return JointState(self._spline(distance), q_s * speed, q_s * acceleration + q_ss * speed**2)
+        q, q_s, q_ss = (self._compute_derivatives(distance, order) for order in range(3))
+        return JointState(q, q_s * speed, q_s * acceleration + q_ss * speed**2)
 
     def sample(self, times: Array) -> JointState:
         """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
         samples = np.array([self._profile.at_time(time) for time in times.tolist()])[:, :, 0].T
         distance, (speed, acceleration) = samples[0], samples[1:, :, None]
-        q_s, q_ss = (derivative(distance) for derivative in self._derivatives)
-        return JointState(self._spline(distance), q_s * speed, q_s * acceleration + q_ss * speed**2)
+        q, q_s, q_ss = (self._compute_derivatives(distance, order) for order in range(3))
+        return JointState(q, q_s * speed, q_s * acceleration + q_ss * speed**2)
+
+    def _compute_derivatives(self, distances: Array | float, order: int) -> Array:
+        """Return a derivative of the joint path, of order 0 to 3, at `(M,)` distances [m] as `(M, n)`."""
+        return np.asarray(polynomial.polyval(distances, self._coefficients[order]).T)
 
     def _compute_tool_limits(
         self, limits: JointLimits, max_speed: float, length: float
@@ -91,7 +98,9 @@ class CartesianLine:
         The chain rule in the module docstring is solved for `v`, then for `a`, then for `j`.
         """
         distances = _CHECKED_FRACTIONS * length
-        q_s, q_ss, q_sss = (np.abs(self._spline(distances, order)).max(axis=0) for order in (1, 2, 3))
+        q_s, q_ss, q_sss = (
+            np.abs(self._compute_derivatives(distances, order)).max(axis=0) for order in (1, 2, 3)
+        )
         max_speeds = (
             limits.velocity / (q_s + _MIN_DIVISOR),
             # Speed that the tool reaches with its maximum acceleration on the whole line.

@@ -10,7 +10,7 @@ import pytest
 UNUSED_MODULES = {
     "PIL", "av", "executive.cells.sim.cell", "executive.cells.sim.scene_file", "executive.record",
     "executive.replay", "executive.run.run", "executive.view", "inference_sdk", "jinja2", "onnxruntime",
-    "rich", "supervision", "torch",
+    "rich", "scipy", "supervision", "torch",
 }  # fmt: skip
 """Modules that only runs, views and training need."""
 SIMULATOR_MODULES = {"executive.cells.sim", "pybullet", "pybullet_data"}
