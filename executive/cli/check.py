@@ -32,7 +32,9 @@ def command(missions: tuple[str, ...], overrides: dict[str, str], as_json: bool)
         from executive.mission.findings import MAX_LISTED_FINDINGS, Finding, MissionError
         from executive.mission.load import load_mission
         from executive.plugins import load_cell_kind, load_skills
+        from executive.run.garbage_collection import omit_final_collection
 
+        omit_final_collection()
         skills = load_skills()
         reports: list[dict[str, Any]] = []
         texts = []

@@ -1,9 +1,10 @@
-"""The modules that a check of a mission imports: each import delays the start."""
+"""Start and end of a command: the modules that a check imports, and messages at the end of a run."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -29,3 +30,11 @@ def test_a_check_imports_only_the_modules_that_it_uses(kind: str, others: set[st
     arguments = [sys.executable, "-c", PROGRAM, kind, *UNUSED_MODULES, *others]
     done = subprocess.run(arguments, capture_output=True, text=True, check=True)
     assert done.stderr.splitlines() == ["exit code 0"]
+
+
+@pytest.mark.slow
+def test_no_library_reports_a_leak_at_the_end_of_a_run(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "executive.cli.main", "run", "sort_overhead", "--quiet"]
+    options = ["--set", "cell.table.objects=[1,1]", "--runs", str(tmp_path)]
+    done = subprocess.run([*command, *options], capture_output=True, text=True, check=True)
+    assert done.stderr == ""
