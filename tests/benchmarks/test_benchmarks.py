@@ -138,7 +138,7 @@ class TestHalts:
     @pytest.mark.slow
     def test_the_simulated_arm_brakes_within_its_limits(self) -> None:
         figures = halts.measure(
-            load_mission_under_test("sort_overhead", {}, has_oracle=True, seed=1), period_steps=60
+            load_mission_under_test("sort_overhead", {}, has_oracle=True, seed=1), period_steps=50
         )
         assert figures["problems"] == []
         assert figures["moving"] >= 20

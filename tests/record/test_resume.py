@@ -292,7 +292,7 @@ def truncate(path: Path, share: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("share", [0.15, 0.6, 0.9])
+@pytest.mark.parametrize("share", [0.15, 0.6, 0.8])
 @pytest.mark.parametrize("name", ["sort_overhead", "sort_wrist"])
 def test_a_scene_is_observed_if_the_journal_lacks_actions_of_the_tool(
     missions: Path, tmp_path: Path, name: str, share: float

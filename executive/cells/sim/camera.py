@@ -116,8 +116,7 @@ class SimCamera(MountedCamera):
         self._bins = bins
         self._fixed_view_renderer: FixedViewRenderer | None = None
         if config.mount == "fixed" and not light.shadow:
-            view = (*self._get_true_view(), (0, 0, *self._size), light)
-            self._fixed_view_renderer = FixedViewRenderer(world, *view)
+            self._fixed_view_renderer = FixedViewRenderer(world, (0, 0, *self._size), light)
 
     def sees_table(self) -> bool:
         """Return True if the whole workspace is in the image now and not occluded by the arm."""
@@ -138,7 +137,7 @@ class SimCamera(MountedCamera):
     def _render(self) -> RenderedImage:
         """Render the current image, without noise."""
         if self._fixed_view_renderer is not None:
-            return self._fixed_view_renderer.render()
+            return self._fixed_view_renderer.render(*self._get_true_view())
         return render(self._world, *self._get_true_view(), (0, 0, *self._size), self._light)
 
     def _capture_images(self) -> tuple[Image, Array | None]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -119,7 +118,7 @@ class _VisualShape(NamedTuple):
 
 
 class FixedViewRenderer:
-    """Renderer of a camera that does not move, which renders the immobile bodies only once.
+    """Renderer of a fixed camera, which renders the immobile bodies only once.
 
     Floor, table and bins take three quarters of the time of an image. Therefore, the first call of `render`
     stores an image of them. Each call combines this image with a new image of the arm and the objects: each
@@ -129,24 +128,30 @@ class FixedViewRenderer:
 
     Args:
         world: The world, in which floor, table and bins do not change after the first call of `render`.
-        matrix: Camera matrix `(3, 3)` [pixel].
-        X_WC: Pose of the camera in the world.
         region: The rendered region of the camera image.
         light: Light of the scene, in which objects cast no shadows.
     """
 
-    def __init__(self, world: World, matrix: Array, X_WC: Pose, region: Region, light: Light) -> None:
-        self._world, self._view = world, (matrix, X_WC, region, light)
+    def __init__(self, world: World, region: Region, light: Light) -> None:
+        self._world, self._region, self._light = world, region, light
         self._client = world.client
         immobile_bodies = (world.floor, world.table, *world.bin_bodies.values())
         self._immobile_shapes = [shape for body in immobile_bodies for shape in self._list_shapes(body)]
         # PyBullet reports wrong colours of the arm after the first call of `changeVisualShape`.
         self._arm_shapes = self._list_shapes(world.arm)
+        self._background: RenderedImage | None = None
 
-    def render(self) -> RenderedImage:
-        """Render the current image."""
+    def render(self, matrix: Array, X_WC: Pose) -> RenderedImage:
+        """Render the current image; a camera that was moved gets a new image of the immobile bodies.
+
+        `matrix` is the camera matrix `(3, 3)` [pixel], and `X_WC` the pose of the camera in the world.
+        """
         background = self._background
-        foreground = self._render_without(self._immobile_shapes)
+        if background is None or not _has_view(background, matrix, X_WC):
+            object_shapes = [shape for body in self._world.labels for shape in self._list_shapes(body)]
+            background = self._render_without(self._arm_shapes + object_shapes, matrix, X_WC)
+            self._background = background
+        foreground = self._render_without(self._immobile_shapes, matrix, X_WC)
         is_in_front = foreground.depth_buffer <= background.depth_buffer
         return replace(
             foreground,
@@ -155,19 +160,15 @@ class FixedViewRenderer:
             depth_buffer=np.where(is_in_front, foreground.depth_buffer, background.depth_buffer),
         )
 
-    @cached_property
-    def _background(self) -> RenderedImage:
-        """Image of the immobile bodies."""
-        object_shapes = [shape for body in self._world.labels for shape in self._list_shapes(body)]
-        return self._render_without(self._arm_shapes + object_shapes)
-
-    def _render_without(self, hidden_shapes: Sequence[_VisualShape]) -> RenderedImage:
+    def _render_without(
+        self, hidden_shapes: Sequence[_VisualShape], matrix: Array, X_WC: Pose
+    ) -> RenderedImage:
         """Render an image in which some shapes are invisible."""
         try:
             for body, link, index, _ in hidden_shapes:
                 # TinyRenderer omits a shape whose opacity, the last number of the colour, is 0.
                 self._client.changeVisualShape(body, link, index, rgbaColor=(0, 0, 0, 0))
-            return render(self._world, *self._view)
+            return render(self._world, matrix, X_WC, self._region, self._light)
         finally:
             for body, link, index, colour in hidden_shapes:
                 self._client.changeVisualShape(body, link, index, rgbaColor=colour)
@@ -179,3 +180,12 @@ class FixedViewRenderer:
             index = sum(shape.link == link for shape in shapes)
             shapes.append(_VisualShape(body, link, index, colour))
         return shapes
+
+
+def _has_view(rendered: RenderedImage, matrix: Array, X_WC: Pose) -> bool:
+    """Return True if an image was rendered with this camera matrix and this pose of the camera."""
+    pairs = (
+        (rendered.matrix, matrix), (rendered.X_WC.position, X_WC.position),
+        (rendered.X_WC.rotation, X_WC.rotation),
+    )  # fmt: skip
+    return all(np.array_equal(*pair) for pair in pairs)

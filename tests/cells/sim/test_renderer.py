@@ -28,10 +28,15 @@ def render_all_bodies(world: World) -> RenderedImage:
     return render(world, compute_calibration(camera)[0], get_camera_pose(world, camera), REGION, CELL_LIGHT)
 
 
-def make_renderer(world: World) -> FixedViewRenderer:
-    camera = world.config.cameras["overhead"]
-    view = compute_calibration(camera)[0], get_camera_pose(world, camera)
-    return FixedViewRenderer(world, *view, REGION, CELL_LIGHT)
+class Renderer:
+    """Renderer of the overhead camera, with stored immobile bodies."""
+
+    def __init__(self, world: World) -> None:
+        self._world, self._renderer = world, FixedViewRenderer(world, REGION, CELL_LIGHT)
+
+    def render(self) -> RenderedImage:
+        camera = self._world.config.cameras["overhead"]
+        return self._renderer.render(compute_calibration(camera)[0], get_camera_pose(self._world, camera))
 
 
 def is_equal(image: RenderedImage, other: RenderedImage) -> bool:
@@ -41,7 +46,7 @@ def is_equal(image: RenderedImage, other: RenderedImage) -> bool:
 
 def test_an_image_with_stored_immobile_bodies_is_equal_to_an_image_of_all_bodies(world: World) -> None:
     before = render_all_bodies(world)
-    renderers = make_renderer(world), make_renderer(world)
+    renderers = Renderer(world), Renderer(world)
     assert all(is_equal(renderer.render(), before) for renderer in renderers)
     world.set_joint_positions(np.radians([10, 40, 0, -80, 0, 60, 0]))
     duck, cube = world.labels
@@ -54,8 +59,18 @@ def test_an_image_with_stored_immobile_bodies_is_equal_to_an_image_of_all_bodies
 
 
 def test_immobile_bodies_are_rendered_only_once(world: World) -> None:
-    renderer = make_renderer(world)
+    renderer = Renderer(world)
     first = renderer.render()
     client, far_away = world.client, [9, 9, 9]
     client.resetBasePositionAndOrientation(world.table, far_away, [0, 0, 0, 1])
     assert is_equal(renderer.render(), first)
+
+
+def test_a_moved_camera_gets_a_new_image_of_the_immobile_bodies(world: World) -> None:
+    renderer = Renderer(world)
+    first = renderer.render()
+    camera = world.config.cameras["overhead"]
+    moved = camera.model_copy(update={"position": (0.5, 0.02, 1.2), "look_at": (0.5, 0.02, 0.0)})
+    world.config = world.config.model_copy(update={"cameras": {"overhead": moved}})
+    assert is_equal(renderer.render(), render_all_bodies(world))
+    assert not is_equal(renderer.render(), first)

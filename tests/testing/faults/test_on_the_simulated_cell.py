@@ -85,12 +85,12 @@ def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched)
 
 @pytest.mark.slow
 def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
-    result = watched.run(during("*/Approach", effects.object_moved((0.0, 0.06)), activations=2), places)
+    result = watched.run(during("*/Approach", effects.object_moved((0.0, -0.06)), activations=2), places)
     (fault,) = result.list_injected_faults()
     before, felt = watched.seen["FaultInjected"], watched.seen["no_contact"]
     assert isinstance(before, dict) and isinstance(felt, dict)
     (body,) = (body for body, place in before.items() if np.allclose(place, fault.position, atol=1e-3))
-    assert np.allclose(felt[body][:2] - before[body][:2], [0.0, 0.06], atol=0.005)
+    assert np.allclose(felt[body][:2] - before[body][:2], [0.0, -0.06], atol=0.005)
     assert (result.status, result.items["lost"], result.agrees) == ("SUCCESS", 0, True)
 
 
