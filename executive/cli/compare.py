@@ -41,8 +41,8 @@ def command(
 ) -> int:  # fmt: skip
     """Run the missions A and B once for every seed, and estimate the differences.
 
-    A and B are files or names of shipped missions. Without B, A is compared with itself: with --set-a for the
-    runs of A, and with --set-b for the runs of B. The results of both are stored in a/results.sqlite and
+    A and B are files or names of shipped missions. A single mission is used as A and as
+    B, and --set-a and --set-b state the difference. The results of both are stored in a/results.sqlite and
     b/results.sqlite in a folder below --runs. The intervals contain the difference with a confidence of 95 %.
     Ctrl-C halts the current runs; then the results of the complete pairs are printed.
     """
@@ -63,7 +63,7 @@ def command(
     with keep_stdout_clean():
         from executive.campaign.comparison import create_comparison, open_comparison, write_missing_reports
         from executive.campaign.results.differences import compute_differences, pair_runs
-        from executive.campaign.results.results_page import Side, write_page
+        from executive.campaign.results.results_page import SweepResults, write_page
         from executive.campaign.results.sweep_folder import make_settings
         from executive.campaign.results.sweep_summary import summarize_runs
         from executive.campaign.sweep import list_jobs, make_repeat_command, run_sweep
@@ -78,12 +78,12 @@ def command(
             pairs_of_inputs = ((missions[0], overrides_a), (missions[-1], overrides_b))
             databases = create_comparison(
                 [
-                    make_settings(mission, seeds, {**overrides, **each}, {}, scene, frames)
-                    for mission, each in pairs_of_inputs
+                    make_settings(mission, seeds, {**overrides, **own_overrides}, {}, scene, frames)
+                    for mission, own_overrides in pairs_of_inputs
                 ],
                 runs,
             )
-        sides: list[Side] = []
+        sides: list[SweepResults] = []
         for name, database in zip("AB", databases, strict=True):
             settings = database.settings
             jobs = list_jobs(settings, database.path.parent)
@@ -96,9 +96,11 @@ def command(
                         on_halt=print_halt,
                     )  # fmt: skip
             rows = database.read_runs()
-            repeat = functools.partial(make_repeat_command, settings)
-            summaries = summarize_runs(rows, database.read_phases(), repeat)
-            sides.append(Side(name, settings, rows, database.read_items(), summaries, len(rows) < len(jobs)))
+            make_command = functools.partial(make_repeat_command, settings)
+            summaries = summarize_runs(rows, database.read_phases(), make_command)
+            sides.append(
+                SweepResults(name, settings, rows, database.read_items(), summaries, len(rows) < len(jobs))
+            )
             database.close()
         pairs = pair_runs(sides[0].runs, sides[1].runs)
         differences, changed = compute_differences(pairs), [pair for pair in pairs if pair.is_changed]

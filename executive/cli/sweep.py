@@ -37,7 +37,7 @@ def parse_seed_range(text: str) -> range:
 @options.variations_option
 @click.option(
     "--resume", type=options.PATH, metavar="SWEEP",
-    help="Execute the missing runs of an interrupted sweep: its folder, or its file results.sqlite.",
+    help="Execute the missing runs of an interrupted sweep, given by its folder or its file results.sqlite.",
 )  # fmt: skip
 @options.workers_option
 @options.cluster_option
@@ -61,11 +61,10 @@ def command(
 ) -> int:  # fmt: skip
     """Run a mission once for every seed and variant, and summarize the runs.
 
-    MISSION is a file or the name of a shipped mission. The results are stored in results.sqlite in a folder
-    below --runs, which also contains the run directories. Only a run that did not succeed, or recorded an
-    object outcome that differs from the simulated world, gets a report; `executive report` writes the others.
-    Exit code 1 if --require is not met. Ctrl-C halts the current runs; then the results of the complete runs
-    are printed. A second Ctrl-C quits immediately.
+    MISSION is a file or the name of a shipped mission. A new folder below --runs contains results.sqlite, the
+    page, and the run directories. A run gets a report if it did not succeed or if the audit disagrees;
+    `executive report` writes the report of another run. Exit code 1 if --require is not met. Ctrl-C halts the
+    current runs; then the results of the complete runs are printed. A second Ctrl-C quits immediately.
     """
     names = ("mission", "seeds", "variations", "frames", "overrides", "scene")
     sources = map(ctx.get_parameter_source, names)
@@ -85,8 +84,8 @@ def command(
     with keep_stdout_clean():
         from executive.campaign.results.export import check_exporter, export_tables
         from executive.campaign.results.junit import write_junit
-        from executive.campaign.results.requirement import list_unmet, parse_requirement
-        from executive.campaign.results.results_page import Side, write_page
+        from executive.campaign.results.requirement import describe_unmet, parse_requirement
+        from executive.campaign.results.results_page import SweepResults, write_page
         from executive.campaign.results.sweep_folder import create_sweep, open_sweep
         from executive.campaign.results.sweep_summary import summarize_runs
         from executive.campaign.sweep import list_jobs, make_repeat_command, run_sweep
@@ -113,17 +112,17 @@ def command(
                     missing, database, workers=workers, cluster=cluster, progress=progress, on_halt=print_halt
                 )
             rows = database.read_runs()
-            repeat = functools.partial(make_repeat_command, settings)
-            summaries = summarize_runs(rows, database.read_phases(), repeat)
+            make_command = functools.partial(make_repeat_command, settings)
+            summaries = summarize_runs(rows, database.read_phases(), make_command)
             print_summary(summaries, len(jobs))
-            side = Side("", settings, rows, database.read_items(), summaries, len(rows) < len(jobs))
+            side = SweepResults("", settings, rows, database.read_items(), summaries, len(rows) < len(jobs))
             page = write_page(folder, [side])
             click.echo(f"page: {page}", err=True)
             if junit is not None:
-                write_junit(junit, settings.mission_name, rows, repeat)
+                write_junit(junit, settings.mission_name, rows, make_command)
             if export is not None:
                 export_tables(database, export)
-        unmet = list_unmet(comparisons, rows, summaries)
+        unmet = describe_unmet(comparisons, rows, summaries)
         for message in unmet:
             click.echo(message, err=True)
     if as_json:

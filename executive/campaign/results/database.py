@@ -37,12 +37,12 @@ class ResultsDatabase:
         settings: Settings of the sweep.
 
     Raises:
-        InputError: The file is missing or no database of this version, or cannot be written.
+        InputError: The file is missing, is no database of this schema version, or cannot be written.
     """
 
     def __init__(self, path: Path, settings: SweepSettings | None = None) -> None:
         self.path = path
-        self._folder: int | None = None
+        self._lock_descriptor: int | None = None
         if settings is None and not path.is_file():
             advice = f"name the file {FILE_NAME} of a sweep, or its folder"
             raise InputError(f'there is no file "{path}"; {advice}')
@@ -53,7 +53,9 @@ class ResultsDatabase:
             (version,) = self._connection.execute("PRAGMA user_version").fetchone()
         if version != SCHEMA_VERSION:
             advice = f"this program reads version {SCHEMA_VERSION}; start a new sweep"
-            raise InputError(f'"{path}" is no results of a sweep, or has version {version}; {advice}')
+            raise InputError(
+                f'"{path}" is no database of a sweep, or has the schema version {version}; {advice}'
+            )
         (self.settings,) = self._read(SETTINGS)
 
     def lock(self) -> None:
@@ -62,9 +64,9 @@ class ResultsDatabase:
         Raises:
             InputError: Another process has reserved the sweep.
         """
-        self._folder = os.open(self.path.parent, os.O_RDONLY)
+        self._lock_descriptor = os.open(self.path.parent, os.O_RDONLY)
         try:
-            fcntl.flock(self._folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(self._lock_descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             advice = "wait until that process has ended; runs would be executed twice"
             raise InputError(f'another process executes the sweep "{self.path}"; {advice}') from error
@@ -95,9 +97,9 @@ class ResultsDatabase:
     def close(self) -> None:
         """Close the file."""
         self._connection.close()
-        if self._folder is not None:
-            os.close(self._folder)
-            self._folder = None
+        if self._lock_descriptor is not None:
+            os.close(self._lock_descriptor)
+            self._lock_descriptor = None
 
     def _create_tables(self, settings: SweepSettings) -> None:
         with self._connection as connection:
@@ -117,7 +119,9 @@ class ResultsDatabase:
             yield
         except sqlite3.Error as error:
             problem = f'the results "{self.path}" cannot be read or written: {error}'
-            raise InputError(f"{problem}; the file contains all runs that ended before") from error
+            raise InputError(
+                f"{problem}; runs that were stored before this error may still be in the file"
+            ) from error
 
 
 def find_database(path: Path) -> Path:

@@ -58,7 +58,7 @@ def pair_runs(runs_a: Sequence[RunRow], runs_b: Sequence[RunRow]) -> list[RunPai
 
 
 def compute_differences(pairs: Sequence[RunPair]) -> list[Difference]:
-    """Return the differences of success rate, throughput, and time of the runs that both missions achieve."""
+    """Return the differences in success rate, throughput, and robot time of the pairs with two successes."""
     both_succeeded = [pair for pair in pairs if pair.a.is_success and pair.b.is_success]
     return [
         _estimate_difference("success", [(pair.a.is_success, 1, pair.b.is_success, 1) for pair in pairs]),
@@ -67,7 +67,7 @@ def compute_differences(pairs: Sequence[RunPair]) -> list[Difference]:
             [(*_get_throughput_terms(pair.a), *_get_throughput_terms(pair.b)) for pair in pairs],
         ),
         _estimate_difference(
-            "robot time of seeds with two successes [s]",
+            "robot time if both runs succeed [s]",
             [(pair.a.robot_time_s, 1, pair.b.robot_time_s, 1) for pair in both_succeeded],
         ),
     ]
@@ -94,10 +94,12 @@ def _estimate_difference(metric: str, terms: Sequence[tuple[float, float, float,
     from scipy.stats import bootstrap  # Imported here, because workers do not need the import of 0.5 s.
 
     def compute_difference(
-        tops_a: NDArray[np.float64], bottoms_a: NDArray[np.float64], tops_b: NDArray[np.float64],
-        bottoms_b: NDArray[np.float64], axis: int,
+        numerators_a: NDArray[np.float64], denominators_a: NDArray[np.float64],
+        numerators_b: NDArray[np.float64], denominators_b: NDArray[np.float64], axis: int,
     ) -> ArrayLike:  # fmt: skip
-        return tops_b.sum(axis) / bottoms_b.sum(axis) - tops_a.sum(axis) / bottoms_a.sum(axis)
+        return numerators_b.sum(axis) / denominators_b.sum(axis) - numerators_a.sum(
+            axis
+        ) / denominators_a.sum(axis)
 
     # The percentile method gives [x, x] for equal differences, for which the BCa method is not defined.
     with np.errstate(all="ignore"):

@@ -56,12 +56,12 @@ def estimate_ratio(numerators: Sequence[float], denominators: Sequence[float]) -
     from scipy.stats import bootstrap
 
     def compute_ratio(
-        tops: NDArray[np.float64], bottoms: NDArray[np.float64], axis: int
+        run_numerators: NDArray[np.float64], run_denominators: NDArray[np.float64], axis: int
     ) -> NDArray[np.float64]:
-        return tops.sum(axis) / bottoms.sum(axis)
+        return run_numerators.sum(axis) / run_denominators.sum(axis)
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Equal runs have an interval of length 0.
+        warnings.simplefilter("ignore")  # scipy warns if all resamples are equal.
         interval = bootstrap(
             (numerators, denominators), compute_ratio, paired=True, vectorized=True, batch=100,
             n_resamples=RESAMPLE_COUNT, method="percentile", rng=np.random.default_rng(BOOTSTRAP_SEED),

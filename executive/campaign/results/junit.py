@@ -24,10 +24,10 @@ def write_junit(path: Path, mission: str, runs: Sequence[RunRow], make_repeat_co
 
 
 def format_junit(mission: str, runs: Sequence[RunRow], make_repeat_command: RepeatCommand) -> str:
-    """Return the report: a test case per run, with the reason of a failure and the command that repeats it.
+    """Return the report: one test case per run, with the reason of a failure and a command to repeat the run.
 
-    A run with status FAULT is an error; a run that did not succeed otherwise, or whose ledger the audit
-    contradicts, is a failure.
+    A run with the status FAULT is an error. A run with the status FAILURE or INCOMPLETE is a failure, and so
+    is a successful run whose audit contradicts the ledger.
     """
     cases = [_make_case(mission, run, make_repeat_command(run)) for run in runs]
     suite = ElementTree.Element(

@@ -16,7 +16,7 @@ from executive.campaign.results.tables import RUNS
 from executive.errors import InputError
 
 METRICS = ("success", "agreement", "objects_per_hour")
-"""Metrics without a column, which are attributes of `VariantSummary`."""
+"""Metrics of a variant: names of attributes of `VariantSummary` with the type `Estimate`."""
 PERCENTILES: Mapping[str, float] = {"min": 0, "median": 50, "p50": 50, "p95": 95, "p99": 99, "max": 100}
 """Percentiles of a column over the runs, by name [%]."""
 STATISTICS = ("mean", *PERCENTILES)
@@ -77,11 +77,11 @@ def parse_requirement(text: str) -> tuple[Comparison, ...]:
     return tuple(map(_parse_comparison, re.split(r"\band\b", text)))
 
 
-def list_unmet(
+def describe_unmet(
     comparisons: Sequence[Comparison], runs: Sequence[RunRow], summaries: Sequence[VariantSummary]
 ) -> list[str]:
     """Return a message for each comparison that the runs of a variant do not meet."""
-    messages = [] if summaries else ["no run was made"]
+    messages = [] if summaries else ["no run has ended"]
     for summary in summaries:
         variant_runs = [run for run in runs if run.variant == summary.variant]
         name = ", ".join(f"{key}={value}" for key, value in summary.variant.items())

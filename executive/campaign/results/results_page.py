@@ -27,7 +27,7 @@ MAX_LISTED_RUNS = 500
 
 
 @dataclass(frozen=True)
-class Side:
+class SweepResults:
     """Results of a sweep.
 
     Attributes:
@@ -48,13 +48,13 @@ class Side:
 
 @dataclass(frozen=True)
 class Group:
-    """Runs with equal inputs except the seed: a column of the tables.
+    """Runs of one variant of a sweep, which are one column in each table of the page.
 
     Attributes:
         label: Name of the side and values of the variant, or `all runs`.
         summary: Summary of the runs.
         robot_times: Duration of each run [s].
-        object_times: Time from the selection of each placed object to its end [s].
+        object_times: Time during which each placed object was the selected target [s].
     """
 
     label: str
@@ -69,7 +69,7 @@ class Histogram:
 
     Attributes:
         label: Label of the group.
-        description: Text for readers who do not see the plot.
+        description: Alternative text of the plot.
         counts: Number of values in each bin.
         low, high: Limits of the first and the last bin, equal for all groups.
     """
@@ -83,7 +83,7 @@ class Histogram:
 
 def write_page(
     folder: Path,
-    sides: Sequence[Side],
+    sides: Sequence[SweepResults],
     differences: Sequence[Difference] = (),
     changed: Sequence[RunPair] = (),
 ) -> Path:
@@ -100,9 +100,9 @@ def write_page(
         sides=sides,
         groups=groups,
         plots={
-            "Robot time of a run [s]": _make_histograms({each.label: each.robot_times for each in groups}),
+            "Robot time of a run [s]": _make_histograms({group.label: group.robot_times for group in groups}),
             "Time per placed object [s]": _make_histograms(
-                {each.label: each.object_times for each in groups}
+                {group.label: group.object_times for group in groups}
             ),
         },
         phases=list(dict.fromkeys(phase.phase for each in groups for phase in each.summary.phases)),
@@ -118,7 +118,7 @@ def write_page(
     return path
 
 
-def _list_groups(side: Side) -> list[Group]:
+def _list_groups(side: SweepResults) -> list[Group]:
     """Return one group for each variant of a side."""
     groups = []
     for summary in side.summaries:
@@ -132,25 +132,26 @@ def _list_groups(side: Side) -> list[Group]:
 
 def _make_histograms(values_by_label: Mapping[str, Sequence[float]]) -> list[Histogram]:
     """Return one histogram for each group with values, all with the same bins."""
-    values = [value for each in values_by_label.values() for value in each]
-    edges = np.histogram_bin_edges(values, BIN_COUNT) if values else np.zeros(2)
+    all_values = [value for values in values_by_label.values() for value in values]
+    edges = np.histogram_bin_edges(all_values, BIN_COUNT) if all_values else np.zeros(2)
     return [
         Histogram(
             label,
-            f"{label}: {len(each)} values from {min(each):.2f} to {max(each):.2f}, median {median(each):.2f}",
-            np.histogram(each, edges)[0].tolist(),
+            f"{label}: {len(values)} values from {min(values):.2f} to {max(values):.2f}, "
+            f"median {median(values):.2f}",
+            np.histogram(values, edges)[0].tolist(),
             float(edges[0]),
             float(edges[-1]),
         )
-        for label, each in values_by_label.items()
-        if each
+        for label, values in values_by_label.items()
+        if values
     ]
 
 
-def _make_link(run: str, folder: Path) -> str:
-    """Return the address of the report in the run directory `run`, relative to `folder`; "" if none."""
-    report = RunDirectory(Path(run)).report
-    return quote(os.path.relpath(report, folder)) if run and report.is_file() else ""
+def _make_link(run_directory: str, folder: Path) -> str:
+    """Return the address of the report in `run_directory`, relative to `folder`; "" if none."""
+    report = RunDirectory(Path(run_directory)).report
+    return quote(os.path.relpath(report, folder)) if run_directory and report.is_file() else ""
 
 
 def _describe_variant(variant: Mapping[str, str]) -> str:

@@ -131,12 +131,12 @@ class ItemRow(Row):
     attempts: int
     """Number of failed attempts to pick the item."""
     robot_time_s: float
-    """Time from each selection as the target to the next selection or the end of the item [s]."""
+    """Time during which the item was the selected target and had no final state [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseRow(Row):
-    """A phase of a run: all activations of one skill."""
+    """All activations of one skill in a run; the time of a run is divided into these phases."""
 
     job: int
     """Index of the run."""

@@ -20,7 +20,7 @@ def make_record(job: int, variant: Mapping[str, str], result: Result, timeline: 
         job: Index of the run in the sweep.
         variant: Values of the varied params and keys of the cell, by name.
         result: Result of the run.
-        timeline: Timeline of the run, with history.
+        timeline: Timeline of the run; its `has_history` is True.
     """
     values, names = to_json(result), {field.name for field in fields(RunRow)}
     shared_values = {name: value for name, value in values.items() if name in names}
@@ -33,12 +33,12 @@ def _list_items(job: int, timeline: Timeline) -> Iterator[ItemRow]:
     for name, history in timeline.items.by_name.items():
         last = history.last_change
         time = _measure_item_time(name, timeline)
-        end = {"label": last.label, "state": last.state, "bin": last.bin}
-        yield ItemRow(job=job, item=name, **end, attempts=last.attempts, robot_time_s=time)
+        final_values = {"label": last.label, "state": last.state, "bin": last.bin}
+        yield ItemRow(job=job, item=name, **final_values, attempts=last.attempts, robot_time_s=time)
 
 
 def _measure_item_time(name: str, timeline: Timeline) -> float:
-    """Return the time during which the item was the selected target and had not ended [s]."""
+    """Return the time during which the item was the selected target and had no final state [s]."""
     selections = timeline.selection_times
     next_times = [*(time for time, _ in selections[1:]), timeline.clock]
     item_end = timeline.items.by_name[name].state_change_time

@@ -97,7 +97,7 @@ def open_sweep(path: Path) -> ResultsDatabase:
 
 
 def _load_variants(settings: SweepSettings) -> list[LoadedMission]:
-    """Return the mission with the values of each variant; an error is reported once, not for every seed."""
+    """Load the mission of each variant and check the scene, to report an error before the first run."""
     skills, mission = load_skills(), settings.mission
     missions = [
         load_mission(mission, skills, {**settings.overrides, **variant}, load_cell_kind)

@@ -119,7 +119,7 @@ def _get_value(values: Mapping[str, object], column: Column) -> SqlValue:
         value = value[name] if isinstance(value, Mapping) else None
     if column.is_json:
         return json.dumps(value, ensure_ascii=False)
-    # SQLite and Parquet have no truth values of their own.
+    # SQLite has no Boolean type, and the Parquet files get the same types.
     return int(value) if isinstance(value, bool) else value  # type: ignore[return-value]
 
 

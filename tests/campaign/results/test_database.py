@@ -67,9 +67,7 @@ def test_a_run_is_stored_completely_or_not_at_all(tmp_path: Path) -> None:
             database.append(replace(RECORD, phases=(PHASE, PHASE)))
         assert (database.read_runs(), database.read_items()) == ([], [])
         database.append(RECORD)
-        with pytest.raises(
-            InputError, match=r"UNIQUE constraint failed: runs\.job; the file contains all runs"
-        ):
+        with pytest.raises(InputError, match=r"UNIQUE constraint failed: runs\.job; runs that were stored"):
             database.append(RECORD)
 
 
@@ -97,7 +95,7 @@ def test_another_file_is_refused(tmp_path: Path) -> None:
         ("text", r'the results ".*text" cannot be read or written: file is not a database'),
         (
             "empty",
-            r'".*empty" is no results of a sweep, or has version 0; this program reads version 1; start',
+            r'".*empty" is no database of a sweep, or has the schema version 0; this program reads version 1',
         ),
     ]:
         with pytest.raises(InputError, match=message):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.campaign.results.requirement import list_unmet, parse_requirement
+from executive.campaign.results.requirement import describe_unmet, parse_requirement
 from executive.campaign.results.rows import RunRow
 from executive.campaign.results.sweep_summary import summarize_runs
 from executive.errors import InputError
@@ -18,7 +18,7 @@ def run(seed: int, variant: str = "", **values: object) -> RunRow:
 
 
 def find_unmet(text: str, *runs: RunRow) -> list[str]:
-    return list_unmet(parse_requirement(text), runs, summarize_runs(runs, [], lambda run: ""))
+    return describe_unmet(parse_requirement(text), runs, summarize_runs(runs, [], lambda run: ""))
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def test_each_comparison_is_met_or_explained(text: str, unmet: list[str] | None)
 def test_every_variant_must_meet_the_requirement() -> None:
     runs = (run(1, "a"), run(2, "b", status="FAILURE", audit=Audit(agrees=False)))
     assert find_unmet("success>0.5", *runs) == ["success>0.5 is not met with v=b: the value is 0"]
-    assert find_unmet("success>0.5") == ["no run was made"]
+    assert find_unmet("success>0.5") == ["no run has ended"]
 
 
 @pytest.mark.parametrize(
