@@ -28,7 +28,7 @@ MAX_STEP_TIME = 0.005
 """Limit of the wall time of a control step [s]."""
 EXCLUDED_ROLES = ("arm", "camera", "detector")
 """Parts of the cell that plan motions, capture images and detect objects."""
-EXCLUDED_ACCESSES = ("arm.plan", "camera.", "detector.", "request.", "planning.")
+EXCLUDED_ACCESSES = ("arm.plan", "camera.", "detector.", "request.", "plan.")
 """Beginnings of the names of the accesses whose times do not count."""
 
 
