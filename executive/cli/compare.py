@@ -2,37 +2,26 @@
 
 from __future__ import annotations
 
-import functools
+from contextlib import closing
 from pathlib import Path
 
 import click
-from click.core import ParameterSource
 
 from executive.cli import options
 from executive.cli.streams import keep_stdout_clean, print_json
-from executive.cli.sweep import parse_seed_range
+from executive.cli.sweep import execute_missing_runs
 from executive.exit_codes import ExitCode
 
 
 @click.command(name="compare")
 @click.argument("missions", metavar="A [B]", nargs=-1)
-@click.option(
-    "--seeds", type=parse_seed_range, metavar="A:B",
-    help="Seeds from A to B; A:B excludes B, A-B includes B.",
-)  # fmt: skip
 @options.make_overrides_option("--set-a", "overrides_a", "Like --set, but only for A; repeatable.")
 @options.make_overrides_option("--set-b", "overrides_b", "Like --set, but only for B; repeatable.")
 @click.option(
     "--resume", type=options.FOLDER, metavar="FOLDER",
     help="Execute the missing runs of the interrupted comparison in this folder.",
 )  # fmt: skip
-@options.workers_option
-@options.cluster_option
-@click.option("--frames", is_flag=True, help="Save the camera images on which decisions are based.")
-@options.overrides_option
-@options.scene_option
-@options.runs_option
-@options.json_option
+@options.add_sweep_options
 @click.pass_context
 def command(
     ctx: click.Context, missions: tuple[str, ...], seeds: range | None, overrides_a: dict[str, str],
@@ -46,62 +35,40 @@ def command(
     b/results.sqlite in a folder below --runs. The intervals contain the difference with a confidence of 95 %.
     Ctrl-C halts the current runs; then the results of the complete pairs are printed.
     """
-    names = ("missions", "seeds", "overrides_a", "overrides_b", "frames", "overrides", "scene")
-    has_settings = any(ctx.get_parameter_source(name) is not ParameterSource.DEFAULT for name in names)
     repeated_keys = ", ".join(overrides.keys() & (overrides_a.keys() | overrides_b.keys()))
     options.check_usage(
         (
-            resume is None and (len(missions) not in (1, 2) or seeds is None),
+            not resume and (len(missions) not in (1, 2) or seeds is None),
             "give one or two missions and --seeds, or --resume FOLDER",
         ),
         (
-            resume is not None and has_settings,
+            resume and options.has_sweep_settings(ctx),
             "--resume takes missions, seeds and settings from the comparison; omit them",
         ),
         (repeated_keys, f"--set and --set-a or --set-b both give {repeated_keys}; omit one of them"),
     )
     with keep_stdout_clean():
-        from executive.campaign.comparison import create_comparison, open_comparison, write_missing_reports
         from executive.campaign.results.differences import compute_differences, pair_runs
-        from executive.campaign.results.results_page import SweepResults, write_page
-        from executive.campaign.results.sweep_folder import make_settings
-        from executive.campaign.results.sweep_summary import summarize_runs
-        from executive.campaign.sweep import list_jobs, make_repeat_command, run_sweep
+        from executive.campaign.results.results_page import write_missing_reports, write_page
+        from executive.campaign.results.sweep_folder import create_comparison, make_settings, open_comparison
+        from executive.campaign.results.sweep_summary import SweepResults
         from executive.cell.json_values import to_json
-        from executive.cli.compare_tables import print_differences
-        from executive.cli.progress import print_halt, show_progress
+        from executive.cli.sweep_tables import print_differences
 
         if resume is not None:
             databases = open_comparison(resume)
         else:
             assert seeds is not None
-            pairs_of_inputs = ((missions[0], overrides_a), (missions[-1], overrides_b))
-            databases = create_comparison(
-                [
-                    make_settings(mission, seeds, {**overrides, **own_overrides}, {}, scene, frames)
-                    for mission, own_overrides in pairs_of_inputs
-                ],
-                runs,
-            )
+            settings = [
+                make_settings(mission, seeds, {**overrides, **own_overrides}, {}, scene, frames)
+                for mission, own_overrides in ((missions[0], overrides_a), (missions[-1], overrides_b))
+            ]
+            databases = create_comparison(settings, runs)
         sides: list[SweepResults] = []
         for name, database in zip("AB", databases, strict=True):
-            settings = database.settings
-            jobs = list_jobs(settings, database.path.parent)
-            stored = {run.job for run in database.read_runs()}
-            missing = [job for job in jobs if job.index not in stored]
-            if missing and not any(side.is_halted for side in sides):
-                with show_progress(f"{name}: {settings.mission}", print_lines=True) as progress:
-                    run_sweep(
-                        missing, database, workers=workers, cluster=cluster, progress=progress,
-                        on_halt=print_halt,
-                    )  # fmt: skip
-            rows = database.read_runs()
-            make_command = functools.partial(make_repeat_command, settings)
-            summaries = summarize_runs(rows, database.read_phases(), make_command)
-            sides.append(
-                SweepResults(name, settings, rows, database.read_items(), summaries, len(rows) < len(jobs))
-            )
-            database.close()
+            is_halted = any(side.is_halted for side in sides)
+            with closing(database):
+                sides.append(execute_missing_runs(database, name, workers, cluster, is_halted=is_halted))
         pairs = pair_runs(sides[0].runs, sides[1].runs)
         differences, changed = compute_differences(pairs), [pair for pair in pairs if pair.is_changed]
         write_missing_reports(changed)
@@ -110,8 +77,9 @@ def command(
         click.echo(f"page: {page}", err=True)
     if as_json:
         print_json(to_json({
-            "settings": [side.settings for side in sides], "results": [str(one.path) for one in databases],
-            "page": str(page), "pairs": len(pairs), "differences": differences, "changed": changed,
+            "settings": [side.settings for side in sides],
+            "results": [str(database.path) for database in databases], "page": str(page),
+            "pairs": len(pairs), "differences": differences, "changed": changed,
             "summaries": [summary for side in sides for summary in side.summaries],
         }))  # fmt: skip
     return ExitCode.HALTED if any(side.is_halted for side in sides) else ExitCode.SUCCESS

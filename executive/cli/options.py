@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+from click.core import ParameterSource
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 """Type of a command function."""
@@ -47,6 +49,20 @@ def _parse_variations(
             raise click.BadParameter(f'"{key}={text}" contains a value twice', ctx, param)
         variations[key] = texts
     return variations
+
+
+def _parse_seed_range(text: str) -> range:
+    """Return the seeds for `A:B` (without B), `A-B` (with B), or `A`."""
+    match = re.fullmatch(r"(\d{1,10})(?:([-:])(\d{1,10}))?", text)
+    if match is None:
+        raise click.BadParameter(f'"{text}" is not a range of seeds, for example 0:100 or 0-99')
+    first, last = int(match[1]), int(match[3] or match[1]) - (match[2] == ":")
+    if last < first:
+        end = f"the end {match[3]} is excluded" if match[2] == ":" else f"{last} is less than {first}"
+        raise click.BadParameter(f'"{text}" contains no seed: {end}')
+    if last > MAX_SEED:
+        raise click.BadParameter(f'seed {last} in "{text}" is too large; the maximum is {MAX_SEED}')
+    return range(first, last + 1)
 
 
 class PathType(click.Path):
@@ -89,9 +105,7 @@ def make_overrides_option(option: str, name: str, text: str) -> Callable[[Comman
 
 
 overrides_option = make_overrides_option(
-    "--set",
-    "overrides",
-    "Set a param of the mission, or a key of the cell: cell.KEY.KEY=VALUE; repeatable.",
+    "--set", "overrides", "Set a param of the mission, or a key of the cell: cell.KEY.KEY=VALUE; repeatable."
 )
 variations_option = click.option(
     "--vary", "variations", metavar="KEY=[VALUE, ...]", multiple=True, callback=_parse_variations,
@@ -105,11 +119,39 @@ scene_option = click.option(
     help="Scene file: differences of the simulated world from the cell file (light, table, objects, camera).",
 )  # fmt: skip
 workers_option = click.option("--workers", type=COUNT, default=2, help="Number of parallel processes.")
-cluster_option = click.option(
-    "--cluster", metavar="ADDRESS",
-    help="Run on the workers of a dask scheduler, for example tcp://scheduler:8786 (extra: cluster).",
-)  # fmt: skip
 oracle_option = click.option(
     "--oracle", is_flag=True,
     help="Take detections from the simulated world instead of images; sorting then takes about two seconds.",
 )  # fmt: skip
+_SWEEP_OPTIONS = (
+    click.option(
+        "--seeds", type=_parse_seed_range, metavar="A:B",
+        help="Seeds from A to B; A:B excludes B, A-B includes B.",
+    ),
+    workers_option,
+    click.option(
+        "--cluster", metavar="ADDRESS",
+        help="Run on the workers of a dask scheduler, for example tcp://scheduler:8786 (extra: cluster).",
+    ),
+    click.option("--frames", is_flag=True, help="Save the camera images on which decisions are based."),
+    overrides_option, scene_option, runs_option, json_option,
+)  # fmt: skip
+"""Options that the commands `sweep` and `compare` share."""
+_SWEEP_SETTINGS = {
+    "mission", "missions", "seeds", "frames", "scene",
+    "variations", "overrides", "overrides_a", "overrides_b",
+}  # fmt: skip
+"""Parameters of `sweep` and `compare` whose values `--resume` reads from the results."""
+
+
+def add_sweep_options(command: CommandT) -> CommandT:
+    """Add the options that the commands `sweep` and `compare` share."""
+    for add_option in reversed(_SWEEP_OPTIONS):
+        command = add_option(command)
+    return command
+
+
+def has_sweep_settings(ctx: click.Context) -> bool:
+    """Return True if the command line of `sweep` or `compare` contains settings that `--resume` reads."""
+    names = ctx.params.keys() & _SWEEP_SETTINGS
+    return any(ctx.get_parameter_source(name) is not ParameterSource.DEFAULT for name in names)

@@ -1,19 +1,23 @@
-"""Summary of a sweep as text and tables on stderr."""
+"""Summary of a sweep, and differences of a comparison, as text and tables on stderr."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console, RenderableType
 from rich.table import Table
 
+from executive.campaign.results.differences import Difference, RunPair
 from executive.campaign.results.intervals import Estimate
+from executive.campaign.results.rows import describe_variant
 from executive.campaign.results.sweep_summary import FailureGroup, VariantSummary
 from executive.view.terminal.summary import describe_end
 
 MAX_LISTED_SEEDS = 10
 """Maximum number of seeds that are listed for a group of failures."""
+MAX_CHANGED_SEEDS = 20
+"""Maximum number of seeds with a changed outcome that are listed."""
 
 
 def print_summary(summaries: Sequence[VariantSummary], asked: int) -> None:
@@ -37,7 +41,7 @@ def _list_lines_and_tables(summaries: Sequence[VariantSummary], asked: int) -> I
     yield _make_table(summaries)
     for summary in summaries:
         if summary.variant and summary.failures:
-            yield f"with {_describe_variant(summary.variant)}:"
+            yield f"with {describe_variant(summary.variant)}:"
         for group in summary.failures:
             yield from _list_failure_lines(group)
 
@@ -47,7 +51,7 @@ def _make_table(summaries: Sequence[VariantSummary]) -> Table:
     table = Table(box=SIMPLE_HEAD, padding=(0, 1))
     table.add_column("(95 % interval)", no_wrap=True)
     for summary in summaries:
-        table.add_column(_describe_variant(summary.variant) or "all runs", justify="right")
+        table.add_column(describe_variant(summary.variant) or "all runs", justify="right")
     columns = list(map(_list_texts, summaries))
     for name in dict.fromkeys(name for column in columns for name in column):
         table.add_row(name, *(column.get(name, "") for column in columns))
@@ -56,7 +60,7 @@ def _make_table(summaries: Sequence[VariantSummary]) -> Table:
 
 def _list_texts(summary: VariantSummary) -> dict[str, str]:
     """Return the values of the metrics of a variant as text, by name."""
-    objects, robot_time, planning = summary.right_objects, summary.robot_time_s, summary.planning
+    objects, robot_time, planning = summary.correct_objects, summary.robot_time_s, summary.planning
     texts = {
         "success": _format_share(summary.success),
         "objects in the right bin": _format_share(objects),
@@ -81,15 +85,10 @@ def _list_failure_lines(group: FailureGroup) -> Iterator[str]:
     more = f" and {count - MAX_LISTED_SEEDS} more" if count > MAX_LISTED_SEEDS else ""
     runs_text = f"{count} run{'s' * (count > 1)}"
     yield f"{runs_text}: {describe_end(group.status, group.reason, group.node, group.message)}"
-    yield f"  seeds {seeds}{more}; repeat the first: {group.repeat}"
+    yield f"  seeds {seeds}{more}; repeat the first: {group.repeat_command}"
     # A run whose process crashed has no run directory.
-    if group.run:
-        yield f"  {group.run}"
-
-
-def _describe_variant(variant: Mapping[str, str]) -> str:
-    """Return the values of a variant as text."""
-    return ", ".join(f"{key}={value}" for key, value in variant.items())
+    if group.run_directory:
+        yield f"  {group.run_directory}"
 
 
 def _format_share(estimate: Estimate) -> str:
@@ -105,3 +104,25 @@ def _format_estimate(estimate: Estimate) -> str:
         return "unknown"
     interval = "" if estimate.low is None else f" ({estimate.low:.0f} to {estimate.high:.0f})"
     return f"{estimate.value:.0f}{interval}"
+
+
+def print_differences(differences: Sequence[Difference], changed: Sequence[RunPair], pair_count: int) -> None:
+    """Print the differences, and the seeds whose outcome changed."""
+    console = Console(stderr=True, highlight=False, markup=False, force_terminal=False)
+    table = Table("", "A", "B", "B minus A", "95 % interval", box=SIMPLE_HEAD, padding=(0, 1))
+    for each in differences:
+        texts = [
+            "unknown" if value is None else f"{value:.4g}" for value in (each.a, each.b, each.difference)
+        ]
+        interval = (
+            "unknown" if each.low is None or each.high is None else f"{each.low:.4g} to {each.high:.4g}"
+        )
+        table.add_row(each.metric, *texts, interval)
+    console.print(f"{pair_count} pairs of runs with the same seed")
+    console.print(table)
+    console.print(f"{len(changed)} seeds with a different outcome")
+    for pair in changed[:MAX_CHANGED_SEEDS]:
+        outcomes = [" ".join(filter(None, (run.status, run.problem, run.run))) for run in (pair.a, pair.b)]
+        console.print(f"  seed {pair.seed}: A {outcomes[0]}; B {outcomes[1]}", soft_wrap=True)
+    if len(changed) > MAX_CHANGED_SEEDS:
+        console.print(f"  and {len(changed) - MAX_CHANGED_SEEDS} more; the page lists them")

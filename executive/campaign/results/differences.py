@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from executive.campaign.results.intervals import BOOTSTRAP_SEED, RESAMPLE_COUNT
+from executive.campaign.results.intervals import FloatArray, compute_bootstrap_interval, divide_sums
 from executive.campaign.results.rows import RunRow
 from executive.campaign.results.sweep_summary import SECONDS_PER_HOUR
 
@@ -91,20 +90,13 @@ def _estimate_difference(metric: str, terms: Sequence[tuple[float, float, float,
     a, b = columns[0].sum() / columns[1].sum(), columns[2].sum() / columns[3].sum()
     if len(terms) < 2:
         return Difference(metric, float(a), float(b), float(b - a))
-    from scipy.stats import bootstrap  # Imported here, because workers do not need the import of 0.5 s.
+    low, high = compute_bootstrap_interval(_subtract_ratios, tuple(columns))
+    return Difference(metric, float(a), float(b), float(b - a), low, high)
 
-    def compute_difference(
-        numerators_a: NDArray[np.float64], denominators_a: NDArray[np.float64],
-        numerators_b: NDArray[np.float64], denominators_b: NDArray[np.float64], axis: int,
-    ) -> ArrayLike:  # fmt: skip
-        return numerators_b.sum(axis) / denominators_b.sum(axis) - numerators_a.sum(
-            axis
-        ) / denominators_a.sum(axis)
 
-    # The percentile method gives [x, x] for equal differences, for which the BCa method is not defined.
-    with np.errstate(all="ignore"):
-        interval = bootstrap(
-            tuple(columns), compute_difference, paired=True, vectorized=True, batch=100,
-            n_resamples=RESAMPLE_COUNT, method="percentile", rng=np.random.default_rng(BOOTSTRAP_SEED),
-        ).confidence_interval  # fmt: skip
-    return Difference(metric, float(a), float(b), float(b - a), float(interval.low), float(interval.high))
+def _subtract_ratios(
+    numerators_a: FloatArray, denominators_a: FloatArray,
+    numerators_b: FloatArray, denominators_b: FloatArray, axis: int,
+) -> FloatArray:  # fmt: skip
+    """Return the ratios of B minus the ratios of A; each ratio divides two sums along an axis."""
+    return divide_sums(numerators_b, denominators_b, axis) - divide_sums(numerators_a, denominators_a, axis)

@@ -44,9 +44,7 @@ def _write(table: Table[RowT], rows: list[RowT], folder: Path) -> None:
     from pyarrow import parquet
 
     types = {"INTEGER": pyarrow.int64(), "REAL": pyarrow.float64(), "TEXT": pyarrow.string()}
-    columns = zip(*map(table.encode, rows), strict=True) if rows else [()] * len(table.columns)
-    arrays = {
-        column.name: pyarrow.array(values, types[column.sql_type])
-        for column, values in zip(table.columns, columns, strict=True)
-    }
-    parquet.write_table(pyarrow.table(arrays), folder / f"{table.name}.parquet")
+    schema = pyarrow.schema([(column.name, types[column.sql_type]) for column in table.columns])
+    values_by_name = [dict(zip(schema.names, table.encode(row), strict=True)) for row in rows]
+    content = pyarrow.Table.from_pylist(values_by_name, schema)
+    parquet.write_table(content, folder / f"{table.name}.parquet")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+FloatArray = NDArray[np.float64]
 RESAMPLE_COUNT = 2000
 """Number of bootstrap resamples."""
 BOOTSTRAP_SEED = 0
@@ -32,7 +33,7 @@ class Estimate:
     high: float | None = None
 
 
-def estimate_share(successes: int, total: int) -> Estimate:
+def estimate_proportion(successes: int, total: int) -> Estimate:
     """Return the proportion successes / total with its Wilson score interval."""
     if total == 0:
         return Estimate(successes, total)
@@ -53,17 +54,31 @@ def estimate_ratio(numerators: Sequence[float], denominators: Sequence[float]) -
     ratio = numerator / denominator
     if len(numerators) < 2:
         return Estimate(numerator, denominator, ratio)
+    low, high = compute_bootstrap_interval(divide_sums, (numerators, denominators))
+    return Estimate(numerator, denominator, ratio, low, high)
+
+
+def divide_sums(numerators: FloatArray, denominators: FloatArray, axis: int) -> FloatArray:
+    """Return the ratios of the sums along an axis."""
+    ratios: FloatArray = numerators.sum(axis) / denominators.sum(axis)
+    return ratios
+
+
+def compute_bootstrap_interval(
+    compute_statistic: Callable[..., FloatArray], columns: Sequence[ArrayLike]
+) -> tuple[float, float]:
+    """Return the 95 % percentile bootstrap interval of a statistic of paired columns.
+
+    `compute_statistic` is called with resampled columns and the keyword `axis`. The BCa method is not used,
+    because it is not defined for equal values; the percentile method returns [x, x] for equal values x.
+    """
     from scipy.stats import bootstrap
 
-    def compute_ratio(
-        run_numerators: NDArray[np.float64], run_denominators: NDArray[np.float64], axis: int
-    ) -> NDArray[np.float64]:
-        return run_numerators.sum(axis) / run_denominators.sum(axis)
-
+    # scipy warns if all resamples are equal or if a denominator is 0.
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # scipy warns if all resamples are equal.
+        warnings.simplefilter("ignore")
         interval = bootstrap(
-            (numerators, denominators), compute_ratio, paired=True, vectorized=True, batch=100,
+            columns, compute_statistic, paired=True, vectorized=True, batch=100,
             n_resamples=RESAMPLE_COUNT, method="percentile", rng=np.random.default_rng(BOOTSTRAP_SEED),
         ).confidence_interval  # fmt: skip
-    return Estimate(numerator, denominator, ratio, float(interval.low), float(interval.high))
+    return float(interval.low), float(interval.high)

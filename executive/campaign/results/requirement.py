@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from executive.campaign.results.intervals import Estimate
-from executive.campaign.results.rows import RunRow
+from executive.campaign.results.rows import RunRow, describe_variant
 from executive.campaign.results.sweep_summary import VariantSummary
 from executive.campaign.results.tables import RUNS
 from executive.errors import InputError
@@ -84,7 +84,7 @@ def describe_unmet(
     messages = [] if summaries else ["no run has ended"]
     for summary in summaries:
         variant_runs = [run for run in runs if run.variant == summary.variant]
-        name = ", ".join(f"{key}={value}" for key, value in summary.variant.items())
+        name = describe_variant(summary.variant)
         for comparison in comparisons:
             value = comparison.compute_value(variant_runs, summary)
             if value is None or not OPERATORS[comparison.symbol](value, comparison.limit):

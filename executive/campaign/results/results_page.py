@@ -12,10 +12,11 @@ from urllib.parse import quote
 import numpy as np
 
 from executive.campaign.results.differences import Difference, RunPair
-from executive.campaign.results.rows import ItemRow, RunRow, SweepSettings
-from executive.campaign.results.sweep_summary import VariantSummary
+from executive.campaign.results.rows import describe_variant
+from executive.campaign.results.sweep_summary import SweepResults, VariantSummary
 from executive.record.atomic_file import write_atomically
 from executive.record.run_directory import RunDirectory, convert_os_errors
+from executive.view.report.page import try_write_report
 from executive.view.text import render_template
 
 PAGE_NAME = "results.html"
@@ -24,26 +25,6 @@ BIN_COUNT = 24
 """Number of bars of a histogram."""
 MAX_LISTED_RUNS = 500
 """Maximum number of runs in a table of the page."""
-
-
-@dataclass(frozen=True)
-class SweepResults:
-    """Results of a sweep.
-
-    Attributes:
-        name: `A` or `B` in a comparison, else "".
-        settings: Settings of the sweep.
-        runs, items: Rows of the runs and of the items.
-        summaries: Summary of each variant.
-        is_halted: True if runs are missing.
-    """
-
-    name: str
-    settings: SweepSettings
-    runs: Sequence[RunRow]
-    items: Sequence[ItemRow]
-    summaries: Sequence[VariantSummary]
-    is_halted: bool
 
 
 @dataclass(frozen=True)
@@ -68,13 +49,11 @@ class Histogram:
     """Histogram of the values of a group.
 
     Attributes:
-        label: Label of the group.
-        description: Alternative text of the plot.
+        description: Label of the group, number of values, range and median: the alternative text of the plot.
         counts: Number of values in each bin.
         low, high: Limits of the first and the last bin, equal for all groups.
     """
 
-    label: str
     description: str
     counts: Sequence[int]
     low: float
@@ -82,11 +61,9 @@ class Histogram:
 
 
 def write_page(
-    folder: Path,
-    sides: Sequence[SweepResults],
-    differences: Sequence[Difference] = (),
-    changed: Sequence[RunPair] = (),
-) -> Path:
+    folder: Path, sides: Sequence[SweepResults],
+    differences: Sequence[Difference] = (), changed: Sequence[RunPair] = (),
+) -> Path:  # fmt: skip
     """Write the page of a sweep (one side) or of a comparison (two sides) into `folder`; return its path.
 
     Raises:
@@ -111,7 +88,7 @@ def write_page(
         problems=problems,
         limit=MAX_LISTED_RUNS,
         link=lambda run: _make_link(run, folder),
-        describe_variant=_describe_variant,
+        describe_variant=describe_variant,
     )
     with convert_os_errors(f'write the page "{path}"', "free some space, or make the folder writable"):
         write_atomically(path, page)
@@ -124,7 +101,7 @@ def _list_groups(side: SweepResults) -> list[Group]:
     for summary in side.summaries:
         runs = {run.job: run for run in side.runs if run.variant == summary.variant}
         items = [item for item in side.items if item.job in runs and item.state == "placed"]
-        label = " ".join(filter(None, (side.name, _describe_variant(summary.variant)))) or "all runs"
+        label = " ".join(filter(None, (side.name, describe_variant(summary.variant)))) or "all runs"
         times = [run.robot_time_s for run in runs.values()]
         groups.append(Group(label, summary, times, [item.robot_time_s for item in items]))
     return groups
@@ -136,7 +113,6 @@ def _make_histograms(values_by_label: Mapping[str, Sequence[float]]) -> list[His
     edges = np.histogram_bin_edges(all_values, BIN_COUNT) if all_values else np.zeros(2)
     return [
         Histogram(
-            label,
             f"{label}: {len(values)} values from {min(values):.2f} to {max(values):.2f}, "
             f"median {median(values):.2f}",
             np.histogram(values, edges)[0].tolist(),
@@ -154,6 +130,8 @@ def _make_link(run_directory: str, folder: Path) -> str:
     return quote(os.path.relpath(report, folder)) if run_directory and report.is_file() else ""
 
 
-def _describe_variant(variant: Mapping[str, str]) -> str:
-    """Return the values of a variant as text."""
-    return ", ".join(f"{key}={value}" for key, value in variant.items())
+def write_missing_reports(pairs: Sequence[RunPair]) -> None:
+    """Write the report of each run with a run directory in which the report is missing."""
+    for run in (run for pair in pairs for run in (pair.a, pair.b)):
+        if run.run and not RunDirectory(Path(run.run)).report.is_file():
+            try_write_report(run.run)

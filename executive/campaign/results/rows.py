@@ -150,6 +150,11 @@ class PhaseRow(Row):
     """Total duration of the activations [s]; the phases of parallel branches overlap."""
 
 
+def describe_variant(variant: Mapping[str, str]) -> str:
+    """Return the values of the varied params and keys as text, for instance `speed=1, attempts=3`."""
+    return ", ".join(f"{key}={value}" for key, value in variant.items())
+
+
 @dataclass(frozen=True)
 class RunRecord:
     """All rows of one run.

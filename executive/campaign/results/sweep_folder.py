@@ -1,10 +1,10 @@
-"""Folder of a sweep: creation with valid inputs, and opening with unchanged inputs."""
+"""Folders of sweeps and comparisons: creation with valid inputs, and opening with unchanged inputs."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -21,39 +21,32 @@ from executive.plugins import load_cell_kind, load_skills
 from executive.record.run_directory import make_dated_folder
 from executive.run.versions import list_versions
 
+SIDES = ("a", "b")
+"""Names of the folders of the two sweeps of a comparison."""
 
-def create_sweep(
-    mission: str,
-    seeds: range,
-    overrides: Mapping[str, str],
-    variations: Mapping[str, tuple[str, ...]],
-    scene: Path | None,
-    saves_pictures: bool,
-    runs: Path,
-) -> ResultsDatabase:
-    """Check the inputs, and create the folder `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_sweep_<mission>` with a database.
 
-    `runs` is the folder of runs; the other arguments are those of `make_settings`.
+def create_sweep(settings: SweepSettings, runs_folder: Path) -> ResultsDatabase:
+    """Create the folder `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_sweep_<mission>` with a locked database.
 
     Raises:
-        MissionError: A variant has errors.
-        InputError: An input does not exist, or the folder cannot be made.
+        InputError: The folder cannot be made.
     """
-    settings = make_settings(mission, seeds, overrides, variations, scene, saves_pictures)
-    folder = make_dated_folder(runs, f"sweep_{settings.mission_name}", datetime.now())
+    return create_database(
+        make_dated_folder(runs_folder, f"sweep_{settings.mission_name}", datetime.now()), settings
+    )
+
+
+def create_database(folder: Path, settings: SweepSettings) -> ResultsDatabase:
+    """Create the database of a sweep in an empty folder, and reserve the sweep for this process."""
     database = ResultsDatabase(folder / FILE_NAME, settings)
     database.lock()
     return database
 
 
 def make_settings(
-    mission: str,
-    seeds: range,
-    overrides: Mapping[str, str],
-    variations: Mapping[str, tuple[str, ...]],
-    scene: Path | None,
-    saves_pictures: bool,
-) -> SweepSettings:
+    mission: str, seeds: range, overrides: Mapping[str, str], variations: Mapping[str, tuple[str, ...]],
+    scene: Path | None, saves_pictures: bool,
+) -> SweepSettings:  # fmt: skip
     """Check the inputs of a sweep, and return its settings.
 
     Args:
@@ -94,6 +87,28 @@ def open_sweep(path: Path) -> ResultsDatabase:
         )
     database.lock()
     return database
+
+
+def create_comparison(settings: Sequence[SweepSettings], runs_folder: Path) -> list[ResultsDatabase]:
+    """Create the folder `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_compare_<mission>` with the databases of two sweeps.
+
+    Raises:
+        InputError: The folder cannot be made.
+    """
+    name = "_".join(dict.fromkeys(each.mission_name for each in settings))
+    folder = make_dated_folder(runs_folder, f"compare_{name}", datetime.now())
+    for side in SIDES:
+        (folder / side).mkdir()
+    return [create_database(folder / side, each) for side, each in zip(SIDES, settings, strict=True)]
+
+
+def open_comparison(folder: Path) -> list[ResultsDatabase]:
+    """Open the databases of a comparison to resume the comparison.
+
+    Raises:
+        InputError: There is no such comparison, or an input has changed.
+    """
+    return [open_sweep(folder / side) for side in SIDES]
 
 
 def _load_variants(settings: SweepSettings) -> list[LoadedMission]:

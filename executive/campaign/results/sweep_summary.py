@@ -7,8 +7,8 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass
 
-from executive.campaign.results.intervals import Estimate, estimate_ratio, estimate_share
-from executive.campaign.results.rows import PhaseRow, RunRow
+from executive.campaign.results.intervals import Estimate, estimate_proportion, estimate_ratio
+from executive.campaign.results.rows import ItemRow, PhaseRow, RunRow, SweepSettings
 from executive.record.timeline.timeline import PlanningTotals
 
 SECONDS_PER_HOUR = 3600.0
@@ -18,7 +18,7 @@ RepeatCommand = Callable[[RunRow], str]
 
 
 @dataclass(frozen=True)
-class Spread:
+class SummaryStatistics:
     """Minimum, median, mean and maximum of a quantity."""
 
     min: float
@@ -27,10 +27,12 @@ class Spread:
     max: float
 
     @staticmethod
-    def from_values(values: Sequence[float]) -> Spread:
-        """Return the spread of the values; 0 without values."""
+    def from_values(values: Sequence[float]) -> SummaryStatistics:
+        """Return the statistics of the values; all are 0 without values."""
         values = values or [0.0]
-        return Spread(min(values), statistics.median(values), statistics.fmean(values), max(values))
+        return SummaryStatistics(
+            min(values), statistics.median(values), statistics.fmean(values), max(values)
+        )
 
 
 @dataclass(frozen=True)
@@ -54,10 +56,12 @@ class FailureGroup:
     """Runs with the same problem.
 
     Attributes:
-        status, reason, node: Status, reason and node of the runs; `disagreement` is the reason of a run in
-            which only the audit contradicts the ledger.
+        status, reason, node: Status, reason and node of the runs; the reason is `disagreement` if a run
+            succeeded but its audit contradicts the ledger.
         seeds: Seeds of the runs.
-        message, run, repeat: Message, run directory, and command that repeats the run; all of the first run.
+        message: Message of the first run.
+        run_directory: Path of the directory of the first run, or "".
+        repeat_command: Command line that repeats the first run.
     """
 
     status: str
@@ -65,8 +69,8 @@ class FailureGroup:
     node: str
     seeds: tuple[int, ...]
     message: str
-    run: str
-    repeat: str
+    run_directory: str
+    repeat_command: str
 
 
 @dataclass(frozen=True)
@@ -75,9 +79,9 @@ class VariantSummary:
 
     Attributes:
         variant: Values of the varied params and keys of the cell, by name.
-        success: Share of the successful runs.
-        right_objects: Share of the objects in a permitted bin; without ground truth, of no objects.
-        agreement: Share of the runs in which the audit confirms the ledger.
+        success: Proportion of the successful runs.
+        correct_objects: Proportion of objects in a permitted bin; the denominator is 0 without ground truth.
+        agreement: Proportion of the runs in which the audit confirms the ledger.
         objects_per_hour: Placed objects per hour of robot time.
         robot_time_s, wall_time_s: Duration of a run on the clock of the run and on a wall clock [s].
         planning: Statistics of motion planning, summed over the runs.
@@ -87,14 +91,39 @@ class VariantSummary:
 
     variant: Mapping[str, str]
     success: Estimate
-    right_objects: Estimate
+    correct_objects: Estimate
     agreement: Estimate
     objects_per_hour: Estimate
-    robot_time_s: Spread
-    wall_time_s: Spread
+    robot_time_s: SummaryStatistics
+    wall_time_s: SummaryStatistics
     planning: PlanningTotals
     phases: tuple[PhaseSummary, ...]
     failures: tuple[FailureGroup, ...]
+
+
+@dataclass(frozen=True)
+class SweepResults:
+    """Results of a sweep.
+
+    Attributes:
+        name: `A` or `B` in a comparison, else "".
+        settings: Settings of the sweep.
+        runs, items: Rows of the runs and of the items.
+        summaries: Summary of each variant.
+        planned_run_count: Number of runs of a complete sweep.
+    """
+
+    name: str
+    settings: SweepSettings
+    runs: Sequence[RunRow]
+    items: Sequence[ItemRow]
+    summaries: Sequence[VariantSummary]
+    planned_run_count: int
+
+    @property
+    def is_halted(self) -> bool:
+        """True if runs are missing."""
+        return len(self.runs) < self.planned_run_count
 
 
 def summarize_runs(
@@ -104,44 +133,36 @@ def summarize_runs(
     runs_by_variant: dict[tuple[tuple[str, str], ...], list[RunRow]] = defaultdict(list)
     for run in runs:
         runs_by_variant[tuple(run.variant.items())].append(run)
-    phases_by_job: dict[int, list[PhaseRow]] = defaultdict(list)
-    for phase in phases:
-        phases_by_job[phase.job].append(phase)
-    summaries = []
-    for group in runs_by_variant.values():
-        group_phases = [phase for run in group for phase in phases_by_job[run.job]]
-        summaries.append(_summarize_variant(group, group_phases, make_repeat_command))
-    return summaries
+    return [_summarize_variant(group, phases, make_repeat_command) for group in runs_by_variant.values()]
 
 
 def _summarize_variant(
     runs: Sequence[RunRow], phases: Sequence[PhaseRow], make_repeat_command: RepeatCommand
 ) -> VariantSummary:
-    """Return the summary of runs of one variant."""
+    """Return the summary of the runs of one variant; `phases` contains the phases of all variants."""
     audits, plannings = [run.audit for run in runs if run.audit], [run.planning for run in runs]
     object_count = sum(audit.right + audit.wrong_bin + audit.left + audit.elsewhere for audit in audits)
+    jobs = {run.job for run in runs}
     hours = [run.robot_time_s / SECONDS_PER_HOUR for run in runs]
     return VariantSummary(
         variant=runs[0].variant,
-        success=estimate_share(sum(run.is_success for run in runs), len(runs)),
-        right_objects=estimate_share(sum(audit.right for audit in audits), object_count),
-        agreement=estimate_share(sum(audit.agrees for audit in audits), len(audits)),
+        success=estimate_proportion(sum(run.is_success for run in runs), len(runs)),
+        correct_objects=estimate_proportion(sum(audit.right for audit in audits), object_count),
+        agreement=estimate_proportion(sum(audit.agrees for audit in audits), len(audits)),
         objects_per_hour=estimate_ratio([run.items.placed for run in runs], hours),
-        robot_time_s=Spread.from_values([run.robot_time_s for run in runs]),
-        wall_time_s=Spread.from_values([run.wall_time_s for run in runs]),
+        robot_time_s=SummaryStatistics.from_values([run.robot_time_s for run in runs]),
+        wall_time_s=SummaryStatistics.from_values([run.wall_time_s for run in runs]),
         planning=PlanningTotals(*map(sum, zip(*map(astuple, plannings), strict=True))),
-        phases=_summarize_phases(phases, len(runs)),
+        phases=_summarize_phases([phase for phase in phases if phase.job in jobs], len(runs)),
         failures=_group_failures(runs, make_repeat_command),
     )
 
 
 def _summarize_phases(phases: Sequence[PhaseRow], run_count: int) -> tuple[PhaseSummary, ...]:
     """Return the summary of each skill, by decreasing time."""
-    rows_by_phase: dict[str, list[PhaseRow]] = defaultdict(list)
-    for phase in phases:
-        rows_by_phase[phase.phase].append(phase)
     summaries = []
-    for name, rows in rows_by_phase.items():
+    for name in dict.fromkeys(phase.phase for phase in phases):
+        rows = [phase for phase in phases if phase.phase == name]
         activations, failures = sum(row.activations for row in rows), sum(row.failures for row in rows)
         time = sum(row.robot_time_s for row in rows) / run_count
         summaries.append(PhaseSummary(name, activations, failures, time))
@@ -157,6 +178,6 @@ def _group_failures(runs: Sequence[RunRow], make_repeat_command: RepeatCommand) 
     failures = []
     for (status, reason, node), group in groups.items():
         first, seeds = group[0], tuple(run.seed for run in group)
-        repeat = make_repeat_command(first)
-        failures.append(FailureGroup(status, reason, node, seeds, first.explanation, first.run, repeat))
+        command = make_repeat_command(first)
+        failures.append(FailureGroup(status, reason, node, seeds, first.explanation, first.run, command))
     return tuple(sorted(failures, key=lambda failure: -len(failure.seeds)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from typing import Generic, TypeAlias, TypeVar, get_args, get_type_hints
 
 from pydantic import TypeAdapter
@@ -21,10 +21,10 @@ class Column:
     """A column of a table.
 
     Attributes:
-        path: Name of the field, and name of the field in this field if the latter is a dataclass.
+        path: Name of the field; for a nested dataclass, followed by the name of the inner field.
         sql_type: Type in SQLite.
-        is_json: True if the text is JSON, the value of a mapping or a sequence.
-        comment: Description of the field; of a nested dataclass, only the first column has the description.
+        is_json: True if the column stores a mapping or a sequence as JSON text.
+        comment: Description of the field; for a nested dataclass, only its first column has one.
     """
 
     path: tuple[str, ...]
@@ -59,7 +59,8 @@ class Table(Generic[RowT]):
     def creation_sql(self) -> str:
         """Statement that creates the table, with a comment for each column."""
         lines = [
-            f"  {each.name} {each.sql_type},{each.comment and f' -- {each.comment}'}" for each in self.columns
+            f"  {column.name} {column.sql_type},{column.comment and f' -- {column.comment}'}"
+            for column in self.columns
         ]
         key = f"  PRIMARY KEY ({', '.join(self._key)})"
         return "\n".join((f"CREATE TABLE {self.name} ( -- {self._comment}", *lines, key, ")"))
@@ -83,16 +84,14 @@ class Table(Generic[RowT]):
         """Return the row with these values of the columns."""
         nested: dict[str, object] = {}
         for column, value in zip(self.columns, values, strict=True):
-            first, *others = column.path
-            decoded = json.loads(value) if column.is_json and isinstance(value, str) else value
-            if not others:
-                nested[first] = decoded
-            elif value is None:
-                nested[first] = None
+            outer_name, *inner_names = column.path
+            decoded = json.loads(str(value)) if column.is_json else value
+            if inner_names and value is not None:
+                inner_values = nested.setdefault(outer_name, {})
+                assert isinstance(inner_values, dict)
+                inner_values[inner_names[0]] = decoded
             else:
-                inner = nested.setdefault(first, {})
-                assert isinstance(inner, dict)
-                inner[others[0]] = decoded
+                nested[outer_name] = decoded
         return self._adapter.validate_python(nested)
 
 
@@ -100,15 +99,17 @@ def _list_columns(row_class: type) -> list[Column]:
     """Return the columns for the fields of a dataclass."""
     hints, columns = get_type_hints(row_class), []
     properties = TypeAdapter(row_class).json_schema()["properties"]
-    for each in fields(row_class):
-        hint, comment = hints[each.name], properties[each.name].get("description", "")
-        types = [one for one in get_args(hint) or (hint,) if one is not type(None)]
+    for name, values in properties.items():
+        hint, comment = hints[name], values.get("description", "")
+        types = [argument for argument in get_args(hint) or (hint,) if argument is not type(None)]
         if isinstance(types[0], type) and is_dataclass(types[0]):
-            inner = [replace(one, path=(each.name, *one.path)) for one in _list_columns(types[0])]
-            columns += [replace(inner[0], comment=comment), *inner[1:]]
+            inner_columns = _list_columns(types[0])
+            inner_columns[0] = replace(inner_columns[0], comment=comment)
+            columns += [replace(column, path=(name, *column.path)) for column in inner_columns]
         else:
+            # Only a mapping and a sequence have several arguments that are types, and are stored as JSON.
             sql_type = {bool: "INTEGER", int: "INTEGER", float: "REAL"}.get(hint, "TEXT")
-            columns.append(Column((each.name,), sql_type, len(types) > 1, comment))
+            columns.append(Column((name,), sql_type, len(types) > 1, comment))
     return columns
 
 

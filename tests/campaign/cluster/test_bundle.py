@@ -16,7 +16,7 @@ from executive.campaign.cluster.bundle import PACKAGES_FOLDER, Bundle, make_bund
 from executive.campaign.cluster.cluster import run_jobs_on_cluster
 from executive.campaign.cluster.environment import FILES_KEY, describe_differences, describe_environment
 from executive.campaign.cluster.returned_run import unpack_returned_run
-from executive.campaign.results.sweep_folder import create_sweep
+from executive.campaign.results.sweep_folder import create_sweep, make_settings
 from executive.campaign.sweep import SweepJob, list_jobs, make_fault_record, run_job
 from executive.errors import InputError
 
@@ -62,7 +62,7 @@ def project(tmp_path: Path, missions: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def list_sweep_jobs(folder: Path) -> list[SweepJob]:
-    with closing(create_sweep("wave.yaml", range(2), {}, {}, None, False, folder)) as database:
+    with closing(create_sweep(make_settings("wave.yaml", range(2), {}, {}, None, False), folder)) as database:
         return list_jobs(database.settings, database.path.parent)
 
 

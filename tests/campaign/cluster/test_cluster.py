@@ -16,7 +16,7 @@ from typing import IO
 import pytest
 
 from executive.campaign.results.rows import RunRow
-from executive.campaign.results.sweep_folder import create_sweep
+from executive.campaign.results.sweep_folder import create_sweep, make_settings
 from executive.campaign.sweep import list_jobs, run_sweep
 from executive.errors import InputError
 
@@ -61,7 +61,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]
 
 
 def sweep(folder: Path, **options: object) -> list[RunRow]:
-    with closing(create_sweep("sort_fruit", SEEDS, FAKE, {}, None, False, folder)) as database:
+    with closing(create_sweep(make_settings("sort_fruit", SEEDS, FAKE, {}, None, False), folder)) as database:
         run_sweep(list_jobs(database.settings, database.path.parent), database, **options)  # type: ignore[arg-type]
         assert [row.job for row in database.read_items() if row.state != "placed"] == []
         return database.read_runs()

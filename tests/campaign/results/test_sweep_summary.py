@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from executive.campaign.results.intervals import Estimate, estimate_ratio, estimate_share
+from executive.campaign.results.intervals import Estimate, estimate_proportion, estimate_ratio
 from executive.campaign.results.rows import PhaseRow, RunRow
-from executive.campaign.results.sweep_summary import FailureGroup, PhaseSummary, Spread, summarize_runs
+from executive.campaign.results.sweep_summary import (
+    FailureGroup,
+    PhaseSummary,
+    SummaryStatistics,
+    summarize_runs,
+)
 from executive.record.audit_comparison import Audit, ItemCounts
 from executive.record.timeline.timeline import PlanningTotals
 
@@ -31,10 +36,10 @@ def test_the_summary_counts_objects_and_groups_problems() -> None:
     (summary,) = summarize_runs(runs, [], repeat)
     assert [
         (share.numerator, share.denominator, share.value)
-        for share in (summary.success, summary.right_objects, summary.agreement)
+        for share in (summary.success, summary.correct_objects, summary.agreement)
     ] == [(2, 5, 0.4), (17, 19, 17 / 19), (4, 5, 0.8)]
     assert summary.objects_per_hour.value == pytest.approx(18 * 3600 / 160)
-    assert summary.robot_time_s == Spread(30.0, 32.0, 32.0, 34.0)
+    assert summary.robot_time_s == SummaryStatistics(30.0, 32.0, 32.0, 34.0)
     assert summary.planning == PlanningTotals(50, 40, pytest.approx(0.5))
     assert summary.failures == (
         FailureGroup("FAILURE", "Grasp.missed", "", (1, 3), "", "runs/1", "repeat 1"),
@@ -59,7 +64,7 @@ def test_variants_and_their_phases_are_separate() -> None:
     assert first.phases == (PhaseSummary("Transit", 2, 0, 2.5), PhaseSummary("Grasp", 4, 1, 1.5))
     assert second.phases == (PhaseSummary("Grasp", 2, 2, 7.0),)
     # Without ground truth no object counts.
-    assert (second.right_objects, second.agreement) == (Estimate(0, 0), Estimate(0, 0))
+    assert (second.correct_objects, second.agreement) == (Estimate(0, 0), Estimate(0, 0))
     assert summarize_runs([], [], repeat) == []
 
 
@@ -71,7 +76,7 @@ def test_variants_and_their_phases_are_separate() -> None:
 def test_the_interval_of_a_share_is_the_published_one(
     successes: int, total: int, low: float, high: float
 ) -> None:
-    estimate = estimate_share(successes, total)
+    estimate = estimate_proportion(successes, total)
     assert (estimate.low, estimate.high) == pytest.approx((low, high), abs=5e-5)
     assert estimate.value == successes / total
 
