@@ -1,4 +1,4 @@
-"""Wait for the result of another thread that leaves time for signals such as Ctrl-C."""
+"""Wait for the result of another thread, with interruptions in which Python handles signals."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import TypeVar
 T = TypeVar("T")
 
 MAX_BLOCKING_TIME = 0.05
-"""Maximum uninterrupted wait for another thread [s], which is the maximum delay of a second Ctrl-C."""
+"""Maximum uninterrupted wait for another thread [s]; within this time, Python handles a signal, for example
+a second Ctrl-C, which ends the process at once."""
 
 
 def wait_until_done(future: Future[T]) -> None:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell
-from executive.geometry import Array
 from executive.manipulation.tool_goals import choose_bin
 
 
@@ -15,24 +14,24 @@ def sort_by_tour(cell: Cell, targets: Sequence[Target]) -> list[Target]:
     """Return pickable targets, sorted by the length of the tour that begins with each target, shortest first.
 
     A tour leads from the destination of the arm to the first target, and from the bin of each target to the
-    next one, which is the nearest. The ways from the targets to their bins are the same in all tours.
+    next one, which is the nearest. The transports from the targets to their bins are not counted, because
+    their total length is the same in all tours.
     """
     places = [cell.bins[choose_bin(cell, target.item)].position for target in targets]
-    distances = [_list_distances(place, targets) for place in (cell.arm.destination, *places)]
+    distances = [
+        [math.dist(place[:2], target.position[:2]) for target in targets]
+        for place in (cell.arm.destination, *places)
+    ]
     lengths = {target.item: _measure_tour(distances, first) for first, target in enumerate(targets)}
     return sorted(targets, key=lambda target: (lengths[target.item], target.item))
-
-
-def _list_distances(place: Array, targets: Sequence[Target]) -> list[float]:
-    """Return the horizontal distances of targets from a place `(3,)` [m]."""
-    return [math.dist(place[:2], target.position[:2]) for target in targets]
 
 
 def _measure_tour(distances: Sequence[Sequence[float]], first: int) -> float:
     """Return the length [m] of the tour that begins with a target.
 
     Args:
-        distances: Distances of all targets from the start, and from the bin of each target [m].
+        distances: Horizontal distances of all targets [m]: row 0 from the start of the tour, row `i + 1` from
+            the bin of target `i`.
         first: Index of the first target.
     """
     remaining, last, length = set(range(len(distances) - 1)) - {first}, first, distances[0][first]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,10 @@ MIN_COSINE_UNLOADED = 0.5
 """Minimum cosine between the tool axis and straight down without a load."""
 MIN_COSINE_LOADED = 0.8
 """Minimum cosine between the tool axis and straight down with a load."""
+PrismIndices: TypeAlias = NDArray[np.intp] | slice
+"""Selection of prisms: indices, or a slice."""
+ALL_PRISMS = slice(None)
+"""Selection of all prisms."""
 
 
 class Discs(NamedTuple):
@@ -90,7 +94,7 @@ class Prisms(NamedTuple):
     is_support: NDArray[np.bool_]
     names: tuple[str, ...]
 
-    def select(self, indices: NDArray[np.intp]) -> Prisms:
+    def select(self, indices: PrismIndices) -> Prisms:
         """Return the fields of the prisms with the given indices; all names remain."""
         return Prisms._make([*(values[indices] for values in self[:-1]), self.names])
 
@@ -99,17 +103,23 @@ class NearestPairs(NamedTuple):
     """For each of `N` states, the pair of disc and prism with the smallest slack.
 
     Attributes:
-        slack: Smallest slack, including that of the tilt `(N,)` [m].
+        slack: Smallest slack of the state, of all pairs, of the tilt, and of the joint range `(N,)`.
         pair_slack: Slack of the pair `(N,)` [m].
+        tilt_slack: Slack of the tilt of the tool `(N,)` [m].
         required_distances: Required distance of the pair `(N,)` [m].
         discs, prisms: Indices of the pair `(N,)`.
     """
 
     slack: Array
     pair_slack: Array
+    tilt_slack: Array
     required_distances: Array
     discs: NDArray[np.intp]
     prisms: NDArray[np.intp]
+
+    def select(self, indices: NDArray[np.intp]) -> NearestPairs:
+        """Return the values of the states with the given indices."""
+        return NearestPairs._make(values[indices] for values in self)
 
 
 class ClearanceModel:
@@ -128,12 +138,11 @@ class ClearanceModel:
         self._end_margins = np.full(len(self._prisms.names), self._margin)
 
     def relax_end_margins(self, tcps: Array, axes: Array, discs: Discs) -> None:
-        """For each prism, lower the required distance near both ends to the distance at the closer end.
+        """For each prism, limit the required distance near the ends to the smallest distance at the ends.
 
         `tcps` `(E, 3)` [m] and `axes` `(E, 3)` are the tool centre points and tool axes at the ends.
         """
-        every = np.arange(len(self._end_margins))
-        end_distances = self._compute_all_distances(tcps, axes, discs, every).min(axis=(0, 1))
+        end_distances = self._compute_all_distances(tcps, axes, discs).min(axis=(0, 1))
         self._end_margins = np.minimum(end_distances, self._margin)
 
     def find_nearest_pairs(
@@ -141,29 +150,32 @@ class ClearanceModel:
     ) -> NearestPairs:
         """Return the pair of disc and prism with the smallest slack in each state.
 
-        The slack is the difference between distance and required distance; a value over `max_slack` [m] may
-        be too large. `tcps` `(N, 3)` [m] and `axes` `(N, 3)` are the tool centre points and the tool axes.
+        The slack is the difference between distance and required distance. A slack up to `max_slack` [m] is
+        exact; a larger slack is an upper bound, because prisms that are far from all states are skipped.
+        `tcps` `(N, 3)` [m] and `axes` `(N, 3)` are the tool centre points and the tool axes.
         """
-        near = self._find_near_prisms(tcps, axes, discs, max_slack)
-        required_distances = self._find_required_distances(tcps, near)
-        slack = self._compute_all_distances(tcps, axes, discs, near) - required_distances[:, None]
+        near_prisms = self._find_near_prisms(tcps, axes, discs, max_slack)
+        required_distances = self._find_required_distances(tcps, near_prisms)
+        slack = self._compute_all_distances(tcps, axes, discs, near_prisms) - required_distances[:, None]
         flat_slack = slack.reshape(len(tcps), -1)
         pairs = flat_slack.argmin(axis=1)
         states = np.arange(len(tcps))
-        pair_slack, (disc, prism) = flat_slack[states, pairs], np.divmod(pairs, len(near))
-        min_slack = np.minimum(pair_slack, _compute_tilt_slack(axes, discs))
-        return NearestPairs(min_slack, pair_slack, required_distances[states, prism], disc, near[prism])
+        pair_slack, tilt_slack = flat_slack[states, pairs], _compute_tilt_slack(axes, discs)
+        disc, prism = np.divmod(pairs, len(near_prisms))
+        return NearestPairs(
+            np.minimum(pair_slack, tilt_slack), pair_slack, tilt_slack, required_distances[states, prism],
+            disc, near_prisms[prism],
+        )  # fmt: skip
 
     def compute_slack_changes(
-        self, pairs: NearestPairs, displaced_tcps: Array, displaced_axes: Array, axes: Array, discs: Discs
+        self, pairs: NearestPairs, displaced_tcps: Array, displaced_axes: Array, discs: Discs
     ) -> Array:
         """Return the change of the slack of each state for each of `M` small displacements `(N, M)` [m].
 
         Args:
-            pairs: Pairs of the states; for each state, only the slack of this pair counts.
+            pairs: Pairs of the states; for each state, only the slack of its pair or of its tilt counts.
             displaced_tcps: Displaced tool centre points `(N, M, 3)` [m].
             displaced_axes: Displaced tool axes `(N, M, 3)`.
-            axes: Tool axes of the states `(N, 3)`.
             discs: Tool and load.
         """
         disc, prism = pairs.discs, pairs.prisms
@@ -171,9 +183,8 @@ class ClearanceModel:
         nearest_prism = self._prisms.select(prism[:, None])
         new_distance = self._compute_distances(displaced_tcps, displaced_axes, nearest_disc, nearest_prism)
         slack_change = new_distance - (pairs.required_distances + pairs.pair_slack)[:, None]
-        tilt_slack = _compute_tilt_slack(axes, discs)
-        tilt_change = _compute_tilt_slack(displaced_axes, discs) - tilt_slack[:, None]
-        return np.where((tilt_slack < pairs.pair_slack)[:, None], tilt_change, slack_change)
+        tilt_change = _compute_tilt_slack(displaced_axes, discs) - pairs.tilt_slack[:, None]
+        return np.where((pairs.tilt_slack < pairs.pair_slack)[:, None], tilt_change, slack_change)
 
     def require_clearance(self, tcps: Array, axes: Array, discs: Discs) -> None:
         """Check the distances from the obstacles at tool centre points `(N, 3)` [m] and axes `(N, 3)`.
@@ -188,9 +199,8 @@ class ClearanceModel:
         # Undetected objects need no margin. The load must not be pressed into the table or a floor.
         tolerances = np.where(self._prisms.is_undetected, self._margin, POSITION_TOLERANCE + SAMPLING_MARGIN)
         tolerances = np.where(self._prisms.is_support, MAX_PENETRATION, tolerances)
-        every = np.arange(len(tolerances))
-        required_distances = self._find_required_distances(tcps, every)[:, None]
-        slack = self._compute_all_distances(tcps, axes, discs, every) - required_distances + tolerances
+        required_distances = self._find_required_distances(tcps)[:, None]
+        slack = self._compute_all_distances(tcps, axes, discs) - required_distances + tolerances
         slack = slack.min(axis=1)
         state, prism = np.unravel_index(np.argmin(slack), slack.shape)
         if slack[state, prism] < 0:
@@ -202,15 +212,15 @@ class ClearanceModel:
 
     def _find_near_prisms(self, tcps: Array, axes: Array, discs: Discs, max_slack: float) -> NDArray[np.intp]:
         """Return the indices of the prisms whose slack may be `max_slack` [m] or less in a state."""
-        tops_and_bottoms = np.concatenate([tcps + offset * axes for offset in discs.offsets])[:, :2]
-        reach = self._prisms.radii + (discs.radii.max() + self._margin + max_slack)
-        (x_min, y_min), (x_max, y_max) = tops_and_bottoms.min(axis=0), tops_and_bottoms.max(axis=0)
         prisms = self._prisms
-        is_near_in_x = (prisms.min_x - reach < x_max) & (prisms.max_x + reach > x_min)
-        is_near_in_y = (prisms.min_y - reach < y_max) & (prisms.max_y + reach > y_min)
+        max_distances = prisms.radii + (discs.radii.max() + self._margin + max_slack)
+        disc_centres = np.concatenate([tcps + offset * axes for offset in discs.offsets])[:, :2]
+        (x_min, y_min), (x_max, y_max) = disc_centres.min(axis=0), disc_centres.max(axis=0)
+        is_near_in_x = (prisms.min_x - max_distances < x_max) & (prisms.max_x + max_distances > x_min)
+        is_near_in_y = (prisms.min_y - max_distances < y_max) & (prisms.max_y + max_distances > y_min)
         return np.flatnonzero(is_near_in_x & is_near_in_y)
 
-    def _find_required_distances(self, tcps: Array, prisms: NDArray[np.intp]) -> Array:
+    def _find_required_distances(self, tcps: Array, prisms: PrismIndices = ALL_PRISMS) -> Array:
         """Return the required distance of each state from each of `K` prisms `(N, K)` [m]."""
         is_near_end = self._compute_end_distances(tcps[:, 0], tcps[:, 1]) < OBSERVED_RADIUS
         return np.where(is_near_end[:, None], self._end_margins[prisms], self._margin)
@@ -221,7 +231,7 @@ class ClearanceModel:
         return np.sqrt(functools.reduce(np.minimum, squares))
 
     def _compute_all_distances(
-        self, tcps: Array, axes: Array, discs: Discs, prisms: NDArray[np.intp]
+        self, tcps: Array, axes: Array, discs: Discs, prisms: PrismIndices = ALL_PRISMS
     ) -> Array:
         """Return the distance of each disc from each of `K` prisms in each state `(N, P, K)` [m]."""
         disc_columns = Discs(discs.offsets[:, None], discs.radii[:, None], discs.min_cosine)
@@ -257,7 +267,7 @@ def _compute_tilt_slack(axes: Array, discs: Discs) -> Array:
 
 def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:
     """Return the obstacles that the cell file declares, and the other obstacles, as prisms."""
-    max_radius = max(kind.radius for kind in config.objects.values())
+    max_radius = max(object_class.radius for object_class in config.objects.values())
     # Each row: smallest corner, largest corner, radius, top [m]; is undetected; is a support; name.
     rows: list[tuple[tuple[float, float], tuple[float, float], float, float, bool, bool, str]] = [
         ((config.table.x[0], config.table.y[0]), (config.table.x[1], config.table.y[1]), max_radius,
@@ -267,13 +277,14 @@ def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:
     for name, bin in config.bins.items():
         (x, y, bottom), (length, width, height) = bin.position, bin.size
         left, right, front, back = x - length / 2, x + length / 2, y - width / 2, y + width / 2
-        # Outer faces of the walls.
-        far_left, far_right = left - BIN_THICKNESS, right + BIN_THICKNESS
-        far_front, far_back = front - BIN_THICKNESS, back + BIN_THICKNESS
+        outer_left, outer_right = left - BIN_THICKNESS, right + BIN_THICKNESS
+        outer_front, outer_back = front - BIN_THICKNESS, back + BIN_THICKNESS
         for wall in (
-            ((far_left, far_front), (left, far_back)), ((right, far_front), (far_right, far_back)),
-            ((left, far_front), (right, front)), ((left, back), (right, far_back)),
-        ):  # fmt: skip
+            ((outer_left, outer_front), (left, outer_back)),
+            ((right, outer_front), (outer_right, outer_back)),
+            ((left, outer_front), (right, front)),
+            ((left, back), (right, outer_back)),
+        ):
             rows.append((*wall, 0.0, bottom + height, False, False, name))
         floor = ((left, front), (right, back), 0.0, bottom + BIN_THICKNESS)
         rows.append((*floor, False, True, f"the floor of {name}"))
@@ -281,5 +292,5 @@ def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:
         centre, radius = (obstacle.x, obstacle.y), obstacle.radius + POSITION_TOLERANCE
         rows.append((centre, centre, radius, obstacle.top, False, False, obstacle.name))
     min_corners, max_corners, *columns, names = zip(*rows, strict=True)
-    corners = np.array(min_corners), np.array(max_corners)
-    return Prisms._make([*corners[0].T, *corners[1].T, *map(np.array, columns), names])
+    corners = np.hstack([min_corners, max_corners])
+    return Prisms._make([*corners.T, *map(np.array, columns), names])

@@ -1,9 +1,9 @@
 """Trajectory optimization: the fastest motion between two states that avoids all obstacles.
 
-Sequential quadratic programming: each step linearizes the distances of the last motion from the obstacles,
-and finds the fastest motion near the last motion. The initial motion approximates a slow motion without
-collision that stops at corners above the obstacles, and determines on which side the result passes each
-obstacle.
+Sequential quadratic programming: each step linearizes the distances of the iterate (the current motion) from
+the obstacles, and finds the fastest motion near the iterate. The initial motion approximates a slow motion
+without collision that stops at via points above the obstacles, and determines on which side the result passes
+each obstacle.
 """
 
 from __future__ import annotations
@@ -11,10 +11,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
@@ -38,7 +36,7 @@ INITIAL_TRUST_RADIUS = 0.3
 TRUST_RADIUS_FACTOR = 0.9
 """Factor on the maximum change of the accelerations after each optimization step."""
 INITIAL_DURATION_FRACTION = 0.8
-"""Duration of the initial motion as a fraction of the duration of the motion that stops at corners."""
+"""Duration of the initial motion as a fraction of the duration of the motion that stops at via points."""
 JOINT_RANGE_MARGIN = 0.01
 """Minimum distance from the position limits of the joints [rad]."""
 CONVERGENCE_TOLERANCE = 2e-3
@@ -46,31 +44,13 @@ CONVERGENCE_TOLERANCE = 2e-3
 _FINITE_DIFFERENCE_STEP = 1e-4  # [rad]
 
 
-class SlackEvaluation(NamedTuple):
-    """Slack of `N` joint configurations.
-
-    The slack is the smallest of these margins: each clearance minus the required clearance [m], and the
-    distance of each joint from its range limits [rad].
-
-    Attributes:
-        slack: Slack of each configuration `(N,)`.
-        axes: Tool axes `(N, 3)`.
-        pairs: Pairs of disc and prism with the smallest slack.
-    """
-
-    slack: Array
-    axes: Array
-    pairs: NearestPairs
-
-    def select(self, indices: NDArray[np.intp]) -> SlackEvaluation:
-        """Return the values of the configurations with the given indices."""
-        pairs = NearestPairs._make(values[indices] for values in self.pairs)
-        return SlackEvaluation(self.slack[indices], self.axes[indices], pairs)
-
-
 @dataclass(frozen=True, eq=False)
 class OptimizationProblem:
     """The optimization problem between two states.
+
+    The slack of a state is the smallest of these margins: each clearance minus the required clearance [m],
+    the remaining tilt of the tool as an equivalent distance [m], and the distance of each joint from its
+    range limits [rad].
 
     Attributes:
         start, end: States at the start and at the end of the motion.
@@ -91,28 +71,32 @@ class OptimizationProblem:
 
     def compute_slack(self, qs: Array) -> Array:
         """Return the slack `(N,)` of joint positions `(N, n)` [rad]; it is negative for a violation."""
-        return self.evaluate(qs, math.inf).slack
+        return self.find_nearest_pairs(qs, math.inf).slack
 
-    def evaluate(self, qs: Array, max_slack: float = MAX_SLACK) -> SlackEvaluation:
-        """Return the slack of joint positions `(N, n)` [rad]; a slack over `max_slack` may be too large."""
+    def find_nearest_pairs(self, qs: Array, max_slack: float = MAX_SLACK) -> NearestPairs:
+        """Return slack and nearest pairs of disc and prism at joint positions `(N, n)` [rad].
+
+        A slack up to `max_slack` is exact; a larger slack is an upper bound.
+        """
         tcps, axes = self.kinematics.compute_tcps_and_axes(qs)
         pairs = self.clearance.find_nearest_pairs(tcps, axes, self.discs, max_slack)
-        return SlackEvaluation(
-            np.minimum(pairs.slack, self._compute_range_slack(qs).min(axis=1)), axes, pairs
-        )
+        range_slack = self._compute_range_slack(qs).min(axis=1)
+        return pairs._replace(slack=np.minimum(pairs.slack, range_slack))
 
-    def compute_gradients(self, qs: Array, evaluation: SlackEvaluation) -> Array:
-        """Return the gradients `(N, n)` [m/rad] of the slack at evaluated joint positions `(N, n)` [rad]."""
+    def compute_gradients(self, qs: Array, pairs: NearestPairs) -> Array:
+        """Return the gradients `(N, n)` [m/rad] of the slack at joint positions `(N, n)` [rad].
+
+        `pairs` is the result of `find_nearest_pairs` at the joint positions.
+        """
         joint_count = qs.shape[1]
         displaced_qs = (qs[:, None] + _FINITE_DIFFERENCE_STEP * np.eye(joint_count)).reshape(-1, joint_count)
         displaced = self.kinematics.compute_tcps_and_axes(displaced_qs)
         new_tcps, new_axes = (values.reshape(-1, joint_count, 3) for values in displaced)
-        slack, axes, pairs = evaluation
-        changes = self.clearance.compute_slack_changes(pairs, new_tcps, new_axes, axes, self.discs)
+        changes = self.clearance.compute_slack_changes(pairs, new_tcps, new_axes, self.discs)
         gradients = changes / _FINITE_DIFFERENCE_STEP
         range_slack = self._compute_range_slack(qs)
         # If a range limit determines the slack, the slack changes only with the joint at the limit.
-        states = np.flatnonzero(range_slack.min(axis=1) <= slack)
+        states = np.flatnonzero(range_slack.min(axis=1) <= pairs.slack)
         joints = np.argmin(range_slack[states], axis=1)
         middle = (self.kinematics.joint_range.lower + self.kinematics.joint_range.upper) / 2
         gradients[states] = 0.0
@@ -129,8 +113,8 @@ class Optimizer:
 
     Args:
         problem: The optimization problem.
-        initial_qs: Samples `(M, n)` [rad] of a motion that stops at corners, at `SAMPLE_FRACTIONS`.
-        duration: Duration of the motion that stops at corners [s].
+        initial_qs: Samples `(M, n)` [rad] of a motion that stops at via points, at `SAMPLE_FRACTIONS`.
+        duration: Duration of the motion that stops at via points [s].
 
     Attributes:
         cost: Duration of the best motion, plus the cost of its violated constraints [s].
@@ -144,35 +128,35 @@ class Optimizer:
         self._transcription = Transcription(problem.start, problem.end, problem.connector.limits)
         motion = self._transcription.fit(INITIAL_DURATION_FRACTION * duration / STEP_COUNT, initial_qs)
         if motion is None:
-            raise JointLimitError("no motion inside the limits approximates the motion that stops at corners")
+            raise JointLimitError("no motion inside the limits approximates the motion with via points")
         self._best_motion, self._trust_radius = motion, INITIAL_TRUST_RADIUS
         self.cost = self._last_cost = math.inf
         self._has_converged = False
         self._payload_constraints: list[LinearizedConstraints] = []
-        self._set_last_motion(motion)
+        self._set_iterate(motion)
 
     def improve(self, max_step_count: int) -> None:
         """Take up to `max_step_count` optimization steps, fewer if the optimization converges."""
         for _ in range(max_step_count):
             if self._has_converged:
                 return
-            samples = np.flatnonzero(self._evaluation.slack < MAX_SLACK)
-            evaluation = self._evaluation.select(samples)
-            gradients = self._problem.compute_gradients(self._last_motion.qs[samples], evaluation)
+            samples = np.flatnonzero(self._nearest_pairs.slack < MAX_SLACK)
+            pairs = self._nearest_pairs.select(samples)
+            gradients = self._problem.compute_gradients(self._iterate.qs[samples], pairs)
             distance_constraints = LinearizedConstraints(
-                evaluation.slack, samples[:, None], gradients[:, None], np.zeros(len(samples))
+                pairs.slack, samples[:, None], gradients[:, None], np.zeros(len(samples))
             )
             constraints = [distance_constraints, *self._payload_constraints]
-            motion = self._transcription.shorten(self._last_motion, constraints, self._trust_radius)
+            motion = self._transcription.shorten(self._iterate, constraints, self._trust_radius)
             if motion is None:
                 return
             self._trust_radius *= TRUST_RADIUS_FACTOR
-            self._set_last_motion(motion)
+            self._set_iterate(motion)
 
-    def _set_last_motion(self, motion: DiscreteMotion) -> None:
-        """Make `motion` the last motion, and also the best motion if its cost is the lowest."""
-        self._last_motion, self._evaluation = motion, self._problem.evaluate(motion.qs)
-        violations = [-float(self._evaluation.slack.min())]
+    def _set_iterate(self, motion: DiscreteMotion) -> None:
+        """Make `motion` the current iterate, and also the best motion if its cost is the lowest."""
+        self._iterate, self._nearest_pairs = motion, self._problem.find_nearest_pairs(motion.qs)
+        violations = [-float(self._nearest_pairs.slack.min())]
         if self._problem.payload is not None:
             sample_time = motion.step / SAMPLES_PER_STEP
             constraints = self._problem.payload.linearize(motion.qs, sample_time, MAX_SLACK)
@@ -184,20 +168,20 @@ class Optimizer:
         if cost < self.cost:
             self._best_motion, self.cost = motion, cost
 
-    def connect_states(self, *, is_exact: bool) -> tuple[PointToPoint, ...]:
+    def connect_states(self, *, keeps_timing: bool) -> tuple[PointToPoint, ...]:
         """Return the best motion as point-to-point motions between its states.
 
         Args:
-            is_exact: True for the states at all half steps, with the timing of the best motion; False for the
-                states at all steps, in minimum time on a slightly different path.
+            keeps_timing: True for the states at all half steps, with the timing of the best motion; False for
+                the states at all steps, in minimum time on a slightly different path.
 
         Raises:
             JointLimitError: No motion connects two of the states.
         """
-        min_duration = self._best_motion.step / 2 if is_exact else None
+        min_duration = self._best_motion.step / 2 if keeps_timing else None
         states = [
             _limit_velocity(state, self._problem.connector.limits)
-            for state in self._transcription.compute_states(self._best_motion)[:: 1 if is_exact else 2]
+            for state in self._transcription.compute_states(self._best_motion)[:: 1 if keeps_timing else 2]
         ]
         return tuple(self._problem.connector.connect(*ends, min_duration) for ends in pairwise(states))
 

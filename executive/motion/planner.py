@@ -95,7 +95,7 @@ class Planner:
         task_before_contact = _treat_target_as_obstacle(task)
         search = MotionSearch(self._config, self.kinematics, self.limits, start, end, task_before_contact)
         errors: list[str] = []
-        for motion in search.list_motions():
+        for motion in search.plan_motions():
             try:
                 self._check_motion(motion, search, task)
             except (Blocked, Unreachable, JointLimitError) as error:

@@ -37,10 +37,11 @@ class Plan(Generic[M]):
 
     @property
     def ready(self) -> bool:
-        """True from the control step at `ready_time`, in real time not before the worker has finished.
+        """True if the time `ready_time` has come and, in real time, the worker has finished.
 
         In simulation, this property waits for the worker at `ready_time`, so that the time at which a motion
-        becomes available does not depend on the speed of the computer.
+        becomes available does not depend on the speed of the computer. If the plan is ready, the first read
+        of the property calls `report`.
         """
         if self.clock.now < self.ready_time - self.clock.step / 2:
             return False
@@ -88,19 +89,23 @@ class PlanFactory(Generic[M]):
         self._stored_query: tuple[bytes, Goal | str, Task] | None = None
         self._stored_plan: Plan[M] | None = None
 
-    def plan_ahead(self, start: Array, goal: Goal | str, task: Task) -> None:
+    def plan_ahead(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
         """Plan a motion from `start` `(n,)` [rad], and store the plan for a later call of `plan`."""
         query = start.tobytes(), goal, task
-        if query != self._stored_query:
-            self._drop_stored_plan()
-            self._stored_query, self._stored_plan = query, self._make_plan(start, goal, task)
+        if self._stored_plan is None or query != self._stored_query:
+            if self._stored_plan is not None:
+                # A plan that the worker has already started cannot be cancelled, but nobody reads its result.
+                self._stored_plan.future.cancel()
+            ready_time = self._clock.now + self._planning_time
+            future = self._worker.submit(self._plan_motion, start.copy(), goal, task)
+            self._stored_query = query
+            self._stored_plan = Plan(self._clock, ready_time, future, self._is_realtime)
+        return self._stored_plan
 
     def plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
         """Return the plan of a motion from `start` `(n,)` [rad], if possible the plan of `plan_ahead`."""
-        plan, is_planned_ahead = self._stored_plan, True
-        if plan is None or (start.tobytes(), goal, task) != self._stored_query:
-            self._drop_stored_plan()
-            plan, is_planned_ahead = self._make_plan(start, goal, task), False
+        is_planned_ahead = (start.tobytes(), goal, task) == self._stored_query
+        plan = self.plan_ahead(start, goal, task)
         self._stored_query = self._stored_plan = None
         request_time, future = self._clock.now, plan.future
 
@@ -111,13 +116,3 @@ class PlanFactory(Generic[M]):
 
         plan.report = report
         return plan
-
-    def _drop_stored_plan(self) -> None:
-        """Cancel the stored plan if the worker has not started it; otherwise, nobody reads its result."""
-        if self._stored_plan is not None:
-            self._stored_plan.future.cancel()
-
-    def _make_plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
-        """Return the plan of a motion, which the worker computes."""
-        future = self._worker.submit(self._plan_motion, start.copy(), goal, task)
-        return Plan(self._clock, self._clock.now + self._planning_time, future, self._is_realtime)

@@ -1,4 +1,4 @@
-"""Search for motions, the best first: direct motions, optimized detours, and motions that stop at corners."""
+"""Search for motions, the best first: direct motions, optimized detours, motions that stop at via points."""
 
 from __future__ import annotations
 
@@ -38,9 +38,10 @@ INITIAL_STEP_COUNT = 4
 REFINEMENT_STEP_COUNT = 8
 """Number of further optimization steps for a detour before it is returned."""
 EXTRA_HEIGHTS = (0.0, 0.05, 0.10)
-"""Heights of the corners above the travel height, in the order of the attempts [m]."""
+"""Heights of the via points above the travel height, in the order of the attempts [m]."""
 MAX_DURATION_FACTOR = 1.1
-"""Ratio of the duration of a motion to the cost of the next detour above which the next detour is refined."""
+"""Maximum ratio of the duration of a motion to the cost of the next detour. A slower motion is yielded only
+after the next detour has been refined, because the refined detour may be faster."""
 LIFT_OFF_DISTANCE = 5e-4
 """Length of the straight motion upwards that separates a load from the surface below [m]."""
 MIN_RISE_COSINE = 0.99
@@ -91,18 +92,18 @@ class MotionSearch:
         self._departure = departure = self._plan_departure(start, float(tcps[0, 2]))
         self._start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
 
-    def list_motions(self) -> Iterator[Trajectory]:
-        """Plan and yield motions, the best first: direct and optimized motions, then motions with corners."""
+    def plan_motions(self) -> Iterator[Trajectory]:
+        """Plan and yield motions, the best first; motions that stop at via points are last."""
         remaining_candidates = islice(self._list_candidates(), MAX_CANDIDATES)
         candidates: list[Candidate] = []
         while group := list(islice(remaining_candidates, COMPARED_CANDIDATES)):
-            yield from self._list_direct_and_optimized(group)
+            yield from self._plan_direct_motions_and_detours(group)
             candidates += group
         for extra_height in EXTRA_HEIGHTS:
             for candidate in candidates:
                 with contextlib.suppress(Unreachable, JointLimitError):
-                    corners = self._connect_with_corners(candidate, extra_height, is_straight=True)
-                    yield self._build_motion(candidate, *corners)
+                    free_part = self._connect_by_via_points(candidate, extra_height, prefers_lines=True)
+                    yield self._build_motion(candidate, *free_part)
 
     def require_clearance(self, qs: Array) -> None:
         """Check that joint positions `(N, n)` [rad] keep the required distances from obstacles.
@@ -126,30 +127,32 @@ class MotionSearch:
         arrival_length = self._end.slow_length or self._straight_length
         return find_candidates(self._kinematics, self._limits, self._start, self._end, arrival_length)
 
-    def _list_direct_and_optimized(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
-        """Yield direct motions without collision and optimized detours, the fastest first."""
+    def _plan_direct_motions_and_detours(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
+        """Plan and yield direct motions without collision and refined detours, the fastest first."""
         motions, optimizers = self._evaluate_candidates(candidates)
         next_costs = [*(_compute_total_cost(*pair) for pair in optimizers), math.inf][1:]
         for (candidate, optimizer), next_cost in zip(optimizers, next_costs, strict=True):
             optimizer.improve(REFINEMENT_STEP_COUNT)
             while motions and motions[0][0] <= _compute_total_cost(candidate, optimizer):
                 yield motions.pop(0)[1]
-            motions = sorted([*motions, *self._list_optimized(candidate, optimizer)], key=itemgetter(0))
-            # The motion through the states of the optimizer may take much longer than the optimizer assumes.
+            motions = sorted([*motions, *self._build_detours(candidate, optimizer)], key=itemgetter(0))
+            # A detour may take much longer than the cost of its optimizer.
             while motions and motions[0][0] <= MAX_DURATION_FACTOR * next_cost:
                 yield motions.pop(0)[1]
         yield from (motion for _, motion in motions)
 
-    def _list_optimized(
+    def _build_detours(
         self, candidate: Candidate, optimizer: Optimizer
     ) -> Iterator[tuple[float, Trajectory]]:
-        """Yield duration [s] and motion: retimed to minimum time, then with the timing of the optimizer.
+        """Yield two detours as pairs `(duration [s], motion)`.
 
-        The duration is that of the motion with which a load is safe.
+        The first detour passes the states of the optimizer in minimum time, the second one with the timing of
+        the optimizer. The duration is the duration after a slowdown for the load; the motion is not slower.
         """
-        for is_exact in (False, True):
+        for keeps_timing in (False, True):
             with contextlib.suppress(JointLimitError):
-                motion = self._build_motion(candidate, *optimizer.connect_states(is_exact=is_exact))
+                free_part = optimizer.connect_states(keeps_timing=keeps_timing)
+                motion = self._build_motion(candidate, *free_part)
                 safe_motion = self._payload.make_safe_motion(motion) if self._payload else motion
                 yield safe_motion.duration, motion
 
@@ -179,82 +182,82 @@ class MotionSearch:
                     duration = free_part.duration + candidate.arrival_duration
                     direct_motions.append((duration, self._build_motion(candidate, free_part)))
                     continue
-                corners = self._connect_with_corners(candidate, EXTRA_HEIGHTS[0], is_straight=False)
-                duration = sum(piece.duration for piece in corners)
-                qs = sample_pieces(corners, SAMPLE_FRACTIONS * duration).q
+                slow_part = self._connect_by_via_points(candidate, EXTRA_HEIGHTS[0], prefers_lines=False)
+                duration = sum(piece.duration for piece in slow_part)
+                qs = sample_pieces(slow_part, SAMPLE_FRACTIONS * duration).q
                 optimizer = Optimizer(problem, qs, duration)
                 optimizer.improve(INITIAL_STEP_COUNT)
                 optimizers.append((candidate, optimizer))
-        direct_motions.sort(key=lambda pair: pair[0])
+        direct_motions.sort(key=itemgetter(0))
         optimizers.sort(key=lambda pair: _compute_total_cost(*pair))
         return direct_motions, optimizers
 
     def _build_motion(self, candidate: Candidate, *free_part: MotionPiece) -> Trajectory:
         """Return the motion that consists of departure, free part, and arrival."""
-        pieces = (self._departure, *free_part) if self._departure else free_part
+        motion = Trajectory([piece for piece in (self._departure, *free_part, candidate.arrival) if piece])
         if not isinstance(self._end, Goal) or self._end.guarded_length == 0:
-            return Trajectory((*pieces, candidate.arrival) if candidate.arrival else pieces)
-        guarded_start_time = sum(piece.duration for piece in pieces)
+            return motion
         if self._end.fast_length:
-            times = np.arange(0.0, guarded_start_time, STEP, dtype=np.float64)
-            tcps, _ = self._kinematics.compute_tcps_and_axes(sample_pieces(pieces, times).q)
+            tcps, _ = self._kinematics.compute_tcps_and_axes(motion.samples.q)
             is_above = tcps[:, 2] > self._end.position[2] + self._end.guarded_length
-            guarded_start_time = float(times[is_above].max(initial=0.0))
-        return Trajectory((*pieces, candidate.arrival) if candidate.arrival else pieces, guarded_start_time)
+            motion.guarded_start_time = STEP * float(np.flatnonzero(is_above).max(initial=0))
+        else:
+            motion.guarded_start_time = motion.duration - candidate.arrival_duration
+        return motion
 
-    def _connect_with_corners(
-        self, candidate: Candidate, extra_height: float, *, is_straight: bool
+    def _connect_by_via_points(
+        self, candidate: Candidate, extra_height: float, *, prefers_lines: bool
     ) -> list[MotionPiece]:
-        """Return a free part that stops at two corners (via points), above the start and above the goal.
+        """Return a free part that stops at two via points, above the start and above the goal.
 
         Args:
             candidate: The end of the motion.
-            extra_height: Height of the corners above the travel height [m].
-            is_straight: True if the tool rises and descends on vertical lines if possible.
+            extra_height: Height of the via points above the travel height [m].
+            prefers_lines: True if the tool rises and descends on vertical lines where this is possible.
 
         Raises:
-            Unreachable: A corner is out of reach in the branch of the candidate.
+            Unreachable: A via point is out of reach in the branch of the candidate.
             JointLimitError: No motion connects two of the states.
         """
         height, end = self._travel_height + extra_height, candidate.free_part_end
         connect = self._connector.connect
-        rise, start_corner = self._get_rise(height, is_straight)
+        rise, start_via_point = self._get_rise(height, prefers_lines)
         (x, y, z), _ = self._locate_tool(end.q)
         if candidate.branch is None or z >= height:
-            return [*rise, connect(start_corner, end)]
-        if is_straight and candidate.arrival is None:
+            return [*rise, connect(start_via_point, end)]
+        if prefers_lines and candidate.arrival is None:
             waypoints = solve_vertical_waypoints(self._kinematics, end.q, height - z, candidate.branch)
             descent = CartesianLine(waypoints[::-1], height - z, self._limits)
-            return [*rise, connect(start_corner, JointState.at_rest(waypoints[-1])), descent]
-        goal_corner = self._solve_corner((x, y, height), candidate.branch, end.q)
-        return [*rise, connect(start_corner, goal_corner), connect(goal_corner, end)]
+            return [*rise, connect(start_via_point, JointState.at_rest(waypoints[-1])), descent]
+        goal_via_point = self._solve_via_point((x, y, height), candidate.branch, end.q)
+        return [*rise, connect(start_via_point, goal_via_point), connect(goal_via_point, end)]
 
-    def _plan_rise(self, height: float, is_straight: bool) -> tuple[list[MotionPiece], JointState]:
-        """Return the motion from the start up to a corner at a height [m], and the state at the corner.
+    def _plan_rise(self, height: float, prefers_lines: bool) -> tuple[list[MotionPiece], JointState]:
+        """Return the motion from the start up to a via point at a height [m], and the state there.
 
-        If the tool starts above `height` or does not point down, the corner is the start itself.
+        If the tool starts above `height` or does not point down, the via point is the start itself.
         """
         q = self._start.q
         (x, y, z), is_pointing_down = self._locate_tool(q)
         if not is_pointing_down or z >= height:
             return [], self._start
-        if is_straight and self._departure is None:
+        if prefers_lines and self._departure is None:
             waypoints = find_vertical_waypoints(self._kinematics, q, height - z)
             if waypoints is not None:
                 line = CartesianLine(waypoints, height - z, self._limits)
                 return [line], JointState.at_rest(waypoints[-1])
-        corner = self._solve_corner((x, y, height), self._kinematics.find_branch(q), q)
-        return [self._connector.connect(self._start, corner)], corner
+        via_point = self._solve_via_point((x, y, height), self._kinematics.find_branch(q), q)
+        return [self._connector.connect(self._start, via_point)], via_point
 
     def _locate_tool(self, q: Array) -> tuple[Array, bool]:
         """Return the tool centre point `(3,)` [m] at `q` `(n,)` [rad], and True if the tool points down."""
         tcps, axes = self._kinematics.compute_tcps_and_axes(q[None])
         return tcps[0], bool(-axes[0, 2] > MIN_RISE_COSINE)
 
-    def _solve_corner(
+    def _solve_via_point(
         self, position: tuple[float, float, float], branch: BranchKey, q_seed: Array
     ) -> JointState:
-        """Return the state of rest at the corner `position` [m], with joint n as in `q_seed` `(n,)` [rad]."""
+        """Return the state of rest at a via point [m], with the last joint as in `q_seed` `(n,)` [rad]."""
         q = self._kinematics.solve(make_tool_down_pose(position), branch)
         q[-1] = q_seed[-1]
         return JointState.at_rest(q)

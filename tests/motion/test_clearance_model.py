@@ -207,7 +207,7 @@ def test_slopes_are_the_differences_of_slack(config, tip, tilt, turn, loaded: bo
     h = 1e-5
     tips, axes = tip + h * np.eye(3), np.broadcast_to(axis, (3, 3))
     pairs = clearance.find_nearest_pairs(tip[None], axis[None], discs)
-    found = clearance.compute_slack_changes(pairs, tips[None], axes[None], axis[None], discs)[0] / h
+    found = clearance.compute_slack_changes(pairs, tips[None], axes[None], discs)[0] / h
     here = slack(clearance, tip, axis, discs)
     forward = (clearance.find_nearest_pairs(tips, axes, discs).slack - here) / h
     backward = (here - clearance.find_nearest_pairs(2 * tip - tips, axes, discs).slack) / h

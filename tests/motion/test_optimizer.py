@@ -67,7 +67,7 @@ def test_it_is_clear_and_much_faster_than_the_way_that_stops_at_every_corner(ove
     optimizer = improved(problem, corners)
     stopping = sum(piece.duration for piece in corners)
     for exactly in (False, True):
-        flown = Trajectory(optimizer.connect_states(is_exact=exactly))
+        flown = Trajectory(optimizer.connect_states(keeps_timing=exactly))
         assert direct.duration < flown.duration < 0.8 * stopping
         assert not exactly or flown.duration == pytest.approx(optimizer.cost, abs=0.01)
         qs = flown.sample_within_limits(LIMITS).q
@@ -82,7 +82,7 @@ def test_no_detour_follows_a_way_in_no_time(over_the_post) -> None:
     first = sample_pieces(corners, SAMPLE_FRACTIONS * sum(piece.duration for piece in corners)).q
     with pytest.raises(
         JointLimitError,
-        match="no motion inside the limits approximates the motion that stops at corners",
+        match="no motion inside the limits approximates the motion with via points",
     ):
         Optimizer(problem, first, 0.1)
 
@@ -94,7 +94,7 @@ def test_slopes_are_the_derivatives_of_slack_by_the_joints(over_the_post, q: Arr
     qs = (problem.start.q + share * (q - problem.start.q))[None]
     h = 1e-5
     here = problem.compute_slack(qs)
-    found = problem.compute_gradients(qs, problem.evaluate(qs))[0]
+    found = problem.compute_gradients(qs, problem.find_nearest_pairs(qs))[0]
     forward = (problem.compute_slack(qs + h * np.eye(7)) - here) / h
     backward = (here - problem.compute_slack(qs - h * np.eye(7))) / h
     smooth = np.abs(forward - backward) < 1e-3  # no kink between
@@ -107,4 +107,4 @@ def test_near_a_joints_limit_that_is_what_slack_and_slopes_tell(over_the_post) -
     qs[0, 6] = -LIMITS.position.upper[6] + 0.003
     slack = problem.compute_slack(qs)
     assert slack[0] == pytest.approx(0.003 - 0.01)
-    assert np.array_equal(problem.compute_gradients(qs, problem.evaluate(qs))[0], np.eye(7)[6])
+    assert np.array_equal(problem.compute_gradients(qs, problem.find_nearest_pairs(qs))[0], np.eye(7)[6])
