@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import cv2
 import numpy as np
@@ -13,14 +14,7 @@ from executive.cell.config import CameraConfig, DepthConfig, NoiseConfig
 from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
 from executive.cells.sim.arm_occlusion import ArmOcclusion
-from executive.cells.sim.renderer import (
-    CELL_LIGHT,
-    FixedViewRenderer,
-    Image,
-    Light,
-    RenderedImage,
-    render,
-)
+from executive.cells.sim.renderer import CELL_LIGHT, FixedViewRenderer, Image, Light, RenderedImage, render
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 from executive.perception.camera_check import describe_displacement
@@ -112,11 +106,13 @@ class SimCamera(MountedCamera):
         self._world = world
         self._seed = seed
         self._occlusion = occlusion
-        self._light = light
         self._bins = bins
-        self._fixed_view_renderer: FixedViewRenderer | None = None
+        region = (0, 0, *self._size)
+        self._render: Callable[[Array, Pose], RenderedImage]
         if config.mount == "fixed" and not light.shadow:
-            self._fixed_view_renderer = FixedViewRenderer(world, (0, 0, *self._size), light)
+            self._render = FixedViewRenderer(world, region, light).render
+        else:
+            self._render = partial(render, world, region=region, light=light)
 
     def sees_table(self) -> bool:
         """Return True if the whole workspace is in the image now and not occluded by the arm."""
@@ -134,15 +130,9 @@ class SimCamera(MountedCamera):
         """Return the true camera matrix and the true pose `X_WC`."""
         return compute_calibration(self._true_config)[0], get_camera_pose(self._world, self._true_config)
 
-    def _render(self) -> RenderedImage:
-        """Render the current image, without noise."""
-        if self._fixed_view_renderer is not None:
-            return self._fixed_view_renderer.render(*self._get_true_view())
-        return render(self._world, *self._get_true_view(), (0, 0, *self._size), self._light)
-
     def _capture_images(self) -> tuple[Image, Array | None]:
         """Return colour and depth image of the current frame; without a depth sensor, the latter is None."""
-        rendered = self._render()
+        rendered = self._render(*self._get_true_view())
         rng = np.random.default_rng([self._seed, self._frame_count])
         image = add_noise(rendered.image, self._true_config.noise, rng)
         if self.config.depth is None:

@@ -9,7 +9,7 @@ import functools
 import math
 from collections.abc import Container, Iterator, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pybullet
@@ -30,18 +30,8 @@ SUPPORT_TOLERANCE = 0.001
 """Maximum height [m] above the floor of a bin at which a contact of the load is a contact with the floor."""
 
 
-class ClosestPoints(NamedTuple):
-    """Closest points of two bodies A and B.
-
-    Attributes:
-        link: Link of body A.
-        height_b: Height of the point on body B above the world's origin [m].
-        distance: Distance between the points [m], negative for a penetration.
-    """
-
-    link: int
-    height_b: float
-    distance: float
+ClosestPoints: TypeAlias = tuple[Any, ...]
+"""Closest points of two bodies A and B from PyBullet: values with the indices `LINK_A`, `POSITION_B`, ...."""
 
 
 class ClosestApproach(NamedTuple):
@@ -156,10 +146,10 @@ class ClearanceChecker:
         bodies += [(name, body) for name, cylinders in self._obstacles.items() for body in cylinders]
         for name, body in bodies:
             for points in self._find_points((arm, body), range(first_link, world.tool_index + 1)):
-                yield ClosestApproach(name_link(points.link), name, points.distance, self._margin)
+                yield ClosestApproach(name_link(points[LINK_A]), name, points[DISTANCE], self._margin)
         for link_a, link_b in world.robot.self_collision_pairs:
             for points in self._find_points((arm, arm, link_a, link_b)):
-                yield ClosestApproach(name_link(link_a), name_link(link_b), points.distance, self._margin)
+                yield ClosestApproach(name_link(link_a), name_link(link_b), points[DISTANCE], self._margin)
         if load is not None:
             yield from self._find_load_approaches(load.object_class, bodies)
 
@@ -175,14 +165,11 @@ class ClearanceChecker:
             return ()
         body_a, body_b, *link_pair = pair
         max_distance = self._margin + SEARCH_DISTANCE
-        points = [
-            ClosestPoints(values[LINK_A], values[POSITION_B][2], values[DISTANCE])
-            for values in self._get_points(body_a, body_b, max_distance, *link_pair)
-            if links is None or values[LINK_A] in links
-        ]
-        distance = min((point.distance for point in points), default=max_distance)
+        all_points = self._get_points(body_a, body_b, max_distance, *link_pair)
+        all_points = [points for points in all_points if links is None or points[LINK_A] in links]
+        distance = min((points[DISTANCE] for points in all_points), default=max_distance)
         self._clear_until[pair] = self._movement + distance - self._margin - ROUNDING_ERROR
-        return [point for point in points if point.distance <= self._margin]
+        return [points for points in all_points if points[DISTANCE] <= self._margin]
 
     def _find_load_approaches(
         self, load: ObjectClass, bodies: Sequence[tuple[str, int]]
@@ -199,11 +186,12 @@ class ClearanceChecker:
             bin = world.config.bins.get(name)
             max_support_height = (bin.position[2] if bin else 0.0) + BIN_THICKNESS + SUPPORT_TOLERANCE
             for points in self._find_points((load_body, body)):
-                is_support = points.height_b <= max_support_height and name not in self._obstacles
-                yield ClosestApproach(part, name, points.distance, 0.0 if is_support else self._margin)
+                is_low = points[POSITION_B][2] <= max_support_height
+                min_distance = 0.0 if is_low and name not in self._obstacles else self._margin
+                yield ClosestApproach(part, name, points[DISTANCE], min_distance)
         links = range(robot.first_collision_link, robot.wrist_link)
         for points in self._find_points((world.arm, load_body), links):
-            yield ClosestApproach(part, world.name_link(points.link), points.distance, self._margin)
+            yield ClosestApproach(part, world.name_link(points[LINK_A]), points[DISTANCE], self._margin)
 
     def _compute_reach(self) -> Array:
         """Return the maximum distance of a point of the arm from the axis of each joint `(n,)` [m]."""

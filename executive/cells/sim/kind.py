@@ -10,7 +10,7 @@ from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions, KeyPath, Workcell
 from executive.cells.sim.min_times import SimMinTimes
 from executive.cells.sim.models import find_model_errors
-from executive.cells.sim.object_positions import find_lack_of_room
+from executive.cells.sim.object_positions import find_object_count_errors
 from executive.cells.sim.poses import find_places_out_of_reach, find_pose_errors
 from executive.events import Emit
 from executive.motion.arms import find_arm_errors
@@ -35,7 +35,7 @@ class SimCellChecks:
             *find_missing_depth_sensors(config),
             *find_detector_errors(config.detectors, cell_folder),
             *find_places_out_of_reach(config),
-            *find_lack_of_room(config),
+            *find_object_count_errors(config),
             # The check of the poses builds a world, which is impossible if a model is missing.
             *(() if model_errors else find_pose_errors(config)),
         )

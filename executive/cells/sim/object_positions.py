@@ -15,10 +15,10 @@ from executive.geometry import Array
 MAX_POSITION_ATTEMPTS = 2000
 """Number of random positions for one set of objects after which the workspace counts as too small."""
 OBJECT_SET_COUNT = 5
-"""Number of random sets of objects for which `find_lack_of_room` tries to find positions."""
+"""Number of random sets of objects for which `find_object_count_errors` tries to find positions."""
 
 
-def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+def find_object_count_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield the key and an error if no random set with the maximum number of objects fits the workspace."""
     message = ""
     for seed in range(OBJECT_SET_COUNT):
@@ -36,7 +36,7 @@ def find_max_object_count(config: CellConfig, limit: int) -> int:
     """Return the maximum number of objects, up to `limit`, for which the workspace has room."""
     for count in range(limit, 0, -1):
         table = config.table.model_copy(update={"objects": (0, count)})
-        if not any(find_lack_of_room(config.model_copy(update={"table": table}))):
+        if not any(find_object_count_errors(config.model_copy(update={"table": table}))):
             return count
     return 0
 

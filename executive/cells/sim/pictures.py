@@ -112,7 +112,7 @@ def _compose_picture(rendered: RenderedImage) -> Image:
     height = len(rendered.image)
     bottom_weight = np.linspace(0, 1, height)[:, None, None]
     background = (1 - bottom_weight) * np.array(TOP_COLOUR) + bottom_weight * np.array(BOTTOM_COLOUR)
-    is_empty = rendered.bodies == -1
+    is_empty = rendered.segmentation == -1
     image = np.where(is_empty[..., None], np.rint(background).astype(np.uint8), rendered.image)
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
     kernel = np.ones((3, 3), np.uint8)

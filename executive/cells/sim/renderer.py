@@ -58,7 +58,7 @@ class RenderedImage:
 
     Attributes:
         image: Colour image of the region `(H, W, 3)` uint8, RGB.
-        bodies: Segmentation `(H, W)`: number of the visible body at each pixel, -1 for none.
+        segmentation: Number `(H, W)` of the visible body at each pixel, -1 for none.
         depth_buffer: Depth buffer of OpenGL `(H, W)`, 0 to 1.
         matrix: Camera matrix of the whole camera image `(3, 3)` [pixel].
         X_WC: Pose of the camera in the world.
@@ -66,7 +66,7 @@ class RenderedImage:
     """
 
     image: Image
-    bodies: NDArray[np.int32]
+    segmentation: NDArray[np.int32]
     depth_buffer: NDArray[np.float32]
     matrix: Array
     X_WC: Pose
@@ -103,9 +103,9 @@ def render(world: World, matrix: Array, X_WC: Pose, region: Region, light: Light
         renderer=pybullet.ER_TINY_RENDERER,
     )
     image = np.ascontiguousarray(np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3])
-    bodies = np.asarray(segmentation, dtype=np.int32).reshape(height, width)
+    segmentation = np.asarray(segmentation, dtype=np.int32).reshape(height, width)
     depth_buffer = np.asarray(depth_buffer, dtype=np.float32).reshape(height, width)
-    return RenderedImage(image, bodies, depth_buffer, matrix, X_WC, region)
+    return RenderedImage(image, segmentation, depth_buffer, matrix, X_WC, region)
 
 
 class _VisualShape(NamedTuple):
@@ -118,7 +118,7 @@ class _VisualShape(NamedTuple):
 
 
 class FixedViewRenderer:
-    """Renderer of a fixed camera, which renders the immobile bodies only once.
+    """Renderer of a fixed camera, which renders the static bodies only once.
 
     Floor, table and bins take three quarters of the time of an image. Therefore, the first call of `render`
     stores an image of them. Each call combines this image with a new image of the arm and the objects: each
@@ -135,28 +135,31 @@ class FixedViewRenderer:
     def __init__(self, world: World, region: Region, light: Light) -> None:
         self._world, self._region, self._light = world, region, light
         self._client = world.client
-        immobile_bodies = (world.floor, world.table, *world.bin_bodies.values())
-        self._immobile_shapes = [shape for body in immobile_bodies for shape in self._list_shapes(body)]
+        static_bodies = (world.floor, world.table, *world.bin_bodies.values())
+        self._static_shapes = [shape for body in static_bodies for shape in self._list_shapes(body)]
         # PyBullet reports wrong colours of the arm after the first call of `changeVisualShape`.
         self._arm_shapes = self._list_shapes(world.arm)
         self._background: RenderedImage | None = None
+        self._background_view: tuple[tuple[float, ...], ...] = ()
+        """Matrices of the view in the image of the static bodies."""
 
     def render(self, matrix: Array, X_WC: Pose) -> RenderedImage:
-        """Render the current image; a camera that was moved gets a new image of the immobile bodies.
+        """Render the current image; a camera that was moved gets a new image of the static bodies.
 
         `matrix` is the camera matrix `(3, 3)` [pixel], and `X_WC` the pose of the camera in the world.
         """
+        view = compute_view_matrix(X_WC), compute_projection_matrix(matrix, self._region)
         background = self._background
-        if background is None or not _has_view(background, matrix, X_WC):
+        if background is None or view != self._background_view:
             object_shapes = [shape for body in self._world.labels for shape in self._list_shapes(body)]
             background = self._render_without(self._arm_shapes + object_shapes, matrix, X_WC)
-            self._background = background
-        foreground = self._render_without(self._immobile_shapes, matrix, X_WC)
+            self._background, self._background_view = background, view
+        foreground = self._render_without(self._static_shapes, matrix, X_WC)
         is_in_front = foreground.depth_buffer <= background.depth_buffer
         return replace(
             foreground,
             image=np.where(is_in_front[..., None], foreground.image, background.image),
-            bodies=np.where(is_in_front, foreground.bodies, background.bodies),
+            segmentation=np.where(is_in_front, foreground.segmentation, background.segmentation),
             depth_buffer=np.where(is_in_front, foreground.depth_buffer, background.depth_buffer),
         )
 
@@ -180,12 +183,3 @@ class FixedViewRenderer:
             index = sum(shape.link == link for shape in shapes)
             shapes.append(_VisualShape(body, link, index, colour))
         return shapes
-
-
-def _has_view(rendered: RenderedImage, matrix: Array, X_WC: Pose) -> bool:
-    """Return True if an image was rendered with this camera matrix and this pose of the camera."""
-    pairs = (
-        (rendered.matrix, matrix), (rendered.X_WC.position, X_WC.position),
-        (rendered.X_WC.rotation, X_WC.rotation),
-    )  # fmt: skip
-    return all(np.array_equal(*pair) for pair in pairs)

@@ -169,7 +169,8 @@ class SceneRenderer:
         second_frame = add_noise(rendered.image, camera.noise, rng)
         left, top, right, bottom = region = camera.table_view
         pixels = np.s_[top:bottom, left:right]
-        view = replace(rendered, image=rendered.image[pixels], bodies=rendered.bodies[pixels], region=region)
+        image, segmentation = rendered.image[pixels], rendered.segmentation[pixels]
+        view = replace(rendered, image=image, segmentation=segmentation, region=region)
         # The minimum contrast depends on the declared noise, so that more noise does not reduce the labels.
         sample = _build_sample(view, MIN_CONTRAST * self._declared_camera.noise.read, objects)
         # A run uses the declared matrix and pose, even if the scene has calibration errors.
@@ -196,7 +197,7 @@ def _build_sample(
     corner = np.array(rendered.region[:2], dtype=float)
     scale = IMAGE_SIZE / (rendered.region[2] - rendered.region[0])
     for body, scene_object in objects.items():
-        mask = rendered.bodies == body
+        mask = rendered.segmentation == body
         if scene_object.label == UNKNOWN_LABEL or not mask.any():
             continue
         mesh = load_mesh(scene_object.model)

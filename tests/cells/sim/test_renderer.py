@@ -40,7 +40,7 @@ class Renderer:
 
 
 def is_equal(image: RenderedImage, other: RenderedImage) -> bool:
-    names = ("image", "bodies", "depth_buffer")
+    names = ("image", "segmentation", "depth_buffer")
     return all(np.array_equal(getattr(image, name), getattr(other, name)) for name in names)
 
 

@@ -66,7 +66,7 @@ def test_projected_meshes_agree_with_the_rendered_silhouettes(
         world.add_object(label, Pose(rotate_about_z(0.7 * i), place), (1, 0, 0))
     matrix, X_WC = compute_calibration(camera)[0], get_camera_pose(world, camera)
     left, top, _, _ = camera.table_view
-    bodies = render(world, matrix, X_WC, camera.table_view, CELL_LIGHT).bodies
+    bodies = render(world, matrix, X_WC, camera.table_view, CELL_LIGHT).segmentation
     for body, label in world.labels.items():
         rows, columns = np.nonzero(bodies == body)
         seen = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
@@ -96,8 +96,8 @@ def test_a_seed_repeats_the_noise_of_images_and_depth_and_a_depth_sensor_changes
     assert (frame.image == without.capture().image).all()
     shot = render(world, frame.matrix, frame.X_WC, (0, 0, 640, 480), CELL_LIGHT)
     for body, distance in ((cube, 1.15), (world.table, 1.2)):
-        assert shot.depth[shot.bodies == body] == pytest.approx(distance, abs=1e-4)
-        assert np.nanmedian(frame.depth[shot.bodies == body]) == pytest.approx(distance, abs=0.003)
+        assert shot.depth[shot.segmentation == body] == pytest.approx(distance, abs=1e-4)
+        assert np.nanmedian(frame.depth[shot.segmentation == body]) == pytest.approx(distance, abs=0.003)
     sky = render(world, frame.matrix, Pose(np.eye(3), np.array([0, 0, 1.2])), (0, 0, 64, 64), CELL_LIGHT)
     assert np.isinf(sky.depth).all()
     again, second, others = same.capture(), one.capture(), other.capture()
