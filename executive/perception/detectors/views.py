@@ -86,51 +86,45 @@ def merge_detections(detections: Sequence[LocatedDetection], size: tuple[int, in
     `size` is the width and height of the image [pixel].
     """
     candidates = sorted(detections, key=lambda pair: (_is_truncated(pair, size), -pair[0].confidence))
-    is_same_object = _compare_objects([detection.box for detection, _ in candidates])
-    selection: list[int] = []
-    for index, (_, region) in enumerate(candidates):
-        selected_elsewhere = [each for each in selection if candidates[each][1] != region]
-        if not is_same_object[index, selected_elsewhere].any():
-            selection.append(index)
-    merged = (candidates[index][0] for index in selection)
+    ious, contained_fractions = compute_overlaps([detection.box for detection, _ in candidates])
+    is_same_object = (ious > MIN_TILE_IOU) | (contained_fractions > MIN_CONTAINED_FRACTION)
+    regions = np.array([region for _, region in candidates]).reshape(-1, 4)
+    is_in_other_region = (regions[:, None] != regions).any(axis=2)
+    merged = (candidates[index][0] for index in _find_unique(is_same_object & is_in_other_region))
     return sorted(merged, key=lambda detection: -detection.confidence)
 
 
 def remove_duplicates(detections: Sequence[Detection]) -> list[Detection]:
     """Return the detections without duplicates of more confident ones; the input is most confident first."""
-    if len(detections) < 2:
-        return list(detections)
-    ious, _ = compute_overlaps(np.array([detection.box for detection in detections]))
-    kept: list[int] = []
-    for index in range(len(detections)):
-        if not (ious[index, kept] > MIN_DUPLICATE_IOU).any():
-            kept.append(index)
-    return [detections[index] for index in kept]
+    ious, _ = compute_overlaps([detection.box for detection in detections])
+    return [detections[index] for index in _find_unique(ious > MIN_DUPLICATE_IOU)]
 
 
-def compute_overlaps(boxes: Array) -> tuple[Array, Array]:
-    """Return the area of the intersection of each pair of boxes, divided by the union and by the smaller box.
+def compute_overlaps(boxes: Sequence[Box]) -> tuple[Array, Array]:
+    """Return the intersection of each pair of `N` boxes as a fraction of the union and of the smaller box.
 
-    The arrays have the shape `(N, N)`. The import of `supervision`, which has this function, takes 0.5 s.
-
-    Args:
-        boxes: Left, top, right and bottom side of each box `(N, 4)`.
+    Both results have the shape `(N, N)`. The import of `supervision`, which has this function, takes 0.5 s.
     """
-    low = np.maximum(boxes[:, None, :2], boxes[:, :2])
-    high = np.minimum(boxes[:, None, 2:], boxes[:, 2:])
+    sides = np.array(boxes, dtype=np.float64).reshape(-1, 4)
+    low = np.maximum(sides[:, None, :2], sides[:, :2])
+    high = np.minimum(sides[:, None, 2:], sides[:, 2:])
     intersections = (high - low).clip(0.0).prod(axis=2)
-    areas = (boxes[:, 2:] - boxes[:, :2]).prod(axis=1)
+    areas = (sides[:, 2:] - sides[:, :2]).prod(axis=1)
     unions = areas[:, None] + areas - intersections
     smaller_areas = np.minimum(areas[:, None], areas)
     return intersections / unions.clip(MIN_AREA), intersections / smaller_areas.clip(MIN_AREA)
 
 
-def _compare_objects(boxes: Sequence[Box]) -> NDArray[np.bool_]:
-    """Return a matrix `(N, N)` that is True for each pair of boxes that show one object."""
-    if len(boxes) < 2:
-        return np.zeros((len(boxes), len(boxes)), dtype=np.bool_)
-    ious, contained_fractions = compute_overlaps(np.array(boxes))
-    return np.asarray((ious > MIN_TILE_IOU) | (contained_fractions > MIN_CONTAINED_FRACTION))
+def _find_unique(is_duplicate: NDArray[np.bool_]) -> list[int]:
+    """Return the indices of the detections that duplicate no earlier detection of the result.
+
+    `is_duplicate` `(N, N)` is True for each pair of detections of the same object.
+    """
+    selection: list[int] = []
+    for index, row in enumerate(is_duplicate):
+        if not row[selection].any():
+            selection.append(index)
+    return selection
 
 
 def _is_truncated(located_detection: LocatedDetection, size: tuple[int, int]) -> bool:
