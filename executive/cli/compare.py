@@ -15,8 +15,8 @@ from executive.exit_codes import ExitCode
 
 @click.command(name="compare")
 @click.argument("missions", metavar="A [B]", nargs=-1)
-@options.make_overrides_option("--set-a", "overrides_a", "Like --set, but only for A; repeatable.")
-@options.make_overrides_option("--set-b", "overrides_b", "Like --set, but only for B; repeatable.")
+@options.make_overrides_option("--set-a", "overrides_a", help="Like --set, but only for A; repeatable.")
+@options.make_overrides_option("--set-b", "overrides_b", help="Like --set, but only for B; repeatable.")
 @click.option(
     "--resume", type=options.FOLDER, metavar="FOLDER",
     help="Execute the missing runs of the interrupted comparison in this folder.",

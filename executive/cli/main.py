@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import gc
 import io
 import signal
 import sys
@@ -18,7 +19,7 @@ import click
 from executive.cli.streams import use_tolerant_streams
 from executive.errors import ExecutiveError, shorten_quotations
 from executive.exit_codes import ExitCode
-from executive.run.garbage_collection import reduce_collections
+from executive.run.garbage_collection import START_THRESHOLD
 from executive.run.signals import TERMINATION_SIGNALS, handle_signals
 
 PATH_ERROR_NUMBERS = (
@@ -63,7 +64,7 @@ class CommandGroup(click.Group):
         """Run a command and exit with its exit code; tracebacks are printed only with `--debug`."""
         del standalone_mode  # This group always runs as a main program.
         args = list(sys.argv[1:] if args is None else args)
-        reduce_collections()
+        gc.set_threshold(START_THRESHOLD)
         with use_tolerant_streams():
             try:
                 with handle_signals(TERMINATION_SIGNALS, signal.default_int_handler):

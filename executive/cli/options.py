@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -97,16 +98,12 @@ def check_usage(*errors: tuple[object, str]) -> None:
             raise click.UsageError(message)
 
 
-def make_overrides_option(option: str, name: str, text: str) -> Callable[[CommandT], CommandT]:
-    """Return a repeatable option KEY=VALUE for the argument `name`, with the help `text`."""
-    return click.option(
-        option, name, metavar="KEY=VALUE", multiple=True, callback=_parse_overrides, help=text
-    )
-
-
+make_overrides_option = partial(click.option, metavar="KEY=VALUE", multiple=True, callback=_parse_overrides)
+"""Returns a repeatable option KEY=VALUE; the arguments are names of option and argument, and `help`."""
 overrides_option = make_overrides_option(
-    "--set", "overrides", "Set a param of the mission, or a key of the cell: cell.KEY.KEY=VALUE; repeatable."
-)
+    "--set", "overrides",
+    help="Set a param of the mission, or a key of the cell: cell.KEY.KEY=VALUE; repeatable.",
+)  # fmt: skip
 variations_option = click.option(
     "--vary", "variations", metavar="KEY=[VALUE, ...]", multiple=True, callback=_parse_variations,
     help="Run every seed with each of the values, named as in --set; repeatable: all combinations are run.",

@@ -61,12 +61,8 @@ def compute_binomial_tail(min_count: int, trial_count: int, probability: float) 
     if min_count <= 0:
         return 1.0
     log_p, log_q = math.log(probability), math.log1p(-probability)
-
-    def compute_log_binomial(count: int) -> float:
-        return math.lgamma(trial_count + 1) - math.lgamma(count + 1) - math.lgamma(trial_count - count + 1)
-
     return math.fsum(
-        math.exp(compute_log_binomial(count) + count * log_p + (trial_count - count) * log_q)
+        math.exp(math.log(math.comb(trial_count, count)) + count * log_p + (trial_count - count) * log_q)
         for count in range(min_count, trial_count + 1)
     )
 
