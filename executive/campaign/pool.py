@@ -31,8 +31,7 @@ def run_jobs(
     *,
     workers: int,
     progress: Callable[[int, int], None] = lambda *_: None,
-    on_result: Callable[[int, JobResult], None] = lambda *_: None,
-    on_crash: Callable[[int], None] = lambda _: None,
+    on_result: Callable[[int, JobResult, int], None] = lambda *_: None,
     on_halt: Callable[[], None] = lambda: None,
 ) -> list[JobResult | None]:
     """Execute all jobs in worker processes and return the results in the order of the jobs.
@@ -47,8 +46,8 @@ def run_jobs(
         make_failure: Function that returns the result after an exception or the death of the processes.
         workers: Number of processes.
         progress: Function that is called with the number of finished jobs and the number of all jobs.
-        on_result: Function that is called with the index and the result of each job as soon as it ends.
-        on_crash: Function that is called with the index of a job after the death of its process.
+        on_result: Function that is called with the index and the result of each job as soon as it ends, and
+            with the number of processes that died during the job.
         on_halt: Function that is called after the first signal.
 
     Raises:
@@ -93,12 +92,11 @@ def run_jobs(
                         if is_halted:
                             continue  # The signal also killed a worker.
                         crash_counts[index] += 1
-                        on_crash(index)
                         if crash_counts[index] < MAX_CRASHES:
                             pending_indices.appendleft(index)
                             continue
                     results[index] = future.result() if error is None else make_failure(jobs[index], error)
-                    on_result(index, results[index])
+                    on_result(index, results[index], crash_counts[index])
                     progress(len(results), len(jobs))
     finally:
         for pool in (*idle_pools, *(pool for _, pool in running_jobs.values())):

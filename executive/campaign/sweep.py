@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -55,7 +54,7 @@ def list_jobs(settings: SweepSettings, runs_folder: Path) -> list[SweepJob]:
 def make_repeat_command(settings: SweepSettings, run: RunRow) -> str:
     """Return the command line that repeats a run of a sweep."""
     overrides = {**settings.overrides, **run.variant}
-    return format_repeat_command(settings.mission, run.seed, overrides, scene=settings.scene_path)
+    return format_repeat_command(settings.mission, run.seed, overrides, scene=settings.scene)
 
 
 def run_sweep(
@@ -74,29 +73,24 @@ def run_sweep(
     meaning as in `executive.campaign.pool.run_jobs`. `cluster` is the address of a dask scheduler, whose
     workers execute the jobs, or None.
     """
-    crash_counts: Counter[int] = Counter()
 
-    def store(index: int, record: RunRecord) -> None:
+    def store(_: int, record: RunRecord, crash_count: int) -> None:
         if record.run.status != "HALTED":
-            run = replace(record.run, crashes=crash_counts[index])
-            database.append(replace(record, run=run))
+            database.append(replace(record, run=replace(record.run, crashes=crash_count)))
 
     execute_jobs: Callable[..., object] = functools.partial(run_jobs, workers=workers)
     if cluster is not None:
         from executive.campaign.cluster.cluster import run_jobs_on_cluster
 
         execute_jobs = functools.partial(run_jobs_on_cluster, address=cluster)
-    execute_jobs(
-        jobs, run_job, make_fault_record, progress=progress, on_result=store,
-        on_crash=lambda index: crash_counts.update([index]), on_halt=on_halt,
-    )  # fmt: skip
+    execute_jobs(jobs, run_job, make_fault_record, progress=progress, on_result=store, on_halt=on_halt)
 
 
 def run_job(job: SweepJob) -> RunRecord:
     """Execute and record one run, and return its rows; write a report if the run has a problem."""
     settings, timeline = job.settings, Timeline()
     loaded, skills = _load_mission(settings.mission, tuple({**settings.overrides, **job.variant}.items()))
-    options = RunOptions(job.seed, scene=settings.scene_path)
+    options = RunOptions(job.seed, scene=settings.scene)
     record_options = RecordOptions(saves_pictures=settings.saves_pictures, timeline=timeline)
     result = record_run(loaded, skills, options, job.runs_folder, record_options)
     record = make_record(job.index, job.variant, result, timeline)

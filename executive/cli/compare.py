@@ -35,18 +35,12 @@ def command(
     b/results.sqlite in a folder below --runs. The intervals contain the difference with a confidence of 95 %.
     Ctrl-C halts the current runs; then the results of the complete pairs are printed.
     """
-    repeated_keys = ", ".join(overrides.keys() & (overrides_a.keys() | overrides_b.keys()))
-    options.check_usage(
-        (
-            not resume and (len(missions) not in (1, 2) or seeds is None),
-            "give one or two missions and --seeds, or --resume FOLDER",
-        ),
-        (
-            resume and options.has_sweep_settings(ctx),
-            "--resume takes missions, seeds and settings from the comparison; omit them",
-        ),
-        (repeated_keys, f"--set and --set-a or --set-b both give {repeated_keys}; omit one of them"),
-    )
+    options.check_resume(
+        ctx, has_runs=len(missions) in (1, 2) and seeds is not None,
+        runs_text="one or two missions and --seeds, or --resume FOLDER",
+        settings_text="missions, seeds and settings from the comparison",
+    )  # fmt: skip
+    options.check_distinct("--set and --set-a or --set-b", overrides, {**overrides_a, **overrides_b})
     with keep_stdout_clean():
         from executive.campaign.results.differences import compute_differences, pair_runs
         from executive.campaign.results.results_page import write_missing_reports, write_page

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -148,7 +148,24 @@ def add_sweep_options(command: CommandT) -> CommandT:
     return command
 
 
-def has_sweep_settings(ctx: click.Context) -> bool:
-    """Return True if the command line of `sweep` or `compare` contains settings that `--resume` reads."""
-    names = ctx.params.keys() & _SWEEP_SETTINGS
-    return any(ctx.get_parameter_source(name) is not ParameterSource.DEFAULT for name in names)
+def check_distinct(names: str, values: Mapping[str, object], other_values: Mapping[str, object]) -> None:
+    """Check that no key has a value in both mappings, which the options `names` give."""
+    keys = ", ".join(values.keys() & other_values.keys())
+    check_usage((keys, f"{names} both give {keys}; omit one of them"))
+
+
+def check_resume(ctx: click.Context, *, has_runs: bool, runs_text: str, settings_text: str) -> None:
+    """Check that a command line states either the runs of `sweep` or `compare`, or `--resume`.
+
+    Args:
+        ctx: Context of the command.
+        has_runs: True if the command line states missions and seeds.
+        runs_text: Arguments that the command needs.
+        settings_text: Settings that `--resume` reads, and their source.
+    """
+    is_resume, names = ctx.params["resume"] is not None, ctx.params.keys() & _SWEEP_SETTINGS
+    has_settings = any(ctx.get_parameter_source(name) is not ParameterSource.DEFAULT for name in names)
+    check_usage(
+        (not is_resume and not has_runs, f"give {runs_text}"),
+        (is_resume and has_settings, f"--resume takes {settings_text}; omit them"),
+    )

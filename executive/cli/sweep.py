@@ -46,15 +46,11 @@ def command(
     `executive report` writes the report of another run. Exit code 1 if --require is not met. Ctrl-C halts the
     current runs; then the results of the complete runs are printed. A second Ctrl-C quits immediately.
     """
-    repeated_keys = ", ".join(variations.keys() & overrides.keys())
-    options.check_usage(
-        (not resume and None in (mission, seeds), "give a MISSION and --seeds, or --resume SWEEP"),
-        (
-            resume and options.has_sweep_settings(ctx),
-            "--resume takes mission, seeds and settings from the sweep; omit them",
-        ),
-        (repeated_keys, f"--set and --vary both give {repeated_keys}; omit one of them"),
-    )
+    options.check_resume(
+        ctx, has_runs=None not in (mission, seeds), runs_text="a MISSION and --seeds, or --resume SWEEP",
+        settings_text="mission, seeds and settings from the sweep",
+    )  # fmt: skip
+    options.check_distinct("--set and --vary", overrides, variations)
     with keep_stdout_clean():
         from executive.campaign.results.export import check_exporter, export_tables
         from executive.campaign.results.junit import write_junit

@@ -20,22 +20,24 @@ MAX_CHANGED_SEEDS = 20
 """Maximum number of seeds with a changed outcome that are listed."""
 
 
-def print_summary(summaries: Sequence[VariantSummary], asked: int) -> None:
-    """Print the summary of the runs of a sweep in which `asked` runs were requested."""
+def print_summary(summaries: Sequence[VariantSummary], planned_run_count: int) -> None:
+    """Print the summary of a sweep of `planned_run_count` runs."""
     console = Console(stderr=True, highlight=False, markup=False, force_terminal=False)
-    for line_or_table in _list_lines_and_tables(summaries, asked):
+    for line_or_table in _list_lines_and_tables(summaries, planned_run_count):
         console.print(line_or_table, soft_wrap=isinstance(line_or_table, str))
 
 
-def _list_lines_and_tables(summaries: Sequence[VariantSummary], asked: int) -> Iterator[RenderableType]:
+def _list_lines_and_tables(
+    summaries: Sequence[VariantSummary], planned_run_count: int
+) -> Iterator[RenderableType]:
     """Yield the lines of text and the table of the summary."""
     run_count = sum(summary.success.denominator for summary in summaries)
     success_count = sum(summary.success.numerator for summary in summaries)
-    if run_count == asked:
+    if run_count == planned_run_count:
         yield f"{success_count} of {run_count} runs succeeded"
     else:
         successes = f"; {success_count} of them succeeded" if run_count else ""
-        yield f"{run_count} of {asked} runs, halted{successes}"
+        yield f"{run_count} of {planned_run_count} runs, halted{successes}"
     if not summaries:
         return
     yield _make_table(summaries)
@@ -62,10 +64,10 @@ def _list_texts(summary: VariantSummary) -> dict[str, str]:
     """Return the values of the metrics of a variant as text, by name."""
     objects, robot_time, planning = summary.correct_objects, summary.robot_time_s, summary.planning
     texts = {
-        "success": _format_share(summary.success),
-        "objects in the right bin": _format_share(objects),
+        "success": _format_percentage(summary.success),
+        "objects in the right bin": _format_percentage(objects),
         "": f"{objects.numerator} of {objects.denominator}",
-        "ledger and audit agree": _format_share(summary.agreement),
+        "ledger and audit agree": _format_percentage(summary.agreement),
         "objects per hour": _format_estimate(summary.objects_per_hour),
         "robot time, median [s]": f"{robot_time.median:.1f} ({robot_time.min:.1f} to {robot_time.max:.1f})",
         "wall time, median [s]": f"{summary.wall_time_s.median:.1f}",
@@ -91,8 +93,8 @@ def _list_failure_lines(group: FailureGroup) -> Iterator[str]:
         yield f"  {group.run_directory}"
 
 
-def _format_share(estimate: Estimate) -> str:
-    """Return a share and its interval [%]."""
+def _format_percentage(estimate: Estimate) -> str:
+    """Return a proportion and its interval [%]."""
     if estimate.value is None or estimate.low is None or estimate.high is None:
         return "unknown"
     return f"{estimate.value:.2%} ({100 * estimate.low:.1f} to {100 * estimate.high:.1f})"
@@ -110,14 +112,11 @@ def print_differences(differences: Sequence[Difference], changed: Sequence[RunPa
     """Print the differences, and the seeds whose outcome changed."""
     console = Console(stderr=True, highlight=False, markup=False, force_terminal=False)
     table = Table("", "A", "B", "B minus A", "95 % interval", box=SIMPLE_HEAD, padding=(0, 1))
-    for each in differences:
-        texts = [
-            "unknown" if value is None else f"{value:.4g}" for value in (each.a, each.b, each.difference)
-        ]
-        interval = (
-            "unknown" if each.low is None or each.high is None else f"{each.low:.4g} to {each.high:.4g}"
-        )
-        table.add_row(each.metric, *texts, interval)
+    for difference in differences:
+        values = (difference.a, difference.b, difference.difference)
+        low, high = _format_number(difference.low), _format_number(difference.high)
+        interval = "unknown" if difference.low is None else f"{low} to {high}"
+        table.add_row(difference.metric, *map(_format_number, values), interval)
     console.print(f"{pair_count} pairs of runs with the same seed")
     console.print(table)
     console.print(f"{len(changed)} seeds with a different outcome")
@@ -126,3 +125,8 @@ def print_differences(differences: Sequence[Difference], changed: Sequence[RunPa
         console.print(f"  seed {pair.seed}: A {outcomes[0]}; B {outcomes[1]}", soft_wrap=True)
     if len(changed) > MAX_CHANGED_SEEDS:
         console.print(f"  and {len(changed) - MAX_CHANGED_SEEDS} more; the page lists them")
+
+
+def _format_number(value: float | None) -> str:
+    """Return a number with four significant digits, or `unknown`."""
+    return "unknown" if value is None else f"{value:.4g}"

@@ -28,13 +28,13 @@ def why(number: int, error: BaseException) -> str:
 
 def test_every_job_is_done_and_the_results_are_in_their_order() -> None:
     calls: list[tuple[int, int]] = []
-    stored: dict[int, float | str] = {}
+    stored: list[tuple[int, float | str, int]] = []
     results = run_jobs(
         [4, 3, 2, 2], half, why, workers=2, progress=lambda done, all: calls.append((done, all)),
-        on_result=stored.__setitem__,
+        on_result=lambda *result: stored.append(result),
     )  # fmt: skip
     assert (results, calls) == ([2.0, "3: 3 is odd", 1.0, 1.0], [(1, 4), (2, 4), (3, 4), (4, 4)])
-    assert stored == dict(enumerate(results))
+    assert sorted(stored) == [(index, result, 0) for index, result in enumerate(results)]
     assert run_jobs([], half, why, workers=2) == []
 
 

@@ -59,7 +59,9 @@ def swept(folder: Path, work: Callable[[SweepJob], RunRecord], count: int = 4, *
 
 
 def test_every_seed_is_run_with_every_combination() -> None:
-    settings = replace(SETTINGS, variations={"b": ("1", "2"), "c": ("x", "y")}, last_seed=1, scene="s.yaml")
+    settings = replace(
+        SETTINGS, variations={"b": ("1", "2"), "c": ("x", "y")}, last_seed=1, scene=Path("s.yaml")
+    )
     jobs = list_jobs(settings, Path("folder"))
     assert [(job.index, job.seed, "".join(job.variant.values())) for job in jobs] == [
         (0, 0, "1x"), (1, 1, "1x"), (2, 0, "1y"), (3, 1, "1y"),

@@ -60,7 +60,7 @@ def make_bundle(jobs: Sequence[SweepJob]) -> Bundle:
     """
     settings = [job.settings for job in jobs]
     paths = {find_mission(each.mission) for each in settings}
-    paths |= {each.scene_path for each in settings if each.scene_path}
+    paths |= {each.scene for each in settings if each.scene}
     values = {text for job in jobs for text in (*job.settings.overrides.values(), *job.variant.values())}
     files = {f"{PACKAGES_FOLDER}/{name}": content for name, content in list_plugin_files()}
     files |= {str(make_relative(path)): path.read_bytes() for path in _find_named_files(paths, values)}

@@ -34,8 +34,7 @@ def run_jobs_on_cluster(
     *,
     address: str,
     progress: Callable[[int, int], None] = lambda *_: None,
-    on_result: Callable[[int, RunRecord], None] = lambda *_: None,
-    on_crash: Callable[[int], None] = lambda _: None,
+    on_result: Callable[[int, RunRecord, int], None] = lambda *_: None,
     on_halt: Callable[[], None] = lambda: None,
 ) -> list[RunRecord | None]:
     """Execute all jobs on the workers of the scheduler at `address`, and return the records of the runs.
@@ -74,14 +73,13 @@ def run_jobs_on_cluster(
                     outcome = _get_outcome(future)
                     if isinstance(outcome, BrokenExecutor):
                         crash_counts[index] += 1
-                        on_crash(index)
                         if crash_counts[index] < MAX_CRASHES:
                             ended_futures.add(submit(index))
                             continue
                     if isinstance(outcome, Exception):
                         outcome = make_failure(jobs[index], outcome)
                     records[index] = outcome
-                    on_result(index, records[index])
+                    on_result(index, records[index], crash_counts[index])
                     progress(len(records), len(jobs))
                 signal_event.wait(MAX_HALT_DELAY)
             if signal_event.is_set():

@@ -41,7 +41,7 @@ def _execute(run_job: Callable[[SweepJob], RunRecord], job: SweepJob, root: Path
     settings = replace(
         settings,
         mission=str(_move_below(root, Path(settings.mission))),
-        scene=settings.scene and str(_move_below(root, Path(settings.scene))),
+        scene=settings.scene and _move_below(root, settings.scene),
     )
     job = replace(job, settings=settings, runs_folder=_move_below(root, job.runs_folder))
     try:

@@ -88,10 +88,8 @@ def _estimate_difference(metric: str, terms: Sequence[tuple[float, float, float,
     if not (columns[1].sum() and columns[3].sum()):
         return Difference(metric)
     a, b = columns[0].sum() / columns[1].sum(), columns[2].sum() / columns[3].sum()
-    if len(terms) < 2:
-        return Difference(metric, float(a), float(b), float(b - a))
-    low, high = compute_bootstrap_interval(_subtract_ratios, tuple(columns))
-    return Difference(metric, float(a), float(b), float(b - a), low, high)
+    interval = compute_bootstrap_interval(_subtract_ratios, tuple(columns))
+    return Difference(metric, float(a), float(b), float(b - a), *interval)
 
 
 def _subtract_ratios(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 RESAMPLE_COUNT = 2000
@@ -51,11 +51,8 @@ def estimate_ratio(numerators: Sequence[float], denominators: Sequence[float]) -
     numerator, denominator = sum(numerators), sum(denominators)
     if not denominator:
         return Estimate(numerator, denominator)
-    ratio = numerator / denominator
-    if len(numerators) < 2:
-        return Estimate(numerator, denominator, ratio)
-    low, high = compute_bootstrap_interval(divide_sums, (numerators, denominators))
-    return Estimate(numerator, denominator, ratio, low, high)
+    interval = compute_bootstrap_interval(divide_sums, (numerators, denominators))
+    return Estimate(numerator, denominator, numerator / denominator, *interval)
 
 
 def divide_sums(numerators: FloatArray, denominators: FloatArray, axis: int) -> FloatArray:
@@ -65,13 +62,15 @@ def divide_sums(numerators: FloatArray, denominators: FloatArray, axis: int) -> 
 
 
 def compute_bootstrap_interval(
-    compute_statistic: Callable[..., FloatArray], columns: Sequence[ArrayLike]
-) -> tuple[float, float]:
-    """Return the 95 % percentile bootstrap interval of a statistic of paired columns.
+    compute_statistic: Callable[..., FloatArray], columns: Sequence[Sequence[float] | FloatArray]
+) -> tuple[float, float] | tuple[None, None]:
+    """Return the 95 % percentile bootstrap interval of a statistic of paired columns; None without two pairs.
 
     `compute_statistic` is called with resampled columns and the keyword `axis`. The BCa method is not used,
     because it is not defined for equal values; the percentile method returns [x, x] for equal values x.
     """
+    if len(columns[0]) < 2:
+        return None, None
     from scipy.stats import bootstrap
 
     # scipy warns if all resamples are equal or if a denominator is 0.

@@ -38,7 +38,7 @@ class SweepSettings(Row):
     """First seed of each variant."""
     last_seed: int
     """Last seed of each variant."""
-    scene: str | None
+    scene: Path | None
     """Scene file; NULL: no change of the simulated world."""
     saves_pictures: bool
     """1 if the runs save the images on which decisions are based."""
@@ -46,11 +46,6 @@ class SweepSettings(Row):
     """Hash of mission, libraries, cell and scene; `--resume` requires equal inputs."""
     versions: Mapping[str, str]
     """Versions of this project, Python, the machine and the required packages."""
-
-    @property
-    def scene_path(self) -> Path | None:
-        """Path of the scene file, or None."""
-        return None if self.scene is None else Path(self.scene)
 
     @property
     def variants(self) -> list[dict[str, str]]:

@@ -63,7 +63,7 @@ def make_settings(
     """
     settings = SweepSettings(
         mission=mission, mission_name="", cell="", overrides=overrides, variations=variations,
-        first_seed=seeds[0], last_seed=seeds[-1], scene=None if scene is None else str(scene),
+        first_seed=seeds[0], last_seed=seeds[-1], scene=scene,
         saves_pictures=saves_pictures, inputs_hash="", versions=dict(list_versions()),
     )  # fmt: skip
     missions = _load_variants(settings)
@@ -79,7 +79,7 @@ def open_sweep(path: Path) -> ResultsDatabase:
     """
     database = ResultsDatabase(find_database(path))
     settings = database.settings
-    if _hash_inputs(_load_variants(settings), settings.scene_path) != settings.inputs_hash:
+    if _hash_inputs(_load_variants(settings), settings.scene) != settings.inputs_hash:
         raise InputError(
             f'the mission "{settings.mission}", its libraries, its cell, its weights or its scene changed '
             f'after the sweep "{path}" began, and the results would mix both versions; restore the files, or '
@@ -119,7 +119,7 @@ def _load_variants(settings: SweepSettings) -> list[LoadedMission]:
         for variant in settings.variants
     ]
     for loaded in missions if settings.scene else ():
-        load_scene(settings.scene_path, loaded.cell_config)
+        load_scene(settings.scene, loaded.cell_config)
     return missions
 
 

@@ -28,8 +28,7 @@ class SummaryStatistics:
 
     @staticmethod
     def from_values(values: Sequence[float]) -> SummaryStatistics:
-        """Return the statistics of the values; all are 0 without values."""
-        values = values or [0.0]
+        """Return the statistics of the values, of which there must be at least one."""
         return SummaryStatistics(
             min(values), statistics.median(values), statistics.fmean(values), max(values)
         )
