@@ -129,38 +129,39 @@ class ClearanceModel:
         config: Content of the cell file.
         obstacles: Obstacles that the cell file does not declare.
         end_positions: Horizontal positions of the start and the end of the motion `(E, 2)` [m].
+        discs: Tool and load.
     """
 
-    def __init__(self, config: CellConfig, obstacles: Sequence[Obstacle], end_positions: Array) -> None:
+    def __init__(
+        self, config: CellConfig, obstacles: Sequence[Obstacle], end_positions: Array, discs: Discs
+    ) -> None:
         self._margin = config.motion.margin + SAMPLING_MARGIN
         self._prisms = _build_prisms(config, obstacles)
-        self._end_positions = end_positions
+        self._end_positions, self._discs = end_positions, discs
         self._end_margins = np.full(len(self._prisms.names), self._margin)
 
-    def relax_end_margins(self, tcps: Array, axes: Array, discs: Discs) -> None:
+    def relax_end_margins(self, tcps: Array, axes: Array) -> None:
         """For each prism, limit the required distance near the ends to the smallest distance at the ends.
 
         `tcps` `(E, 3)` [m] and `axes` `(E, 3)` are the tool centre points and tool axes at the ends.
         """
-        end_distances = self._compute_all_distances(tcps, axes, discs).min(axis=(0, 1))
+        end_distances = self._compute_all_distances(tcps, axes).min(axis=(0, 1))
         self._end_margins = np.minimum(end_distances, self._margin)
 
-    def find_nearest_pairs(
-        self, tcps: Array, axes: Array, discs: Discs, max_slack: float = math.inf
-    ) -> NearestPairs:
+    def find_nearest_pairs(self, tcps: Array, axes: Array, max_slack: float = math.inf) -> NearestPairs:
         """Return the pair of disc and prism with the smallest slack in each state.
 
         The slack is the difference between distance and required distance. A slack up to `max_slack` [m] is
         exact; a larger slack is an upper bound, because prisms that are far from all states are skipped.
         `tcps` `(N, 3)` [m] and `axes` `(N, 3)` are the tool centre points and the tool axes.
         """
-        near_prisms = self._find_near_prisms(tcps, axes, discs, max_slack)
+        near_prisms = self._find_near_prisms(tcps, axes, max_slack)
         required_distances = self._find_required_distances(tcps, near_prisms)
-        slack = self._compute_all_distances(tcps, axes, discs, near_prisms) - required_distances[:, None]
+        slack = self._compute_all_distances(tcps, axes, near_prisms) - required_distances[:, None]
         flat_slack = slack.reshape(len(tcps), -1)
         pairs = flat_slack.argmin(axis=1)
         states = np.arange(len(tcps))
-        pair_slack, tilt_slack = flat_slack[states, pairs], _compute_tilt_slack(axes, discs)
+        pair_slack, tilt_slack = flat_slack[states, pairs], self._compute_tilt_slack(axes)
         disc, prism = np.divmod(pairs, len(near_prisms))
         return NearestPairs(
             np.minimum(pair_slack, tilt_slack), pair_slack, tilt_slack, required_distances[states, prism],
@@ -168,7 +169,7 @@ class ClearanceModel:
         )  # fmt: skip
 
     def compute_slack_changes(
-        self, pairs: NearestPairs, displaced_tcps: Array, displaced_axes: Array, discs: Discs
+        self, pairs: NearestPairs, displaced_tcps: Array, displaced_axes: Array
     ) -> Array:
         """Return the change of the slack of each state for each of `M` small displacements `(N, M)` [m].
 
@@ -176,23 +177,20 @@ class ClearanceModel:
             pairs: Pairs of the states; for each state, only the slack of its pair or of its tilt counts.
             displaced_tcps: Displaced tool centre points `(N, M, 3)` [m].
             displaced_axes: Displaced tool axes `(N, M, 3)`.
-            discs: Tool and load.
         """
-        disc, prism = pairs.discs, pairs.prisms
-        nearest_disc = Discs(discs.offsets[disc, None], discs.radii[disc, None], discs.min_cosine)
-        nearest_prism = self._prisms.select(prism[:, None])
-        new_distance = self._compute_distances(displaced_tcps, displaced_axes, nearest_disc, nearest_prism)
+        disc, prism = pairs.discs[:, None], pairs.prisms[:, None]
+        new_distance = self._compute_distances(displaced_tcps, displaced_axes, disc, prism)
         slack_change = new_distance - (pairs.required_distances + pairs.pair_slack)[:, None]
-        tilt_change = _compute_tilt_slack(displaced_axes, discs) - pairs.tilt_slack[:, None]
+        tilt_change = self._compute_tilt_slack(displaced_axes) - pairs.tilt_slack[:, None]
         return np.where((pairs.tilt_slack < pairs.pair_slack)[:, None], tilt_change, slack_change)
 
-    def require_clearance(self, tcps: Array, axes: Array, discs: Discs) -> None:
+    def require_clearance(self, tcps: Array, axes: Array) -> None:
         """Check the distances from the obstacles at tool centre points `(N, 3)` [m] and axes `(N, 3)`.
 
         Raises:
             Blocked: A state is too near to an obstacle; the message names the obstacle and the tool position.
         """
-        tilt_slack = _compute_tilt_slack(axes, discs)
+        tilt_slack = self._compute_tilt_slack(axes)
         if tilt_slack.min() < -MAX_EXTRA_TILT:
             tcp = tcps[np.argmin(tilt_slack)]
             raise Blocked(f"the motion would tilt the tool too far{_describe_tcp(tcp)}")
@@ -200,7 +198,7 @@ class ClearanceModel:
         tolerances = np.where(self._prisms.is_undetected, self._margin, POSITION_TOLERANCE + SAMPLING_MARGIN)
         tolerances = np.where(self._prisms.is_support, MAX_PENETRATION, tolerances)
         required_distances = self._find_required_distances(tcps)[:, None]
-        slack = self._compute_all_distances(tcps, axes, discs) - required_distances + tolerances
+        slack = self._compute_all_distances(tcps, axes) - required_distances + tolerances
         slack = slack.min(axis=1)
         state, prism = np.unravel_index(np.argmin(slack), slack.shape)
         if slack[state, prism] < 0:
@@ -210,11 +208,11 @@ class ClearanceModel:
                 f"{self._prisms.names[prism]}{_describe_tcp(tcps[state])}"
             )
 
-    def _find_near_prisms(self, tcps: Array, axes: Array, discs: Discs, max_slack: float) -> NDArray[np.intp]:
+    def _find_near_prisms(self, tcps: Array, axes: Array, max_slack: float) -> NDArray[np.intp]:
         """Return the indices of the prisms whose slack may be `max_slack` [m] or less in a state."""
         prisms = self._prisms
-        max_distances = prisms.radii + (discs.radii.max() + self._margin + max_slack)
-        disc_centres = np.concatenate([tcps + offset * axes for offset in discs.offsets])[:, :2]
+        max_distances = prisms.radii + (self._discs.radii.max() + self._margin + max_slack)
+        disc_centres = np.concatenate([tcps + offset * axes for offset in self._discs.offsets])[:, :2]
         (x_min, y_min), (x_max, y_max) = disc_centres.min(axis=0), disc_centres.max(axis=0)
         is_near_in_x = (prisms.min_x - max_distances < x_max) & (prisms.max_x + max_distances > x_min)
         is_near_in_y = (prisms.min_y - max_distances < y_max) & (prisms.max_y + max_distances > y_min)
@@ -230,39 +228,40 @@ class ClearanceModel:
         squares = [(x - end_x) ** 2 + (y - end_y) ** 2 for end_x, end_y in self._end_positions]
         return np.sqrt(functools.reduce(np.minimum, squares))
 
-    def _compute_all_distances(
-        self, tcps: Array, axes: Array, discs: Discs, prisms: PrismIndices = ALL_PRISMS
-    ) -> Array:
+    def _compute_all_distances(self, tcps: Array, axes: Array, prisms: PrismIndices = ALL_PRISMS) -> Array:
         """Return the distance of each disc from each of `K` prisms in each state `(N, P, K)` [m]."""
-        disc_columns = Discs(discs.offsets[:, None], discs.radii[:, None], discs.min_cosine)
+        all_discs = np.arange(len(self._discs.radii))[:, None]
         tcps, axes = tcps[:, None, None], axes[:, None, None]
-        return self._compute_distances(tcps, axes, disc_columns, self._prisms.select(prisms))
+        return self._compute_distances(tcps, axes, all_discs, prisms)
 
-    def _compute_distances(self, tcps: Array, axes: Array, discs: Discs, prisms: Prisms) -> Array:
+    def _compute_distances(
+        self, tcps: Array, axes: Array, disc_indices: NDArray[np.intp], prism_indices: PrismIndices
+    ) -> Array:
         """Return the distances between discs and prisms [m], negative inside; all arrays broadcast."""
-        x, y, z = (tcps[..., i] + discs.offsets * axes[..., i] for i in range(3))
+        offsets, radii = self._discs.offsets[disc_indices], self._discs.radii[disc_indices]
+        prisms = self._prisms.select(prism_indices)
+        x, y, z = (tcps[..., i] + offsets * axes[..., i] for i in range(3))
         sine_of_tilt = np.sqrt(np.maximum(0.0, 1 - axes[..., 2] ** 2))
         end_distance = self._compute_end_distances(x, y)
         max_undetected_top = UNDETECTED_HEIGHT_SLOPE * np.maximum(end_distance - OBSERVED_RADIUS, 0.0)
         top = np.where(prisms.is_undetected, np.minimum(max_undetected_top, prisms.tops), prisms.tops)
-        vertical = z - discs.radii * sine_of_tilt - top
+        vertical = z - radii * sine_of_tilt - top
         dx = np.maximum(np.maximum(prisms.min_x - x, x - prisms.max_x), 0.0)
         dy = np.maximum(np.maximum(prisms.min_y - y, y - prisms.max_y), 0.0)
-        horizontal = np.sqrt(dx * dx + dy * dy) - (prisms.radii + discs.radii)
+        horizontal = np.sqrt(dx * dx + dy * dy) - (prisms.radii + radii)
         outside_h, outside_v = np.maximum(horizontal, 0.0), np.maximum(vertical, 0.0)
         outside = np.sqrt(outside_h * outside_h + outside_v * outside_v)
         return np.where(outside > 0, outside, np.maximum(horizontal, vertical))
+
+    def _compute_tilt_slack(self, axes: Array) -> Array:
+        """Return the distance from the limit of the tilt for tool axes `(..., 3)`, as an equivalent [m]."""
+        return DISTANCE_PER_COSINE * (-axes[..., 2] - self._discs.min_cosine)
 
 
 def _describe_tcp(tcp: Array) -> str:
     """Return the end of a message about the tool centre point `(3,)` [m]."""
     x, y, z = tcp
     return f", with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m"
-
-
-def _compute_tilt_slack(axes: Array, discs: Discs) -> Array:
-    """Return the remaining tilt of tool axes `(..., 3)` up to the limit, as an equivalent distance [m]."""
-    return DISTANCE_PER_COSINE * (-axes[..., 2] - discs.min_cosine)
 
 
 def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:

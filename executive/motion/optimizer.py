@@ -16,7 +16,7 @@ import numpy as np
 
 from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
-from executive.motion.clearance_model import ClearanceModel, Discs, NearestPairs
+from executive.motion.clearance_model import ClearanceModel, NearestPairs
 from executive.motion.joints import JointLimits, JointState
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import Connector, JointLimitError, PointToPoint
@@ -57,7 +57,6 @@ class OptimizationProblem:
         connector: Planner of motions between two states within the joint limits.
         kinematics: Kinematics of the arm.
         clearance: Model of the distances from the obstacles.
-        discs: Tool and load as discs.
         payload: Acceleration limit due to the load, or None.
     """
 
@@ -66,7 +65,6 @@ class OptimizationProblem:
     connector: Connector
     kinematics: Kinematics
     clearance: ClearanceModel
-    discs: Discs
     payload: PayloadLimit | None = None
 
     def compute_slack(self, qs: Array) -> Array:
@@ -79,7 +77,7 @@ class OptimizationProblem:
         A slack up to `max_slack` is exact; a larger slack is an upper bound.
         """
         tcps, axes = self.kinematics.compute_tcps_and_axes(qs)
-        pairs = self.clearance.find_nearest_pairs(tcps, axes, self.discs, max_slack)
+        pairs = self.clearance.find_nearest_pairs(tcps, axes, max_slack)
         range_slack = self._compute_range_slack(qs).min(axis=1)
         return pairs._replace(slack=np.minimum(pairs.slack, range_slack))
 
@@ -92,7 +90,7 @@ class OptimizationProblem:
         displaced_qs = (qs[:, None] + _FINITE_DIFFERENCE_STEP * np.eye(joint_count)).reshape(-1, joint_count)
         displaced = self.kinematics.compute_tcps_and_axes(displaced_qs)
         new_tcps, new_axes = (values.reshape(-1, joint_count, 3) for values in displaced)
-        changes = self.clearance.compute_slack_changes(pairs, new_tcps, new_axes, self.discs)
+        changes = self.clearance.compute_slack_changes(pairs, new_tcps, new_axes)
         gradients = changes / _FINITE_DIFFERENCE_STEP
         range_slack = self._compute_range_slack(qs)
         # If a range limit determines the slack, the slack changes only with the joint at the limit.

@@ -78,15 +78,15 @@ class MotionSearch:
         self._travel_height = compute_travel_height(config)
         self._end = end
         self._straight_length = config.motion.straight
-        self._discs = make_tool_discs(config, task.load)
+        discs = make_tool_discs(config, task.load)
         if not isinstance(end, Goal) and task.load is None:
             # Without a load, the tool may tilt: the arm must reach named poses from any configuration.
-            self._discs = self._discs._replace(min_cosine=-1.0)
+            discs = discs._replace(min_cosine=-1.0)
         self._payload = PayloadLimit(task.load, kinematics) if task.load else None
         start_tcp_and_axis = kinematics.compute_tcps_and_axes(start[None])
         tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, self._locate_free_part_end(), strict=True))
-        self._clearance = ClearanceModel(config, task.obstacles, tcps[:, :2])
-        self._clearance.relax_end_margins(tcps, axes, self._discs)
+        self._clearance = ClearanceModel(config, task.obstacles, tcps[:, :2], discs)
+        self._clearance.relax_end_margins(tcps, axes)
         # All candidates share the rises.
         self._get_rise = functools.cache(self._plan_rise)
         self._departure = departure = self._plan_departure(start, float(tcps[0, 2]))
@@ -111,7 +111,7 @@ class MotionSearch:
         Raises:
             Blocked: A distance is too small.
         """
-        self._clearance.require_clearance(*self._kinematics.compute_tcps_and_axes(qs), self._discs)
+        self._clearance.require_clearance(*self._kinematics.compute_tcps_and_axes(qs))
 
     def _locate_free_part_end(self) -> tuple[Array, Array]:
         """Return tool centre point [m] and tool axis, `(1, 3)` each, at the end of the free part."""
@@ -173,7 +173,7 @@ class MotionSearch:
                 break
             problem = OptimizationProblem(
                 self._start, candidate.free_part_end, self._connector, self._kinematics, self._clearance,
-                self._discs, self._payload,
+                self._payload,
             )  # fmt: skip
             with contextlib.suppress(JointLimitError, Unreachable):
                 free_part = self._connector.connect(self._start, candidate.free_part_end)

@@ -55,14 +55,10 @@ def to_box(points: Array, low: Array, high: Array) -> Array:
     return np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=1)
 
 
-def slack(clearance: ClearanceModel, tip, axis=DOWN, discs: Discs | None = None) -> float:
+def slack(clearance: ClearanceModel, tip, axis=DOWN) -> float:
     """Of one state."""
-    assert discs is not None
-    return float(
-        clearance.find_nearest_pairs(
-            np.array([tip], dtype=float), np.array([axis], dtype=float), discs
-        ).slack[0]
-    )
+    pairs = clearance.find_nearest_pairs(np.array([tip], dtype=float), np.array([axis], dtype=float))
+    return float(pairs.slack[0])
 
 
 near_the_post = st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.15), st.floats(0.15, 0.42)).map(
@@ -74,8 +70,8 @@ near_the_post = st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.15), st.flo
 @settings(max_examples=60)
 def test_distances_from_a_cylinder_are_what_geometry_says(config: CellConfig, tip, loaded: bool) -> None:
     discs = make_tool_discs(config, CUBE if loaded else None)
-    without = slack(ClearanceModel(config, (), AWAY), tip, discs=discs)
-    found = slack(ClearanceModel(config, (POST,), AWAY), tip, discs=discs)
+    without = slack(ClearanceModel(config, (), AWAY, discs), tip)
+    found = slack(ClearanceModel(config, (POST,), AWAY, discs), tip)
     points = np.concatenate(discs_of(tip, DOWN, discs))
     grown = Obstacle(POST.x, POST.y, POST.radius + POSITION_TOLERANCE, POST.top, "")
     nearest = float(to_cylinder(points, grown).min())
@@ -106,7 +102,7 @@ def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) ->
     points = np.concatenate(discs_of(tip, DOWN, discs))
     nearest = min(float(to_box(points, np.array(a), np.array(b)).min()) for a, b in boxes)
     # Its end is here, so that the workspace beside does not count.
-    found = slack(ClearanceModel(config, (), tip[None, :2]), tip, discs=discs)
+    found = slack(ClearanceModel(config, (), tip[None, :2], discs), tip)
     if nearest > 0:
         spare = DISTANCE_PER_COSINE * (1 - discs.min_cosine)
         assert found == pytest.approx(
@@ -138,40 +134,36 @@ def test_the_workspace_is_not_entered_low_but_where_it_was_looked_at(config, x, 
     tip, discs = (x, y, min(z, compute_max_pile_height(config))), make_tool_discs(config, None)
     away = math.hypot(x - end[0, 0], y - end[0, 1])
     if away > OBSERVED_RADIUS + compute_max_pile_height(config):
-        assert slack(ClearanceModel(config, (), end), tip, discs=discs) < 0
+        assert slack(ClearanceModel(config, (), end, discs), tip) < 0
     elif away < OBSERVED_RADIUS - 1e-9:
         wanted = min(
             tip[2] - (config.motion.margin + SAMPLING_MARGIN), DISTANCE_PER_COSINE * (1 - discs.min_cosine)
         )
-        assert slack(ClearanceModel(config, (), end), tip, discs=discs) == pytest.approx(wanted, abs=1e-9)
+        assert slack(ClearanceModel(config, (), end, discs), tip) == pytest.approx(wanted, abs=1e-9)
 
 
 def test_near_an_end_what_is_unavoidable_there_is_allowed_and_elsewhere_it_is_not(config) -> None:
     discs = make_tool_discs(config, None)
     beside = np.array([POST.x + POST.radius + POSITION_TOLERANCE + TOOL_RADIUS + 0.002, POST.y, 0.1])
     opposite = np.array([2 * POST.x - beside[0], POST.y, 0.1])
-    clearance = ClearanceModel(config, (POST,), beside[None, :2])
-    assert slack(clearance, beside, discs=discs) == pytest.approx(
-        0.002 - (config.motion.margin + SAMPLING_MARGIN)
-    )
-    clearance.relax_end_margins(beside[None], DOWN[None], discs)
-    assert slack(clearance, beside, discs=discs) == pytest.approx(0.0, abs=1e-9)
-    assert slack(clearance, beside - (0.001, 0, 0), discs=discs) == pytest.approx(-0.001, abs=1e-9)
+    clearance = ClearanceModel(config, (POST,), beside[None, :2], discs)
+    assert slack(clearance, beside) == pytest.approx(0.002 - (config.motion.margin + SAMPLING_MARGIN))
+    clearance.relax_end_margins(beside[None], DOWN[None])
+    assert slack(clearance, beside) == pytest.approx(0.0, abs=1e-9)
+    assert slack(clearance, beside - (0.001, 0, 0)) == pytest.approx(-0.001, abs=1e-9)
     assert np.linalg.norm(opposite - beside) > OBSERVED_RADIUS
-    assert slack(clearance, opposite, discs=discs) == pytest.approx(
-        0.002 - (config.motion.margin + SAMPLING_MARGIN)
-    )
+    assert slack(clearance, opposite) == pytest.approx(0.002 - (config.motion.margin + SAMPLING_MARGIN))
     inside = np.array([[POST.x, POST.y, POST.top - 0.01]])
-    clearance.relax_end_margins(inside, DOWN[None], discs)
-    clearance.require_clearance(inside, DOWN[None], discs)  # what is entered already may be left
+    clearance.relax_end_margins(inside, DOWN[None])
+    clearance.require_clearance(inside, DOWN[None])  # what is entered already may be left
 
 
 def test_an_error_names_the_thing_the_lack_and_the_place(config: CellConfig) -> None:
-    discs, clearance = make_tool_discs(config, None), ClearanceModel(config, (POST,), AWAY)
+    clearance = ClearanceModel(config, (POST,), AWAY, make_tool_discs(config, None))
 
     def require(tip, axis=DOWN) -> None:
         tips = np.array([[-0.6, 0.0, 0.4], tip, [-0.6, 0.0, 0.4]])
-        clearance.require_clearance(tips, np.array([DOWN, axis, DOWN]), discs)
+        clearance.require_clearance(tips, np.array([DOWN, axis, DOWN]))
 
     require((-0.6, 0.0, 0.4))
     text = "would bring tool or load 16 mm too near to the post, with the tool at (-0.500, 0.100, 0.290) m"
@@ -200,17 +192,14 @@ def test_an_error_names_the_thing_the_lack_and_the_place(config: CellConfig) -> 
 @settings(max_examples=80)
 def test_slopes_are_the_differences_of_slack(config, tip, tilt, turn, loaded: bool) -> None:
     axis = np.array([math.sin(tilt), math.cos(tilt) * math.sin(turn), -math.cos(tilt) * math.cos(turn)])
-    discs, clearance = (
-        make_tool_discs(config, CUBE if loaded else None),
-        ClearanceModel(config, (POST,), AWAY),
-    )
+    clearance = ClearanceModel(config, (POST,), AWAY, make_tool_discs(config, CUBE if loaded else None))
     h = 1e-5
     tips, axes = tip + h * np.eye(3), np.broadcast_to(axis, (3, 3))
-    pairs = clearance.find_nearest_pairs(tip[None], axis[None], discs)
-    found = clearance.compute_slack_changes(pairs, tips[None], axes[None], discs)[0] / h
-    here = slack(clearance, tip, axis, discs)
-    forward = (clearance.find_nearest_pairs(tips, axes, discs).slack - here) / h
-    backward = (here - clearance.find_nearest_pairs(2 * tip - tips, axes, discs).slack) / h
+    pairs = clearance.find_nearest_pairs(tip[None], axis[None])
+    found = clearance.compute_slack_changes(pairs, tips[None], axes[None])[0] / h
+    here = slack(clearance, tip, axis)
+    forward = (clearance.find_nearest_pairs(tips, axes).slack - here) / h
+    backward = (here - clearance.find_nearest_pairs(2 * tip - tips, axes).slack) / h
     smooth = np.abs(forward - backward) < 1e-2  # no kink between
     assert np.allclose(found[smooth], forward[smooth], atol=1e-6)
 
@@ -219,9 +208,9 @@ def test_slopes_are_the_differences_of_slack(config, tip, tilt, turn, loaded: bo
 @settings(max_examples=40)
 def test_far_obstacles_are_left_out_only_where_the_slack_is_large(config, tips, loaded: bool) -> None:
     discs = make_tool_discs(config, CUBE if loaded else None)
-    clearance = ClearanceModel(config, (POST,), AWAY)
+    clearance = ClearanceModel(config, (POST,), AWAY, discs)
     axes = np.broadcast_to(DOWN, (len(tips), 3))
-    exact = clearance.find_nearest_pairs(np.array(tips), axes, discs).slack
-    quick = clearance.find_nearest_pairs(np.array(tips), axes, discs, 0.03).slack
+    exact = clearance.find_nearest_pairs(np.array(tips), axes).slack
+    quick = clearance.find_nearest_pairs(np.array(tips), axes, 0.03).slack
     assert np.array_equal(quick[exact < 0.03], exact[exact < 0.03])
     assert np.all(quick >= exact)

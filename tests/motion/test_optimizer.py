@@ -35,7 +35,8 @@ def over_the_post(config, kinematics, connector):
             return JointState.at_rest(kinematics.solve(make_tool_down_pose((x, y, z)), (branch, 0.0)))
 
         corners = [state(*LEFT), state(*LEFT[:2], HIGH), state(*RIGHT[:2], HIGH), state(*RIGHT)]
-        clearance = ClearanceModel(config, (POST,), np.array([LEFT[:2], RIGHT[:2]]))
+        discs = make_tool_discs(config, load)
+        clearance = ClearanceModel(config, (POST,), np.array([LEFT[:2], RIGHT[:2]]), discs)
         payload = PayloadLimit(load, kinematics) if load else None
         problem = OptimizationProblem(
             corners[0],
@@ -43,7 +44,6 @@ def over_the_post(config, kinematics, connector):
             connector,
             kinematics,
             clearance,
-            make_tool_discs(config, load),
             payload,
         )
         return problem, [connector.connect(a, b) for a, b in pairwise(corners)]
