@@ -103,9 +103,8 @@ def make_fault_record(job: SweepJob, error: BaseException) -> RunRecord:
     """Return the record of a run that raised an exception or whose processes died."""
     message = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
     run = RunRow(
-        job=job.index, seed=job.seed, variant=job.variant,
-        status="FAULT", reason="fault", message=message, node="",
-    )  # fmt: skip
+        job=job.index, seed=job.seed, variant=job.variant, status="FAULT", reason="fault", message=message
+    )
     return RunRecord(run)
 
 

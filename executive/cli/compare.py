@@ -58,22 +58,22 @@ def command(
                 for mission, own_overrides in ((missions[0], overrides_a), (missions[-1], overrides_b))
             ]
             databases = create_comparison(settings, runs)
-        sides: list[SweepResults] = []
+        sweeps: list[SweepResults] = []
         for name, database in zip("AB", databases, strict=True):
-            is_halted = any(side.is_halted for side in sides)
+            is_halted = any(sweep.is_halted for sweep in sweeps)
             with closing(database):
-                sides.append(execute_missing_runs(database, name, workers, cluster, is_halted=is_halted))
-        pairs = pair_runs(sides[0].runs, sides[1].runs)
+                sweeps.append(execute_missing_runs(database, name, workers, cluster, is_halted=is_halted))
+        pairs = pair_runs(sweeps[0].runs, sweeps[1].runs)
         differences, changed = compute_differences(pairs), [pair for pair in pairs if pair.is_changed]
         write_missing_reports(changed)
-        page = write_page(databases[0].path.parents[1], sides, differences, changed)
+        page = write_page(databases[0].path.parents[1], sweeps, differences, changed)
         print_differences(differences, changed, len(pairs))
         click.echo(f"page: {page}", err=True)
     if as_json:
         print_json(to_json({
-            "settings": [side.settings for side in sides],
+            "settings": [sweep.settings for sweep in sweeps],
             "results": [str(database.path) for database in databases], "page": str(page),
             "pairs": len(pairs), "differences": differences, "changed": changed,
-            "summaries": [summary for side in sides for summary in side.summaries],
+            "summaries": [summary for sweep in sweeps for summary in sweep.summaries],
         }))  # fmt: skip
-    return ExitCode.HALTED if any(side.is_halted for side in sides) else ExitCode.SUCCESS
+    return ExitCode.HALTED if any(sweep.is_halted for sweep in sweeps) else ExitCode.SUCCESS

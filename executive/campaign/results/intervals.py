@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+"""Array of floats with 64 bits."""
 RESAMPLE_COUNT = 2000
 """Number of bootstrap resamples."""
 BOOTSTRAP_SEED = 0
@@ -64,10 +65,14 @@ def divide_sums(numerators: FloatArray, denominators: FloatArray, axis: int) -> 
 def compute_bootstrap_interval(
     compute_statistic: Callable[..., FloatArray], columns: Sequence[Sequence[float] | FloatArray]
 ) -> tuple[float, float] | tuple[None, None]:
-    """Return the 95 % percentile bootstrap interval of a statistic of paired columns; None without two pairs.
+    """Return the 95 % percentile bootstrap interval of a statistic of paired columns.
 
-    `compute_statistic` is called with resampled columns and the keyword `axis`. The BCa method is not used,
+    Columns with fewer than two values have no interval: both limits are None. The BCa method is not used,
     because it is not defined for equal values; the percentile method returns [x, x] for equal values x.
+
+    Args:
+        compute_statistic: Function of resampled columns and of the keyword `axis`.
+        columns: Columns of equal length.
     """
     if len(columns[0]) < 2:
         return None, None

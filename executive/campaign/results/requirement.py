@@ -39,13 +39,13 @@ class Comparison:
     """A metric that is compared with a number.
 
     Attributes:
-        metric: Name of a metric, or of a statistic.
-        column: Column of the runs for a statistic, or "".
+        name: Metric of a variant, or statistic of `column` over the runs.
+        column: Column of the runs; "" for a metric of a variant.
         symbol: Key of `OPERATORS`.
         limit: The number.
     """
 
-    metric: str
+    name: str
     column: str
     symbol: str
     limit: float
@@ -53,18 +53,18 @@ class Comparison:
     def compute_value(self, runs: Sequence[RunRow], summary: VariantSummary) -> float | None:
         """Return the value of the metric for the runs of a variant; None without data."""
         if not self.column:
-            estimate: Estimate = getattr(summary, self.metric)
+            estimate: Estimate = getattr(summary, self.name)
             return estimate.value
         values = [RUNS.encode(run)[_COLUMN_INDICES[self.column]] for run in runs]
         numbers = [float(value) for value in values if value is not None]
         if not numbers:
             return None
-        percentile = PERCENTILES.get(self.metric)
+        percentile = PERCENTILES.get(self.name)
         return float(np.mean(numbers) if percentile is None else np.percentile(numbers, percentile))
 
     def __str__(self) -> str:
         """Return the text of the comparison."""
-        metric = f"{self.metric}({self.column})" if self.column else self.metric
+        metric = f"{self.name}({self.column})" if self.column else self.name
         return f"{metric}{self.symbol}{self.limit:g}"
 
 

@@ -32,7 +32,7 @@ class Group:
     """Runs of one variant of a sweep, which are one column in each table of the page.
 
     Attributes:
-        label: Name of the side and values of the variant, or `all runs`.
+        label: `A` or `B` in a comparison, and values of the variant, or `all runs`.
         summary: Summary of the runs.
         robot_times: Duration of each run [s].
         object_times: Time during which each placed object was the selected target [s].
@@ -61,20 +61,20 @@ class Histogram:
 
 
 def write_page(
-    folder: Path, sides: Sequence[SweepResults],
+    folder: Path, sweeps: Sequence[SweepResults],
     differences: Sequence[Difference] = (), changed: Sequence[RunPair] = (),
 ) -> Path:  # fmt: skip
-    """Write the page of a sweep (one side) or of a comparison (two sides) into `folder`; return its path.
+    """Write the page of a sweep, or of a comparison of two sweeps, into `folder`; return its path.
 
     Raises:
         InputError: The file cannot be written.
     """
-    groups = [group for side in sides for group in _list_groups(side)]
-    problems = [(side, run) for side in sides for run in side.runs if run.problem]
+    groups = [group for sweep in sweeps for group in _list_groups(sweep)]
+    problems = [(sweep, run) for sweep in sweeps for run in sweep.runs if run.problem]
     path = folder / PAGE_NAME
     page = render_template(
         "results/results.html",
-        sides=sides,
+        sweeps=sweeps,
         groups=groups,
         plots={
             "Robot time of a run [s]": _make_histograms({group.label: group.robot_times for group in groups}),
@@ -82,7 +82,7 @@ def write_page(
                 {group.label: group.object_times for group in groups}
             ),
         },
-        phases=list(dict.fromkeys(phase.phase for each in groups for phase in each.summary.phases)),
+        phases=list(dict.fromkeys(phase.phase for group in groups for phase in group.summary.phases)),
         differences=differences,
         changed=changed,
         problems=problems,
@@ -95,13 +95,13 @@ def write_page(
     return path
 
 
-def _list_groups(side: SweepResults) -> list[Group]:
-    """Return one group for each variant of a side."""
+def _list_groups(sweep: SweepResults) -> list[Group]:
+    """Return one group for each variant of a sweep."""
     groups = []
-    for summary in side.summaries:
-        runs = {run.job: run for run in side.runs if run.variant == summary.variant}
-        items = [item for item in side.items if item.job in runs and item.state == "placed"]
-        label = " ".join(filter(None, (side.name, describe_variant(summary.variant)))) or "all runs"
+    for summary in sweep.summaries:
+        runs = {run.job: run for run in sweep.runs if run.variant == summary.variant}
+        items = [item for item in sweep.items if item.job in runs and item.state == "placed"]
+        label = " ".join(filter(None, (sweep.name, describe_variant(summary.variant)))) or "all runs"
         times = [run.robot_time_s for run in runs.values()]
         groups.append(Group(label, summary, times, [item.robot_time_s for item in items]))
     return groups
@@ -125,7 +125,7 @@ def _make_histograms(values_by_label: Mapping[str, Sequence[float]]) -> list[His
 
 
 def _make_link(run_directory: str, folder: Path) -> str:
-    """Return the address of the report in `run_directory`, relative to `folder`; "" if none."""
+    """Return the address of the report in `run_directory`, relative to `folder`; "" without a report."""
     report = RunDirectory(Path(run_directory)).report
     return quote(os.path.relpath(report, folder)) if run_directory and report.is_file() else ""
 

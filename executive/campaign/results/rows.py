@@ -66,11 +66,11 @@ class RunRow(Row):
     """Values of the varied params and keys of the cell, by name."""
     status: str
     """Final status: SUCCESS, INCOMPLETE, FAILURE or FAULT."""
-    reason: str
+    reason: str = ""
     """Reason of the failure, for instance `Transit.dropped`; "" on success."""
-    message: str
+    message: str = ""
     """Sentence that explains the status, or ""."""
-    node: str
+    node: str = ""
     """Path of the node that caused the status, or ""."""
     items: ItemCounts = field(default_factory=ItemCounts)
     """Number of items by final state, from the ledger."""

@@ -55,6 +55,6 @@ def _list_phases(job: int, timeline: Timeline) -> Iterator[PhaseRow]:
     for skill in dict.fromkeys(activation.skill for activation in timeline.activations if activation.skill):
         activations = [activation for activation in timeline.activations if activation.skill == skill]
         failure_count = sum(activation.status == "FAILURE" for activation in activations)
-        time = round(sum(each.end - each.start for each in activations), DECIMAL_PLACES)
+        time = round(sum(activation.end - activation.start for activation in activations), DECIMAL_PLACES)
         counts = {"activations": len(activations), "failures": failure_count}
         yield PhaseRow(job=job, phase=skill, **counts, robot_time_s=time)

@@ -95,11 +95,11 @@ def create_comparison(settings: Sequence[SweepSettings], runs_folder: Path) -> l
     Raises:
         InputError: The folder cannot be made.
     """
-    name = "_".join(dict.fromkeys(each.mission_name for each in settings))
+    name = "_".join(dict.fromkeys(side_settings.mission_name for side_settings in settings))
     folder = make_dated_folder(runs_folder, f"compare_{name}", datetime.now())
     for side in SIDES:
         (folder / side).mkdir()
-    return [create_database(folder / side, each) for side, each in zip(SIDES, settings, strict=True)]
+    return [create_database(folder / side, values) for side, values in zip(SIDES, settings, strict=True)]
 
 
 def open_comparison(folder: Path) -> list[ResultsDatabase]:
