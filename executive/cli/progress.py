@@ -49,16 +49,15 @@ def show_progress(
         print_lines: True to print a line per `LINE_PERIOD` if stderr is not a terminal.
     """
     console = Console(file=open_unescaped_stderr())
-    estimates = (RateColumn(), TimeRemainingColumn())
-    bar = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     is_hidden = quiet or not console.is_interactive
     if print_lines and not quiet and is_hidden:
         yield _make_line_printer(description)
         return
     # The remaining time is estimated from all completed parts, because a part may take minutes.
     with Progress(
-        *bar, *estimates, console=console, disable=is_hidden, speed_estimate_period=math.inf
-    ) as progress:
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), RateColumn(),
+        TimeRemainingColumn(), console=console, disable=is_hidden, speed_estimate_period=math.inf,
+    ) as progress:  # fmt: skip
         task = progress.add_task(description, total=None)
         yield lambda completed, total: progress.update(task, completed=completed, total=total)
 

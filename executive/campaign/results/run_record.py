@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
+from itertools import pairwise
 
 from pydantic import TypeAdapter
 
@@ -32,20 +33,19 @@ def _list_items(job: int, timeline: Timeline) -> Iterator[ItemRow]:
     """Yield the row of each item."""
     for name, history in timeline.items.by_name.items():
         last = history.last_change
-        time = _measure_item_time(name, timeline)
-        final_values = {"label": last.label, "state": last.state, "bin": last.bin}
-        yield ItemRow(job=job, item=name, **final_values, attempts=last.attempts, robot_time_s=time)
+        yield ItemRow(
+            job=job, item=name, label=last.label, state=last.state, bin=last.bin, attempts=last.attempts,
+            robot_time_s=_measure_item_time(name, timeline),
+        )  # fmt: skip
 
 
 def _measure_item_time(name: str, timeline: Timeline) -> float:
     """Return the time during which the item was the selected target and had no final state [s]."""
-    selections = timeline.selection_times
-    next_times = [*(time for time, _ in selections[1:]), timeline.clock]
-    item_end = timeline.items.by_name[name].state_change_time
+    end_time = timeline.items.by_name[name].state_change_time
     durations = (
-        max(0.0, min(next_time, item_end) - time)
-        for (time, selected), next_time in zip(selections, next_times, strict=False)
-        if selected == name
+        max(0.0, min(next_time, end_time) - time)
+        for (time, item), (next_time, _) in pairwise([*timeline.selection_times, (timeline.clock, "")])
+        if item == name
     )
     return round(sum(durations), DECIMAL_PLACES)
 
