@@ -106,14 +106,14 @@ class NearestPairs(NamedTuple):
         slack: Smallest slack of the state, of all pairs, of the tilt, and of the joint range `(N,)`.
         pair_slack: Slack of the pair `(N,)` [m].
         tilt_slack: Slack of the tilt of the tool `(N,)` [m].
-        required_distances: Required distance of the pair `(N,)` [m].
+        distances: Distance between disc and prism of the pair `(N,)` [m], negative for a penetration.
         discs, prisms: Indices of the pair `(N,)`.
     """
 
     slack: Array
     pair_slack: Array
     tilt_slack: Array
-    required_distances: Array
+    distances: Array
     discs: NDArray[np.intp]
     prisms: NDArray[np.intp]
 
@@ -162,11 +162,10 @@ class ClearanceModel:
         pairs = flat_slack.argmin(axis=1)
         states = np.arange(len(tcps))
         pair_slack, tilt_slack = flat_slack[states, pairs], self._compute_tilt_slack(axes)
-        disc, prism = np.divmod(pairs, len(near_prisms))
-        return NearestPairs(
-            np.minimum(pair_slack, tilt_slack), pair_slack, tilt_slack, required_distances[states, prism],
-            disc, near_prisms[prism],
-        )  # fmt: skip
+        discs, prisms = np.divmod(pairs, len(near_prisms))
+        distances = required_distances[states, prisms] + pair_slack
+        min_slack = np.minimum(pair_slack, tilt_slack)
+        return NearestPairs(min_slack, pair_slack, tilt_slack, distances, discs, near_prisms[prisms])
 
     def compute_slack_changes(
         self, pairs: NearestPairs, displaced_tcps: Array, displaced_axes: Array
@@ -178,9 +177,9 @@ class ClearanceModel:
             displaced_tcps: Displaced tool centre points `(N, M, 3)` [m].
             displaced_axes: Displaced tool axes `(N, M, 3)`.
         """
-        disc, prism = pairs.discs[:, None], pairs.prisms[:, None]
-        new_distance = self._compute_distances(displaced_tcps, displaced_axes, disc, prism)
-        slack_change = new_distance - (pairs.required_distances + pairs.pair_slack)[:, None]
+        discs, prisms = pairs.discs[:, None], pairs.prisms[:, None]
+        new_distances = self._compute_distances(displaced_tcps, displaced_axes, discs, prisms)
+        slack_change = new_distances - pairs.distances[:, None]
         tilt_change = self._compute_tilt_slack(displaced_axes) - pairs.tilt_slack[:, None]
         return np.where((pairs.tilt_slack < pairs.pair_slack)[:, None], tilt_change, slack_change)
 
@@ -231,8 +230,7 @@ class ClearanceModel:
     def _compute_all_distances(self, tcps: Array, axes: Array, prisms: PrismIndices = ALL_PRISMS) -> Array:
         """Return the distance of each disc from each of `K` prisms in each state `(N, P, K)` [m]."""
         all_discs = np.arange(len(self._discs.radii))[:, None]
-        tcps, axes = tcps[:, None, None], axes[:, None, None]
-        return self._compute_distances(tcps, axes, all_discs, prisms)
+        return self._compute_distances(tcps[:, None, None], axes[:, None, None], all_discs, prisms)
 
     def _compute_distances(
         self, tcps: Array, axes: Array, disc_indices: NDArray[np.intp], prism_indices: PrismIndices

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from executive.cell.config import DetectorConfig
-from executive.perception.detectors.onnx_model import load_model, read_labels
+from executive.perception.detectors.onnx_model import OnnxModel, read_labels
 from executive.perception.detectors.options import DetectorOptions, OptionErrors
 from executive.perception.detectors.requests import DetectorContext
 from executive.perception.detectors.rfdetr import RfdetrDetector
@@ -27,7 +27,7 @@ class EmbeddedDetector(RfdetrDetector):
             InputError: The cell file has an option; this kind of detector has no options.
         """
         DetectorOptions.read(config)
-        return cls(load_model(MODEL_PATH, read_labels(LABELS_PATH)), config, context)
+        return cls(OnnxModel.load(MODEL_PATH, read_labels(LABELS_PATH)), config, context)
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:

@@ -59,6 +59,16 @@ class OnnxModel:
         self.labels = tuple(labels)
         self.input_size = self._check_shapes(path)
 
+    @staticmethod
+    def load(path: Path, labels: Sequence[str], threads: int = 2) -> OnnxModel:
+        """Return the model in a file, with the arguments of the class.
+
+        Unchanged models are loaded once per process, because a worker of a sweep runs a mission many times,
+        and loading takes 0.2 s.
+        """
+        change_time = path.stat().st_mtime_ns if path.is_file() else 0
+        return _load_model(path, tuple(labels), threads, change_time)
+
     def detect(self, image: NDArray[np.uint8], min_confidence: float) -> list[Detection]:
         """Return the detections of at least `min_confidence` in an RGB image `(H, W, 3)`, best first.
 
@@ -110,16 +120,6 @@ class OnnxModel:
             advice = "give one label per class, in the order of the model"
             raise InputError(f"{path} has {class_count} classes, but there are {labels}; {advice}")
         return size
-
-
-def load_model(path: Path, labels: Sequence[str], threads: int = 2) -> OnnxModel:
-    """Return the model in a file, with the arguments of `OnnxModel`.
-
-    Unchanged models are loaded once per process, because a worker of a sweep runs a mission many times, and
-    loading takes 0.2 s.
-    """
-    change_time = path.stat().st_mtime_ns if path.is_file() else 0
-    return _load_model(path, tuple(labels), threads, change_time)
 
 
 @functools.lru_cache(maxsize=4)

@@ -14,12 +14,7 @@ from pydantic import Field
 from executive.cell.config import DetectorConfig
 from executive.cell.detection import Detection
 from executive.errors import InputError
-from executive.perception.detectors.onnx_model import (
-    OnnxModel,
-    describe_missing_model,
-    load_model,
-    read_labels,
-)
+from executive.perception.detectors.onnx_model import OnnxModel, describe_missing_model, read_labels
 from executive.perception.detectors.options import DetectorOptions, OptionErrors, find_class_map_errors
 from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
 from executive.perception.detectors.views import Region, search_regions
@@ -77,7 +72,7 @@ class RfdetrDetector(ThreadedDetector):
         for _, message in cls.check(config, folder, {}):
             raise InputError(message)
         options = RfdetrOptions.read(config)
-        model = load_model(folder / options.model_path, options.read_names(folder), options.threads)
+        model = OnnxModel.load(folder / options.model_path, options.read_names(folder), options.threads)
         return cls(model, config, context, options.class_map)
 
     @staticmethod
