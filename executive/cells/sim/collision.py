@@ -99,11 +99,11 @@ class ClearanceChecker:
             # apart by the margin once. Every other pair must keep the margin.
             self._movement, self._clear_until = 0.0, {}
             load = task.load.object_class if task.load else None
-            reach = self._reach + (load.height + load.radius if load else 0.0)
+            load_size = load.height + load.radius + load.contact_radius if load else 0.0
             start_approaches = self._find_closest_approaches(path[0], task.load)
             start_distances = {pair: approach.distance for pair, approach in start_approaches.items()}
             for q, last_q in zip(path[1:], path, strict=False):
-                self._movement += float(np.abs(q - last_q) @ reach)
+                self._movement += float(np.abs(q - last_q) @ (self._reach + load_size))
                 approaches = self._find_closest_approaches(q, task.load)
                 for pair, approach in approaches.items():
                     min_distance = min(approach.min_distance, start_distances.get(pair, math.inf))
