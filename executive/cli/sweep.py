@@ -105,19 +105,20 @@ def execute_missing_runs(
         is_halted: True after a halt of the comparison; no run is executed.
     """
     from executive.campaign.results.sweep_summary import SweepResults, summarize_runs
+    from executive.campaign.results.tables import ITEMS, PHASES, RUNS
     from executive.campaign.sweep import list_jobs, make_repeat_command, run_sweep
     from executive.cli.progress import print_halt, show_progress
 
     settings = database.settings
     jobs = list_jobs(settings, database.path.parent)
-    stored = {run.job for run in database.read_runs()}
+    stored = {run.job for run in database.read(RUNS)}
     missing = [job for job in jobs if job.index not in stored]
-    if missing and not is_halted:
+    if not is_halted:
         title = f"{name}: {settings.mission}" if name else settings.mission
         with show_progress(title, print_lines=True) as progress:
             run_sweep(
                 missing, database, workers=workers, cluster=cluster, progress=progress, on_halt=print_halt
             )
-    runs, make_command = database.read_runs(), functools.partial(make_repeat_command, settings)
-    summaries = summarize_runs(runs, database.read_phases(), make_command)
-    return SweepResults(name, settings, runs, database.read_items(), summaries, len(jobs))
+    runs, make_command = database.read(RUNS), functools.partial(make_repeat_command, settings)
+    summaries = summarize_runs(runs, database.read(PHASES), make_command)
+    return SweepResults(name, settings, runs, database.read(ITEMS), summaries, len(jobs))

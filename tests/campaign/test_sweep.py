@@ -20,6 +20,7 @@ from executive.campaign.pool import run_jobs
 from executive.campaign.results.database import ResultsDatabase
 from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings
 from executive.campaign.results.run_record import make_record
+from executive.campaign.results.tables import RUNS
 from executive.campaign.sweep import (
     SweepJob,
     list_jobs,
@@ -55,7 +56,7 @@ def swept(folder: Path, work: Callable[[SweepJob], RunRecord], count: int = 4, *
         closing(ResultsDatabase(folder / "a", SETTINGS)) as database,
     ):
         run_sweep(jobs, database, **options)
-        return database.read_runs()
+        return database.read(RUNS)
 
 
 def test_every_seed_is_run_with_every_combination() -> None:

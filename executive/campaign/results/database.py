@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from executive.campaign.results.rows import ItemRow, PhaseRow, RunRecord, RunRow, SweepSettings
+from executive.campaign.results.rows import RunRecord, SweepSettings
 from executive.campaign.results.tables import ITEMS, PHASES, RUNS, SETTINGS, RowT, Table
 from executive.errors import InputError
 
@@ -56,7 +56,7 @@ class ResultsDatabase:
             raise InputError(
                 f'"{path}" is no database of a sweep, or has the schema version {version}; {advice}'
             )
-        (self.settings,) = self._read(SETTINGS)
+        (self.settings,) = self.read(SETTINGS)
 
     def lock(self) -> None:
         """Reserve the sweep for this process until the database is closed; other processes can read the file.
@@ -82,17 +82,10 @@ class ResultsDatabase:
             connection.executemany(ITEMS.insertion_sql, map(ITEMS.encode, record.items))
             connection.executemany(PHASES.insertion_sql, map(PHASES.encode, record.phases))
 
-    def read_runs(self) -> list[RunRow]:
-        """Return the rows of all stored runs, sorted by job."""
-        return self._read(RUNS)
-
-    def read_items(self) -> list[ItemRow]:
-        """Return the rows of all items, sorted by job."""
-        return self._read(ITEMS)
-
-    def read_phases(self) -> list[PhaseRow]:
-        """Return the rows of all phases, sorted by job."""
-        return self._read(PHASES)
+    def read(self, table: Table[RowT]) -> list[RowT]:
+        """Return all rows of a table, sorted by job and in the order of their insertion."""
+        with self._explain_errors(), closing(self._connection.execute(table.selection_sql)) as cursor:
+            return list(map(table.decode, cursor))
 
     def close(self) -> None:
         """Close the file."""
@@ -107,10 +100,6 @@ class ResultsDatabase:
                 connection.execute(table.creation_sql)
             connection.execute(SETTINGS.insertion_sql, SETTINGS.encode(settings))
             connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
-
-    def _read(self, table: Table[RowT]) -> list[RowT]:
-        with self._explain_errors(), closing(self._connection.execute(table.selection_sql)) as cursor:
-            return list(map(table.decode, cursor))
 
     @contextlib.contextmanager
     def _explain_errors(self) -> Iterator[None]:

@@ -33,18 +33,18 @@ def export_tables(database: ResultsDatabase, folder: Path) -> None:
     """
     with convert_os_errors(f'write the tables to "{folder}"', "name another folder with --export DIR"):
         folder.mkdir(parents=True, exist_ok=True)
-        _write(RUNS, database.read_runs(), folder)
-        _write(ITEMS, database.read_items(), folder)
-        _write(PHASES, database.read_phases(), folder)
+        _write(RUNS, database, folder)
+        _write(ITEMS, database, folder)
+        _write(PHASES, database, folder)
 
 
-def _write(table: Table[RowT], rows: list[RowT], folder: Path) -> None:
-    """Write a table to a file."""
+def _write(table: Table[RowT], database: ResultsDatabase, folder: Path) -> None:
+    """Write a table of the database to a file."""
     import pyarrow
     from pyarrow import parquet
 
     types = {"INTEGER": pyarrow.int64(), "REAL": pyarrow.float64(), "TEXT": pyarrow.string()}
     schema = pyarrow.schema([(column.name, types[column.sql_type]) for column in table.columns])
-    values_by_name = [dict(zip(schema.names, table.encode(row), strict=True)) for row in rows]
+    values_by_name = [dict(zip(schema.names, table.encode(row), strict=True)) for row in database.read(table)]
     content = pyarrow.Table.from_pylist(values_by_name, schema)
     parquet.write_table(content, folder / f"{table.name}.parquet")

@@ -17,6 +17,7 @@ import pytest
 
 from executive.campaign.results.rows import RunRow
 from executive.campaign.results.sweep_folder import create_sweep, make_settings
+from executive.campaign.results.tables import ITEMS, RUNS
 from executive.campaign.sweep import list_jobs, run_sweep
 from executive.errors import InputError
 
@@ -63,8 +64,8 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]
 def sweep(folder: Path, **options: object) -> list[RunRow]:
     with closing(create_sweep(make_settings("sort_fruit", SEEDS, FAKE, {}, None, False), folder)) as database:
         run_sweep(list_jobs(database.settings, database.path.parent), database, **options)  # type: ignore[arg-type]
-        assert [row.job for row in database.read_items() if row.state != "placed"] == []
-        return database.read_runs()
+        assert [row.job for row in database.read(ITEMS) if row.state != "placed"] == []
+        return database.read(RUNS)
 
 
 def test_a_killed_worker_costs_only_time(cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,6 +15,7 @@ import pytest
 
 from executive.campaign.results.database import ResultsDatabase, find_database
 from executive.campaign.results.rows import ItemRow, PhaseRow, RunRecord, RunRow, SweepSettings
+from executive.campaign.results.tables import ITEMS, PHASES, RUNS
 from executive.errors import InputError
 from executive.record.audit_comparison import Audit, ItemCounts
 from executive.record.timeline.timeline import PlanningTotals
@@ -43,8 +44,8 @@ def test_all_rows_are_read_as_they_were_stored(tmp_path: Path) -> None:
         database.append(RunRecord(plain))
     with closing(ResultsDatabase(find_database(tmp_path))) as database:
         assert database.settings == SETTINGS
-        assert database.read_runs() == [plain, RUN]
-        assert (database.read_items(), database.read_phases()) == ([ITEM], [PHASE])
+        assert database.read(RUNS) == [plain, RUN]
+        assert (database.read(ITEMS), database.read(PHASES)) == ([ITEM], [PHASE])
     assert [path.name for path in tmp_path.iterdir()] == ["results.sqlite"], "one file contains everything"
 
 
@@ -65,7 +66,7 @@ def test_a_run_is_stored_completely_or_not_at_all(tmp_path: Path) -> None:
             InputError, match=r"cannot be read or written: UNIQUE.* phases\.job, phases\.phase"
         ):
             database.append(replace(RECORD, phases=(PHASE, PHASE)))
-        assert (database.read_runs(), database.read_items()) == ([], [])
+        assert (database.read(RUNS), database.read(ITEMS)) == ([], [])
         database.append(RECORD)
         with pytest.raises(InputError, match=r"UNIQUE constraint failed: runs\.job; runs that were stored"):
             database.append(RECORD)
@@ -83,7 +84,7 @@ os.kill(os.getpid(), signal.SIGKILL)
     ended = subprocess.run([sys.executable, "-c", script], cwd=root, env={**os.environ, "PYTHONPATH": "."})
     assert ended.returncode == -signal.SIGKILL
     with closing(ResultsDatabase(tmp_path / "a")) as database:
-        assert database.read_runs() == [RUN]
+        assert database.read(RUNS) == [RUN]
 
 
 def test_another_file_is_refused(tmp_path: Path) -> None:
@@ -106,7 +107,7 @@ def test_two_processes_do_not_execute_the_same_sweep(tmp_path: Path) -> None:
     with closing(ResultsDatabase(tmp_path / "a", SETTINGS)) as first:
         first.lock()
         with closing(ResultsDatabase(tmp_path / "a")) as second:
-            assert second.read_runs() == [], "it can be read meanwhile"
+            assert second.read(RUNS) == [], "it can be read meanwhile"
             with pytest.raises(InputError, match=r'another process executes the sweep ".*/a"; wait until'):
                 second.lock()
     with closing(ResultsDatabase(tmp_path / "a")) as third:
