@@ -54,7 +54,7 @@ def command(
     with keep_stdout_clean():
         from executive.campaign.results.export import check_exporter, export_tables
         from executive.campaign.results.junit import write_junit
-        from executive.campaign.results.requirement import describe_unmet, parse_requirement
+        from executive.campaign.results.requirement import describe_unmet_comparisons, parse_requirement
         from executive.campaign.results.results_page import write_page
         from executive.campaign.results.sweep_folder import create_sweep, make_settings, open_sweep
         from executive.campaign.sweep import make_repeat_command
@@ -80,7 +80,7 @@ def command(
                 write_junit(junit, results.settings.mission_name, results.runs, make_command)
             if export is not None:
                 export_tables(database, export)
-        unmet = describe_unmet(comparisons, results.runs, results.summaries)
+        unmet = describe_unmet_comparisons(comparisons, results.runs, results.summaries)
         for message in unmet:
             click.echo(message, err=True)
     if as_json:

@@ -77,7 +77,7 @@ def parse_requirement(text: str) -> tuple[Comparison, ...]:
     return tuple(map(_parse_comparison, re.split(r"\band\b", text)))
 
 
-def describe_unmet(
+def describe_unmet_comparisons(
     comparisons: Sequence[Comparison], runs: Sequence[RunRow], summaries: Sequence[VariantSummary]
 ) -> list[str]:
     """Return a message for each comparison that the runs of a variant do not meet."""
