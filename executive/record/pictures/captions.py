@@ -49,16 +49,16 @@ def draw_captions(
 
 
 def place_caption(
-    corner: tuple[int, int], size: tuple[int, int], image_size: tuple[int, int], placed: Sequence[Rectangle]
+    corner: tuple[int, int], size: tuple[int, int], image_size: tuple[int, int], others: Sequence[Rectangle]
 ) -> Rectangle:
-    """Return the place of a caption in the image, near `corner` and beside the captions in `placed`.
+    """Return the rectangle of a caption in the image, near `corner` and beside the other captions.
 
     Arguments are in pixels. If no place near the corner is free, the caption covers other captions.
     """
     (width, height), max_top = size, image_size[1] - size[1]
     left = max(0, min(corner[0], image_size[0] - width))
     preferred_top = max(0, min(corner[1] - height, max_top))
-    obstacles = [each for each in placed if each[0] < left + width + MIN_GAP and left < each[2] + MIN_GAP]
+    obstacles = [each for each in others if each[0] < left + width + MIN_GAP and left < each[2] + MIN_GAP]
     tops = [preferred_top, *(bottom + MIN_GAP for _, _, _, bottom in obstacles)]
     tops += [top - MIN_GAP - height for _, top, _, _ in obstacles]
     free_tops = (

@@ -72,11 +72,11 @@ def _draw_boxes(image: NDArray[np.uint8], content: PictureContent, scale: float)
     """Return `image`, which is already scaled by `scale`, with all boxes; the selected box is drawn last."""
     colours = [to_bgr(choose_class_colour(each.label, content.classes)) for each in content.detections]
     boxes = [[int(side * scale) for side in each.box] for each in content.detections]
-    chosen = content.selected_index
-    layers = [(index, colours[index], LINE_WIDTH) for index in range(len(boxes)) if index != chosen]
-    if chosen is not None:
-        layers.append((chosen, to_bgr(OUTLINE), SELECTED_LINE_WIDTH + 2 * OUTLINE_WIDTH))
-        layers.append((chosen, colours[chosen], SELECTED_LINE_WIDTH))
+    selected = content.selected_index
+    layers = [(index, colours[index], LINE_WIDTH) for index in range(len(boxes)) if index != selected]
+    if selected is not None:
+        layers.append((selected, to_bgr(OUTLINE), SELECTED_LINE_WIDTH + 2 * OUTLINE_WIDTH))
+        layers.append((selected, colours[selected], SELECTED_LINE_WIDTH))
     for index, colour, line_width in layers:
         left, top, right, bottom = boxes[index]
         cv2.rectangle(image, (left, top), (right, bottom), colour, line_width)
