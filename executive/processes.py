@@ -44,12 +44,17 @@ class WorkerPool(ProcessPoolExecutor):
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
+    def kill(self) -> None:
+        """Kill the processes of the pool; the pool is unusable afterwards."""
+        for process in list((self._processes or {}).values()):
+            process.kill()
+
     def __exit__(
         self, cls: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> bool | None:
         """Wait for all submitted calls; after an exception, kill the processes instead."""
         if error is not None:
-            kill_workers()
+            self.kill()
         return super().__exit__(cls, error, traceback)
 
 

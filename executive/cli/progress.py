@@ -87,5 +87,10 @@ def report_polygons(folder: Path) -> None:
 
 
 def print_halt() -> None:
-    """Print the consequences of the received Ctrl-C or SIGTERM."""
+    """Print the consequences of the received Ctrl-C or SIGTERM for runs on this computer."""
     click.echo("halting: no new runs start; current runs halt; press Ctrl-C again to quit at once", err=True)
+
+
+def print_cancellation() -> None:
+    """Print the consequences of the received Ctrl-C or SIGTERM for runs on a cluster."""
+    click.echo("halting: no new runs start; current runs on the cluster are cancelled", err=True)

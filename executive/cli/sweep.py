@@ -107,7 +107,7 @@ def execute_missing_runs(
     from executive.campaign.results.sweep_summary import SweepResults, summarize_runs
     from executive.campaign.results.tables import ITEMS, PHASES, RUNS
     from executive.campaign.sweep import list_jobs, make_repeat_command, run_sweep
-    from executive.cli.progress import print_halt, show_progress
+    from executive.cli.progress import print_cancellation, print_halt, show_progress
 
     settings = database.settings
     jobs = list_jobs(settings, database.path.parent)
@@ -117,8 +117,9 @@ def execute_missing_runs(
         title = f"{name}: {settings.mission}" if name else settings.mission
         with show_progress(title, print_lines=True) as progress:
             run_sweep(
-                missing, database, workers=workers, cluster=cluster, progress=progress, on_halt=print_halt
-            )
+                missing, database, workers=workers, cluster=cluster, progress=progress,
+                on_halt=print_halt if cluster is None else print_cancellation,
+            )  # fmt: skip
     runs, make_command = database.read(RUNS), functools.partial(make_repeat_command, settings)
     summaries = summarize_runs(runs, database.read(PHASES), make_command)
     return SweepResults(name, settings, runs, database.read(ITEMS), summaries, len(jobs))

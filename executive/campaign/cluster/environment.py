@@ -1,4 +1,4 @@
-"""Comparison of the software of this computer with the software of a worker: equal software, equal traces."""
+"""Comparison of the software of client and worker; only the same software produces the same traces."""
 
 from __future__ import annotations
 
@@ -6,33 +6,55 @@ import functools
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import executive
+from executive.errors import InputError
 from executive.mission.text.file_search import get_shipped_folder
 from executive.run.versions import find_version, list_requirements, list_versions
 
+if TYPE_CHECKING:
+    from distributed import Worker
+
 CLUSTER_EXTRA = "cluster"
 """Extra of this project with the packages for the connection to a scheduler."""
-FILES_KEY = "files of executive"
-"""Key of the hash of the files of this project, whose version number does not change with each commit."""
+FILES_KEY = "hash of the files of executive"
+"""Key of the hash of the files of this project. The version number is the same for many commits."""
 HASHED_SUFFIXES = (".py", ".yaml", ".onnx")
 """Suffixes of the files that are hashed: code, shipped missions and cells, and models."""
+INSTALLATION_ADVICE = "install the same versions there, and start the scheduler and its workers again"
+"""Advice to the user of a worker with other software."""
 
 
 @functools.cache
 def describe_environment() -> Mapping[str, str]:
     """Return versions by name, and a hash of the code, missions and models of this project."""
-    versions = {name: find_version(name) for name in list_requirements(CLUSTER_EXTRA)}
-    return MappingProxyType({**list_versions(), **versions, FILES_KEY: _hash_files()})
+    cluster_versions = {name: find_version(name) for name in list_requirements(CLUSTER_EXTRA)}
+    return {**list_versions(), **cluster_versions, FILES_KEY: _hash_files()}
 
 
-def describe_differences(here: Mapping[str, str], there: Mapping[str, str]) -> str:
-    """Return a text with the different properties of this computer and another computer, or ""."""
-    pairs = {name: (there.get(name, "missing"), here.get(name, "none")) for name in (*here, *there)}
-    return ", ".join(
-        f"{name} {one} instead of {other}" for name, (one, other) in pairs.items() if one != other
-    )
+def describe_differences(client_versions: Mapping[str, str], worker_versions: Mapping[str, str]) -> str:
+    """Return the versions that differ between client and worker as text, "" if all are equal."""
+    differences: list[str] = []
+    for name in {**client_versions, **worker_versions}:
+        worker_version = worker_versions.get(name, "missing")
+        client_version = client_versions.get(name, "none")
+        if worker_version != client_version:
+            differences.append(f"{name} {worker_version} instead of {client_version}")
+    return ", ".join(differences)
+
+
+def check_environment(client_versions: Mapping[str, str], dask_worker: Worker) -> None:
+    """Compare the software of the client with the software of this worker.
+
+    Raises:
+        InputError: The software differs.
+    """
+    if differences := describe_differences(client_versions, describe_environment()):
+        worker = f"the worker {dask_worker.address}"
+        raise InputError(
+            f"the software of {worker} differs from this computer: {differences}; {INSTALLATION_ADVICE}"
+        )
 
 
 def _hash_files() -> str:

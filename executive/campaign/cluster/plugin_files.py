@@ -11,18 +11,20 @@ from packaging.utils import canonicalize_name
 
 from executive.errors import InputError
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
-from executive.plugins import CELL_KIND_GROUP, SKILL_GROUP, find_project
+from executive.plugins import CELL_KIND_GROUP, SKILL_GROUP, list_entries
 from executive.run.versions import DISTRIBUTION
-from executive.tree.node_registry import ENTRY_POINT_GROUP
+from executive.tree.node_registry import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
 
-PLUGIN_GROUPS = (SKILL_GROUP, ENTRY_POINT_GROUP, DETECTOR_GROUP, CELL_KIND_GROUP)
+PLUGIN_GROUPS = (SKILL_GROUP, CONTROL_NODE_GROUP, DETECTOR_GROUP, CELL_KIND_GROUP)
 """Groups of entry points with which a package extends this project."""
+PROJECT_PACKAGES = ("executive", "skills")
+"""Top-level packages of this project, which each worker has."""
 METADATA_FILES = ("METADATA", "entry_points.txt")
 """Files of a `dist-info` folder from which Python reads the entry points of a package."""
 
 
 def list_plugin_files() -> Iterator[tuple[str, bytes]]:
-    """Yield path and content of each file that a worker needs to find the parts of other packages.
+    """Yield path and content of each file that a worker needs to load the plugins of other packages.
 
     The paths are relative to a folder of Python's search path. The packages on which the other packages
     depend are not included.
@@ -30,18 +32,16 @@ def list_plugin_files() -> Iterator[tuple[str, bytes]]:
     Raises:
         InputError: The module of an entry point does not exist.
     """
-    class_paths: list[str] = []
     for distribution in distributions():
         name = canonicalize_name(distribution.name)
-        values = [each.value for each in distribution.entry_points if each.group in PLUGIN_GROUPS]
-        if values and name != DISTRIBUTION:
-            class_paths += values
+        is_plugin = any(entry.group in PLUGIN_GROUPS for entry in distribution.entry_points)
+        if is_plugin and name != DISTRIBUTION:
             folder = f"{name.replace('-', '_')}-{distribution.version}.dist-info"
             for file in METADATA_FILES:
                 yield f"{folder}/{file}", (distribution.read_text(file) or "").encode()
-    if (project := find_project()) is not None and canonicalize_name(project.name) != DISTRIBUTION:
-        class_paths += (value for group in PLUGIN_GROUPS for value in project.read_entries(group).values())
-    for module in sorted({path.partition(":")[0].partition(".")[0] for path in class_paths}):
+    entries = (entry for group in PLUGIN_GROUPS for entry in list_entries(group, "plugin").values())
+    modules = {entry.value.partition(":")[0].partition(".")[0] for entry in entries}
+    for module in sorted(modules.difference(PROJECT_PACKAGES)):
         yield from _list_module_files(module)
 
 

@@ -1,8 +1,9 @@
-"""Run directory that a worker returned: the files are unpacked with the paths of this computer."""
+"""Run directory that a worker returns: packing on the worker, and unpacking on the client."""
 
 from __future__ import annotations
 
 import io
+import shutil
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,36 +15,45 @@ from executive.record.run_directory import convert_os_errors, make_unique_folder
 
 TEXT_SUFFIXES = (".html", ".json", ".jsonl", ".yaml")
 """Suffixes of the files that may contain paths."""
-RECORD_ADAPTER = TypeAdapter(RunRecord)
+_RECORD_ADAPTER = TypeAdapter(RunRecord)
 """Encoder and decoder of the record of a run; JSON represents each floating-point number exactly."""
 
 
 @dataclass(frozen=True)
-class JobOutput:
-    """Output of a job.
+class ReturnedRun:
+    """A run that a worker returns.
 
     Attributes:
-        root: Folder of the bundle on the worker; the output contains absolute paths below this folder.
-        record: Record of the run as JSON; "" after an exception.
-        error: Message of the exception, or "".
+        root: Folder of the unpacked bundle on the worker. A path on the worker is `root` followed by the path
+            on the client.
+        record: Record of the run as JSON.
         run_directory: Zip file with the files of the run directory; empty if there is no run directory.
     """
 
     root: str
-    record: str = ""
-    error: str = ""
-    run_directory: bytes = b""
+    record: str
+    run_directory: bytes
 
 
-def unpack_returned_run(output: JobOutput) -> RunRecord:
-    """Write the run directory of a job, and return the record of the run with the path of the directory.
+def pack_run(record: RunRecord, root: Path) -> ReturnedRun:
+    """Return a run, and delete its run directory on the worker."""
+    content = b""
+    if record.run.run:
+        archive = Path(shutil.make_archive(record.run.run, "zip", record.run.run))
+        content = archive.read_bytes()
+        archive.unlink()
+        shutil.rmtree(record.run.run)
+    return ReturnedRun(str(root), _RECORD_ADAPTER.dump_json(record).decode(), content)
+
+
+def unpack_run(returned: ReturnedRun) -> RunRecord:
+    """Write the run directory, and return the record; both contain the paths on the client.
 
     Raises:
         InputError: A file cannot be written.
     """
-    # Below the folder of the bundle, a worker has the paths of this computer.
-    text = output.record.replace(output.root, "")
-    record = RECORD_ADAPTER.validate_json(text)
+    text = returned.record.replace(returned.root, "")
+    record = _RECORD_ADAPTER.validate_json(text)
     if not record.run.run:
         return record
     folder = Path(record.run.run)
@@ -51,9 +61,9 @@ def unpack_returned_run(output: JobOutput) -> RunRecord:
         folder.parent.mkdir(parents=True, exist_ok=True)
         # Runs of two workers may have the same name.
         path = make_unique_folder(folder.parent, folder.name)
-        with zipfile.ZipFile(io.BytesIO(output.run_directory)) as archive:
+        with zipfile.ZipFile(io.BytesIO(returned.run_directory)) as archive:
             archive.extractall(path)
         for file in (file for file in path.rglob("*") if file.suffix in TEXT_SUFFIXES):
-            content = file.read_bytes().replace(output.root.encode(), b"")
+            content = file.read_bytes().replace(returned.root.encode(), b"")
             file.write_bytes(content.replace(bytes(folder), bytes(path)))
-    return RECORD_ADAPTER.validate_json(text.replace(str(folder), str(path)))
+    return _RECORD_ADAPTER.validate_json(text.replace(str(folder), str(path)))

@@ -1,92 +1,116 @@
-"""Part of the cluster on the workers: a plugin of dask that unpacks a bundle and executes jobs there."""
+"""Worker side of the cluster execution: a dask plugin that unpacks a bundle and executes jobs."""
 
 from __future__ import annotations
 
+import io
+import multiprocessing
 import os
-import pickle
 import shutil
-import subprocess
+import sys
 import tempfile
 import threading
+import uuid
+import zipfile
 from collections.abc import Mapping
 from concurrent.futures import BrokenExecutor
+from dataclasses import replace
 from pathlib import Path
 
 from distributed import Worker, WorkerPlugin, get_worker
 
-from executive.campaign.cluster.bundle import PACKAGES_FOLDER, Bundle, make_relative
-from executive.campaign.cluster.environment import describe_differences, describe_environment
-from executive.campaign.cluster.returned_run import JobOutput
-from executive.errors import InputError
-from executive.processes import THREAD_COUNT_VARIABLES, build_command
+from executive.campaign.cluster.bundle import PACKAGES_FOLDER
+from executive.campaign.cluster.environment import check_environment
+from executive.campaign.cluster.returned_run import ReturnedRun, pack_run
+from executive.campaign.sweep import SweepJob, make_fault_record, run_job
+from executive.processes import WorkerPool
 
 
 class BundlePlugin(WorkerPlugin):
-    """A plugin with a bundle; a worker that joins later gets the plugin, too.
+    """A plugin with a bundle; a worker that joins later also receives the plugin.
 
     Args:
-        bundle: Files for the jobs.
-        name: Name of the plugin, unique in the cluster.
-        environment: Software of the client.
+        bundle: Zip file with the files that the jobs read.
+        client_versions: Software of the client.
     """
 
-    def __init__(self, bundle: Bundle, name: str, environment: Mapping[str, str]) -> None:
-        self.name, self._bundle, self._environment = name, bundle, dict(environment)
+    def __init__(self, bundle: bytes, client_versions: Mapping[str, str]) -> None:
+        self.name = f"executive-{uuid.uuid4()}"
+        self.client_versions = client_versions
+        self._bundle, self._working_directory = bundle, Path.cwd()
 
     def setup(self, worker: Worker) -> None:
         """Unpack the bundle into a temporary folder of the worker."""
-        folder = tempfile.mkdtemp(prefix=f"executive-{self._bundle.hash}-", dir=worker.local_directory)
-        self._root = Path(folder).resolve()
-        self._bundle.unpack(self._root)
-        # A worker with several threads executes one job at a time, because a job is a process of its own.
+        self._root = Path(tempfile.mkdtemp(prefix="executive-", dir=worker.local_directory)).resolve()
+        with zipfile.ZipFile(io.BytesIO(self._bundle)) as archive:
+            archive.extractall(self._root)
+        # A dask nanny starts its worker as a daemon process, and a daemon process may not start a process.
+        multiprocessing.current_process().daemon = False
+        # A run may crash its process; the worker survives. All threads of the worker share one process.
         self._lock = threading.Lock()
-        self._process: subprocess.Popen[bytes] | None = None
+        self._pool: WorkerPool | None = WorkerPool(1)
 
     def teardown(self, worker: Worker) -> None:
         """Kill the process of the jobs, and delete the folder."""
         del worker
-        if self._process is not None:
-            self._process.kill()
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            pool.kill()
         shutil.rmtree(self._root, ignore_errors=True)
 
-    def execute(self, call: bytes) -> JobOutput:
-        """Execute a pickled pair of function and job in the process of the plugin.
+    def execute(self, job: SweepJob) -> ReturnedRun:
+        """Execute a job in the process of the plugin.
 
         Raises:
             BrokenExecutor: The process died.
-            InputError: The software of this worker differs from the software of the client.
         """
-        if differences := describe_differences(self._environment, describe_environment()):
-            raise InputError(f"a worker has other software than this computer: {differences}")
         with self._lock:
-            process = self._process = self._process or self._start_process()
-            assert process.stdin is not None and process.stdout is not None
+            assert self._pool is not None, "The plugin was removed."
             try:
-                process.stdin.write(call)
-                process.stdin.flush()
-                output: JobOutput = pickle.load(process.stdout)
-            except (EOFError, OSError, pickle.UnpicklingError):
-                process.kill()
-                self._process = None
-                raise BrokenExecutor(f"the process of the run died with code {process.wait()}") from None
-            return output
-
-    def _start_process(self) -> subprocess.Popen[bytes]:
-        """Start the process in the working directory of the client below the folder of the bundle."""
-        threads = dict.fromkeys(THREAD_COUNT_VARIABLES, "1")
-        search_path = filter(None, (str(self._root / PACKAGES_FOLDER), os.environ.get("PYTHONPATH")))
-        return subprocess.Popen(
-            build_command("executive.campaign.cluster.job_process", str(self._root)),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            cwd=self._root / make_relative(self._bundle.working_directory),
-            env={**threads, **os.environ, "PYTHONPATH": os.pathsep.join(search_path)},
-            start_new_session=True,  # Ctrl-C at the terminal of the worker must not halt a run.
-        )
+                return self._pool.submit(_execute_job, job, self._root, self._working_directory).result()
+            except BrokenExecutor:
+                self._pool = self._pool and WorkerPool(1)
+                raise
 
 
-def execute_on_worker(plugin: str, call: bytes) -> JobOutput:
-    """Execute a pickled pair of function and job on this worker with the plugin of this name."""
-    bundle_plugin = get_worker().plugins[plugin]
-    assert isinstance(bundle_plugin, BundlePlugin)
-    return bundle_plugin.execute(call)
+def execute_on_worker(plugin_name: str, job: SweepJob) -> ReturnedRun:
+    """Execute a job on this worker with the plugin of this name.
+
+    Raises:
+        BrokenExecutor: The process of the job died.
+        InputError: The software of this worker differs from the software of the client.
+    """
+    worker = get_worker()
+    plugin = worker.plugins[plugin_name]
+    assert isinstance(plugin, BundlePlugin)
+    check_environment(plugin.client_versions, worker)
+    return plugin.execute(job)
+
+
+def _execute_job(job: SweepJob, root: Path, working_directory: Path) -> ReturnedRun:
+    """Execute a job in the working directory of the client below `root`, the folder of the bundle."""
+    # In a process group of its own, the process receives no Ctrl-C from the terminal of the worker.
+    os.setpgid(0, 0)
+    worker_directory = _make_worker_path(root, working_directory)
+    worker_directory.mkdir(parents=True, exist_ok=True)
+    os.chdir(worker_directory)
+    packages = str(root / PACKAGES_FOLDER)
+    if packages not in sys.path:
+        sys.path.insert(0, packages)
+        search_path = filter(None, (packages, os.environ.get("PYTHONPATH")))
+        os.environ["PYTHONPATH"] = os.pathsep.join(search_path)
+    settings = job.settings
+    settings = replace(
+        settings,
+        mission=str(_make_worker_path(root, Path(settings.mission))),
+        scene=settings.scene and _make_worker_path(root, settings.scene),
+    )
+    job = replace(job, settings=settings, runs_folder=_make_worker_path(root, job.runs_folder))
+    try:
+        return pack_run(run_job(job), root)
+    except Exception as error:
+        return pack_run(make_fault_record(job, error), root)
+
+
+def _make_worker_path(root: Path, path: Path) -> Path:
+    """Return `root` joined with an absolute path without its leading slash, or a relative path as it is."""
+    return root / path.relative_to(path.anchor) if path.is_absolute() else path
