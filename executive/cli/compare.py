@@ -33,7 +33,7 @@ def command(
     A and B are files or names of shipped missions. A single mission is used as A and as
     B, and --set-a and --set-b state the difference. The results of both are stored in a/results.sqlite and
     b/results.sqlite in a folder below --runs. The intervals contain the difference with a confidence of 95 %.
-    Ctrl-C halts the current runs; then the results of the complete pairs are printed.
+    Ctrl-C ends the current runs; then the results of the complete pairs are printed.
     """
     options.check_resume(
         ctx, has_runs=len(missions) in (1, 2) and seeds is not None,

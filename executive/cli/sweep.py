@@ -43,7 +43,7 @@ def command(
 
     MISSION is a file or the name of a shipped mission. A new folder below --runs contains results.sqlite, the
     page, and the run directories. A run gets a report if it did not succeed or if the audit disagrees;
-    `executive report` writes the report of another run. Exit code 1 if --require is not met. Ctrl-C halts the
+    `executive report` writes the report of another run. Exit code 1 if --require is not met. Ctrl-C ends the
     current runs; then the results of the complete runs are printed. A second Ctrl-C quits immediately.
     """
     options.check_resume(
