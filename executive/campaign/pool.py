@@ -21,7 +21,7 @@ JobResult = TypeVar("JobResult")
 MAX_HALT_DELAY = 0.1
 """Maximum time between a signal to this process and the signals to its workers [s]."""
 MAX_CRASHES = 2
-"""Number of deaths of worker processes during one job at which the job has failed."""
+"""Number of worker processes that have died during a job when the job counts as failed."""
 
 
 def run_jobs(

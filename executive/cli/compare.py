@@ -32,7 +32,7 @@ def command(
 
     A and B are files or names of shipped missions. A single mission is used as A and as
     B, and --set-a and --set-b state the difference. The results of both are stored in a/results.sqlite and
-    b/results.sqlite in a folder below --runs. The intervals contain the difference with a confidence of 95 %.
+    b/results.sqlite in a folder below --runs. Each difference has a 95 % confidence interval.
     Ctrl-C ends the current runs; then the results of the complete pairs are printed.
     """
     options.check_resume(
@@ -60,7 +60,7 @@ def command(
             databases = create_comparison(settings, runs)
         sweeps: list[SweepResults] = []
         for name, database in zip("AB", databases, strict=True):
-            is_halted = any(sweep.is_halted for sweep in sweeps)
+            is_halted = any(sweep.is_incomplete for sweep in sweeps)
             with closing(database):
                 sweeps.append(execute_missing_runs(database, name, workers, cluster, is_halted=is_halted))
         pairs = pair_runs(sweeps[0].runs, sweeps[1].runs)
@@ -76,4 +76,4 @@ def command(
             "pairs": len(pairs), "differences": differences, "changed": changed,
             "summaries": [summary for sweep in sweeps for summary in sweep.summaries],
         }))  # fmt: skip
-    return ExitCode.HALTED if any(sweep.is_halted for sweep in sweeps) else ExitCode.SUCCESS
+    return ExitCode.HALTED if any(sweep.is_incomplete for sweep in sweeps) else ExitCode.SUCCESS

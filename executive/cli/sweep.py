@@ -42,9 +42,10 @@ def command(
     """Run a mission once for every seed and variant, and summarize the runs.
 
     MISSION is a file or the name of a shipped mission. A new folder below --runs contains results.sqlite, the
-    page, and the run directories. A run gets a report if it did not succeed or if the audit disagrees;
-    `executive report` writes the report of another run. Exit code 1 if --require is not met. Ctrl-C ends the
-    current runs; then the results of the complete runs are printed. A second Ctrl-C quits immediately.
+    page results.html, and the run directories. A run gets a report if it did not succeed or if the audit
+    disagrees; `executive report` writes the report of another run. Exit code 1 if --require is not met.
+    Ctrl-C ends the current runs; then the results of the complete runs are printed. A second Ctrl-C quits
+    immediately.
     """
     options.check_resume(
         ctx, has_runs=None not in (mission, seeds), runs_text="a MISSION and --seeds, or --resume SWEEP",
@@ -54,14 +55,14 @@ def command(
     with keep_stdout_clean():
         from executive.campaign.results.export import check_exporter, export_tables
         from executive.campaign.results.junit import write_junit
-        from executive.campaign.results.requirement import describe_unmet_comparisons, parse_requirement
+        from executive.campaign.results.requirement import describe_unmet_conditions, parse_requirement
         from executive.campaign.results.results_page import write_page
         from executive.campaign.results.sweep_folder import create_sweep, make_settings, open_sweep
         from executive.campaign.sweep import make_repeat_command
         from executive.cell.json_values import to_json
         from executive.cli.sweep_tables import print_summary
 
-        comparisons = parse_requirement(require) if require else ()
+        conditions = parse_requirement(require) if require else ()
         if export is not None:
             check_exporter()
         if resume is not None:
@@ -80,16 +81,16 @@ def command(
                 write_junit(junit, results.settings.mission_name, results.runs, make_command)
             if export is not None:
                 export_tables(database, export)
-        unmet = describe_unmet_comparisons(comparisons, results.runs, results.summaries)
+        unmet = describe_unmet_conditions(conditions, results.runs, results.summaries)
         for message in unmet:
             click.echo(message, err=True)
     if as_json:
         print_json(to_json({
             "settings": results.settings, "results": str(database.path), "page": str(page),
-            "asked": results.planned_run_count, "cut_off": results.is_halted, "variants": results.summaries,
-            "unmet": unmet, "runs": results.runs,
+            "asked": results.planned_run_count, "cut_off": results.is_incomplete,
+            "variants": results.summaries, "unmet": unmet, "runs": results.runs,
         }))  # fmt: skip
-    return ExitCode.HALTED if results.is_halted else ExitCode(int(bool(unmet)))
+    return ExitCode.HALTED if results.is_incomplete else ExitCode(int(bool(unmet)))
 
 
 def execute_missing_runs(

@@ -14,7 +14,7 @@ def sort_by_tour(cell: Cell, targets: Sequence[Target]) -> list[Target]:
     """Return pickable targets, sorted by the length of the tour that begins with each target, shortest first.
 
     A tour leads from the destination of the arm to the first target, and from the bin of each target to the
-    next one, which is the nearest. The transports from the targets to their bins are not counted, because
+    nearest of the remaining targets. The transports from the targets to their bins are not counted, because
     their total length is the same in all tours.
     """
     places = [cell.bins[choose_bin(cell, target.item)].position for target in targets]

@@ -40,8 +40,8 @@ REFINEMENT_STEP_COUNT = 8
 EXTRA_HEIGHTS = (0.0, 0.05, 0.10)
 """Heights of the via points above the travel height, in the order of the attempts [m]."""
 MAX_DURATION_FACTOR = 1.1
-"""Maximum ratio of the duration of a motion to the cost of the next detour. A slower motion is yielded only
-after the next detour has been refined, because the refined detour may be faster."""
+"""A motion is yielded if its duration is at most this multiple of the cost of the next detour. Else the next
+detour is refined first, because it may be faster."""
 LIFT_OFF_DISTANCE = 5e-4
 """Length of the straight motion upwards that separates a load from the surface below [m]."""
 MIN_RISE_COSINE = 0.99
@@ -136,7 +136,7 @@ class MotionSearch:
             while motions and motions[0][0] <= _compute_total_cost(candidate, optimizer):
                 yield motions.pop(0)[1]
             motions = sorted([*motions, *self._build_detours(candidate, optimizer)], key=itemgetter(0))
-            # A detour may take much longer than the cost of its optimizer.
+            # A detour may take longer than the cost of its optimizer; then the next detour is refined first.
             while motions and motions[0][0] <= MAX_DURATION_FACTOR * next_cost:
                 yield motions.pop(0)[1]
         yield from (motion for _, motion in motions)
@@ -147,7 +147,7 @@ class MotionSearch:
         """Yield two detours as pairs `(duration [s], motion)`.
 
         The first detour passes the states of the optimizer in minimum time, the second one with the timing of
-        the optimizer. The duration is the duration after a slowdown for the load; the motion is not slower.
+        the optimizer. The duration includes the slowdown for the load; the motion is not slowed down.
         """
         for keeps_timing in (False, True):
             with contextlib.suppress(JointLimitError):

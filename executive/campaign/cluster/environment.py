@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 CLUSTER_EXTRA = "cluster"
 """Extra of this project with the packages for the connection to a scheduler."""
 FILES_KEY = "hash of the files of executive"
-"""Key of the hash of the files of this project. The version number is the same for many commits."""
+"""Key of the hash of this project's files, which differs for commits with the same version number."""
 HASHED_SUFFIXES = (".py", ".yaml", ".onnx")
 """Suffixes of the files that are hashed: code, shipped missions and cells, and models."""
 INSTALLATION_ADVICE = "install the same versions there, and start the scheduler and its workers again"

@@ -23,14 +23,14 @@ LOCK_TIMEOUT = 60.0
 
 
 class ResultsDatabase:
-    """An open database; each run is stored in one transaction, and later readers see only complete runs.
+    """An open database; each run is stored in one transaction, so that no program reads a part of a run.
 
     The file has a rollback journal, because a write-ahead log would need two more files and shared memory,
     which network file systems do not have.
 
     Args:
         path: The file.
-        settings: Settings of a new database, which is created; None: open an existing database.
+        settings: Settings with which the database is created; None to open an existing database.
 
     Attributes:
         path: The file.
@@ -83,7 +83,7 @@ class ResultsDatabase:
             connection.executemany(PHASES.insertion_sql, map(PHASES.encode, record.phases))
 
     def read(self, table: Table[RowT]) -> list[RowT]:
-        """Return all rows of a table, sorted by job and in the order of their insertion."""
+        """Return all rows of a table, sorted by the first column of the key, then by insertion."""
         with self._explain_errors(), closing(self._connection.execute(table.selection_sql)) as cursor:
             return list(map(table.decode, cursor))
 
@@ -113,6 +113,6 @@ class ResultsDatabase:
             ) from error
 
 
-def find_database(path: Path) -> Path:
-    """Return the database at a path: the file itself, or the file in the folder of a sweep."""
+def get_database_path(path: Path) -> Path:
+    """Return the path of the database: `path`, or the file in it if `path` is a folder."""
     return path / FILE_NAME if path.is_dir() else path

@@ -57,7 +57,11 @@ def pair_runs(runs_a: Sequence[RunRow], runs_b: Sequence[RunRow]) -> list[RunPai
 
 
 def compute_differences(pairs: Sequence[RunPair]) -> list[Difference]:
-    """Return the differences in success rate, throughput, and robot time of the pairs with two successes."""
+    """Return the differences in success rate, throughput, and robot time.
+
+    Success rate and throughput are computed from all pairs, the robot time from the pairs in which both runs
+    succeed.
+    """
     both_succeeded = [pair for pair in pairs if pair.a.is_success and pair.b.is_success]
     return [
         _estimate_difference("success", [(pair.a.is_success, 1, pair.b.is_success, 1) for pair in pairs]),

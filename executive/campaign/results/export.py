@@ -45,6 +45,6 @@ def _write(table: Table[RowT], database: ResultsDatabase, folder: Path) -> None:
 
     types = {"INTEGER": pyarrow.int64(), "REAL": pyarrow.float64(), "TEXT": pyarrow.string()}
     schema = pyarrow.schema([(column.name, types[column.sql_type]) for column in table.columns])
-    values_by_name = [dict(zip(schema.names, table.encode(row), strict=True)) for row in database.read(table)]
-    content = pyarrow.Table.from_pylist(values_by_name, schema)
+    rows = [dict(zip(schema.names, table.encode(row), strict=True)) for row in database.read(table)]
+    content = pyarrow.Table.from_pylist(rows, schema)
     parquet.write_table(content, folder / f"{table.name}.parquet")

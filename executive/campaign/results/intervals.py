@@ -38,7 +38,7 @@ def estimate_proportion(successes: int, total: int) -> Estimate:
     """Return the proportion successes / total with its Wilson score interval."""
     if total == 0:
         return Estimate(successes, total)
-    from scipy.stats import binomtest  # Imported here, because workers do not need the import of 0.5 s.
+    from scipy.stats import binomtest  # Imported here, because the import takes 0.5 s.
 
     interval = binomtest(successes, total).proportion_ci(method="wilson")
     return Estimate(successes, total, successes / total, float(interval.low), float(interval.high))

@@ -29,20 +29,20 @@ _COLUMN_INDICES = {
     if column.sql_type != "TEXT" and column.name not in ("job", "seed")
 }
 """Index of each column with numbers in an encoded `RunRow`, by name."""
-_COMPARISON = re.compile(
+_CONDITION = re.compile(
     r"\s*(\w+)\s*(?:\(\s*(\w+)\s*\))?\s*([<>]=?)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 )
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Condition:
     """A metric that is compared with a number.
 
     Attributes:
         name: Metric of a variant, or statistic of `column` over the runs.
         column: Column of the runs; "" for a metric of a variant.
         symbol: Key of `OPERATORS`.
-        limit: The number.
+        limit: Number with which the metric is compared.
     """
 
     name: str
@@ -63,39 +63,39 @@ class Comparison:
         return float(np.mean(numbers) if percentile is None else np.percentile(numbers, percentile))
 
     def __str__(self) -> str:
-        """Return the text of the comparison."""
+        """Return the text of the condition."""
         metric = f"{self.name}({self.column})" if self.column else self.name
         return f"{metric}{self.symbol}{self.limit:g}"
 
 
-def parse_requirement(text: str) -> tuple[Comparison, ...]:
-    """Return the comparisons in a text that joins comparisons with `and`.
+def parse_requirement(text: str) -> tuple[Condition, ...]:
+    """Return the conditions in a text that joins them with `and`.
 
     Raises:
         InputError: The text contains something else, or an unknown metric, statistic or column.
     """
-    return tuple(map(_parse_comparison, re.split(r"\band\b", text)))
+    return tuple(map(_parse_condition, re.split(r"\band\b", text)))
 
 
-def describe_unmet_comparisons(
-    comparisons: Sequence[Comparison], runs: Sequence[RunRow], summaries: Sequence[VariantSummary]
+def describe_unmet_conditions(
+    conditions: Sequence[Condition], runs: Sequence[RunRow], summaries: Sequence[VariantSummary]
 ) -> list[str]:
-    """Return a message for each comparison that the runs of a variant do not meet."""
+    """Return a message for each condition that the runs of a variant do not meet."""
     messages = [] if summaries else ["no run has ended"]
     for summary in summaries:
         variant_runs = [run for run in runs if run.variant == summary.variant]
         name = describe_variant(summary.variant)
-        for comparison in comparisons:
-            value = comparison.compute_value(variant_runs, summary)
-            if value is None or not OPERATORS[comparison.symbol](value, comparison.limit):
+        for condition in conditions:
+            value = condition.compute_value(variant_runs, summary)
+            if value is None or not OPERATORS[condition.symbol](value, condition.limit):
                 found = "no run has a value" if value is None else f"the value is {value:.6g}"
-                messages.append(f"{comparison} is not met{name and f' with {name}'}: {found}")
+                messages.append(f"{condition} is not met{name and f' with {name}'}: {found}")
     return messages
 
 
-def _parse_comparison(text: str) -> Comparison:
-    """Return a comparison from its text."""
-    match = _COMPARISON.fullmatch(text)
+def _parse_condition(text: str) -> Condition:
+    """Return a condition from its text."""
+    match = _CONDITION.fullmatch(text)
     if match is None:
         raise InputError(
             f'"{text.strip()}" is no comparison of a metric with a number; write for example '
@@ -109,4 +109,4 @@ def _parse_comparison(text: str) -> Comparison:
         raise InputError(
             f'runs have no column "{column}" with numbers; they have {", ".join(_COLUMN_INDICES)}'
         )
-    return Comparison(metric, column, match[3], float(match[4]))
+    return Condition(metric, column, match[3], float(match[4]))

@@ -29,10 +29,10 @@ MAX_LISTED_RUNS = 500
 
 @dataclass(frozen=True)
 class Group:
-    """Runs of one variant of a sweep, which are one column in each table of the page.
+    """Runs of one variant of a sweep; each table of the page has one column per group.
 
     Attributes:
-        label: `A` or `B` in a comparison, and values of the variant, or `all runs`.
+        label: Name of the sweep (`A` or `B` in a comparison) and values of the variant; else `all runs`.
         summary: Summary of the runs.
         robot_times: Duration of each run [s].
         object_times: Time during which each placed object was the selected target [s].
@@ -131,7 +131,7 @@ def _make_link(run_directory: str, folder: Path) -> str:
 
 
 def write_missing_reports(pairs: Sequence[RunPair]) -> None:
-    """Write the report of each run with a run directory in which the report is missing."""
+    """Write the report of each run that has a run directory without a report."""
     for run in (run for pair in pairs for run in (pair.a, pair.b)):
         if run.run and not RunDirectory(Path(run.run)).report.is_file():
             try_write_report(run.run)

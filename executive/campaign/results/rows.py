@@ -131,7 +131,7 @@ class ItemRow(Row):
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseRow(Row):
-    """All activations of one skill in a run; the time of a run is divided into these phases."""
+    """All activations of one skill in a run."""
 
     job: int
     """Index of the run."""

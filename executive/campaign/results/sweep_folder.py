@@ -9,7 +9,7 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from executive.campaign.results.database import FILE_NAME, ResultsDatabase, find_database
+from executive.campaign.results.database import FILE_NAME, ResultsDatabase, get_database_path
 from executive.campaign.results.rows import SweepSettings
 from executive.cells.sim.scene_file import load_scene
 from executive.errors import InputError
@@ -53,7 +53,7 @@ def make_settings(
         mission: Mission file, or name of a shipped mission.
         seeds: Seeds of each variant.
         overrides: Values of params of the mission and keys of the cell, as given with `--set`.
-        variations: Values as given with `--vary`, by the same names.
+        variations: Values of `--vary`, by param of the mission or key of the cell.
         scene: Scene file; None: no change of the simulated world.
         saves_pictures: True to save the images on which decisions are based.
 
@@ -77,7 +77,7 @@ def open_sweep(path: Path) -> ResultsDatabase:
     Raises:
         InputError: There is no such sweep, another process executes the sweep, or an input has changed.
     """
-    database = ResultsDatabase(find_database(path))
+    database = ResultsDatabase(get_database_path(path))
     settings = database.settings
     if _hash_inputs(_load_variants(settings), settings.scene) != settings.inputs_hash:
         raise InputError(

@@ -36,7 +36,7 @@ class SummaryStatistics:
 
 @dataclass(frozen=True)
 class PhaseSummary:
-    """A skill in all runs of a variant.
+    """Number and time of the activations of one skill in all runs of a variant.
 
     Attributes:
         phase: Name of the skill.
@@ -85,7 +85,7 @@ class VariantSummary:
         robot_time_s, wall_time_s: Duration of a run on the clock of the run and on a wall clock [s].
         planning: Statistics of motion planning, summed over the runs.
         phases: The skills, by decreasing time.
-        failures: The problems, by decreasing number of runs.
+        failures: Groups of runs with the same problem, by decreasing number of runs.
     """
 
     variant: Mapping[str, str]
@@ -120,7 +120,7 @@ class SweepResults:
     planned_run_count: int
 
     @property
-    def is_halted(self) -> bool:
+    def is_incomplete(self) -> bool:
         """True if runs are missing."""
         return len(self.runs) < self.planned_run_count
 

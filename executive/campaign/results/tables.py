@@ -72,7 +72,7 @@ class Table(Generic[RowT]):
 
     @property
     def selection_sql(self) -> str:
-        """Statement that selects all rows, sorted by job and in the order of their insertion."""
+        """Statement that selects all rows, sorted by the first column of the key, then by insertion."""
         return f"SELECT * FROM {self.name} ORDER BY {self._key[0]}, rowid"
 
     def encode(self, row: RowT) -> tuple[SqlValue, ...]:
@@ -99,15 +99,15 @@ def _list_columns(row_class: type) -> list[Column]:
     """Return the columns for the fields of a dataclass."""
     hints, columns = get_type_hints(row_class), []
     properties = TypeAdapter(row_class).json_schema()["properties"]
-    for name, values in properties.items():
-        hint, comment = hints[name], values.get("description", "")
+    for name, field_schema in properties.items():
+        hint, comment = hints[name], field_schema.get("description", "")
         types = [argument for argument in get_args(hint) or (hint,) if argument is not type(None)]
         if isinstance(types[0], type) and is_dataclass(types[0]):
             inner_columns = _list_columns(types[0])
             inner_columns[0] = replace(inner_columns[0], comment=comment)
             columns += [replace(column, path=(name, *column.path)) for column in inner_columns]
         else:
-            # Only a mapping and a sequence have several arguments that are types, and are stored as JSON.
+            # Only types of mappings and sequences have several arguments; their values are stored as JSON.
             sql_type = {bool: "INTEGER", int: "INTEGER", float: "REAL"}.get(hint, "TEXT")
             columns.append(Column((name,), sql_type, len(types) > 1, comment))
     return columns

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.campaign.results.database import ResultsDatabase, find_database
+from executive.campaign.results.database import ResultsDatabase, get_database_path
 from executive.campaign.results.rows import ItemRow, PhaseRow, RunRecord, RunRow, SweepSettings
 from executive.campaign.results.tables import ITEMS, PHASES, RUNS
 from executive.errors import InputError
@@ -42,7 +42,7 @@ def test_all_rows_are_read_as_they_were_stored(tmp_path: Path) -> None:
     with closing(ResultsDatabase(path, SETTINGS)) as database:
         database.append(RECORD)
         database.append(RunRecord(plain))
-    with closing(ResultsDatabase(find_database(tmp_path))) as database:
+    with closing(ResultsDatabase(get_database_path(tmp_path))) as database:
         assert database.settings == SETTINGS
         assert database.read(RUNS) == [plain, RUN]
         assert (database.read(ITEMS), database.read(PHASES)) == ([ITEM], [PHASE])

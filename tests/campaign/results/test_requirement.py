@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.campaign.results.requirement import describe_unmet_comparisons, parse_requirement
+from executive.campaign.results.requirement import describe_unmet_conditions, parse_requirement
 from executive.campaign.results.rows import RunRow
 from executive.campaign.results.sweep_summary import summarize_runs
 from executive.errors import InputError
@@ -18,7 +18,7 @@ def run(seed: int, variant: str = "", **values: object) -> RunRow:
 
 
 def find_unmet(text: str, *runs: RunRow) -> list[str]:
-    return describe_unmet_comparisons(parse_requirement(text), runs, summarize_runs(runs, [], lambda run: ""))
+    return describe_unmet_conditions(parse_requirement(text), runs, summarize_runs(runs, [], lambda run: ""))
 
 
 @pytest.mark.parametrize(
