@@ -96,7 +96,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("result = run_skill(...)", "testing/run_skill.py", "SkillResult"),
         ("executive.testing.run_mission", "testing/run_mission.py", ""),
         ("result = run_mission(...)", "testing/run_mission.py", "MissionResult"),
-        ("class MissionResult(RunEnded)", "events/run_events.py", "RunEnded"),
+        ("class MissionResult(RunEnded)", "events.py", "RunEnded"),
         ("executive.testing.substitutes", "testing/substitutes.py", ""),
     ],
     "Test kit: faults": [

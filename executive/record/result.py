@@ -11,8 +11,7 @@ from pydantic import TypeAdapter
 
 from executive.cell.json_values import to_json
 from executive.errors import ExecutiveError, explain_os_errors
-from executive.events import RunResumed, TimedEvent
-from executive.events.run_events import RunStatus
+from executive.events import RunResumed, RunStatus, TimedEvent
 from executive.exit_codes import ExitCode
 from executive.record.atomic_file import write_atomically
 from executive.record.audit_comparison import Audit, ItemCounts, describe_disagreement
