@@ -7,21 +7,19 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import cv2
 import numpy as np
 
 from executive.cell.config import CellConfig
-from executive.cell.frame import Box
 from executive.cells.sim.models import find_model_errors
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
-from executive.cells.sim.scenes import IMAGE_SIZE, Sample, SceneRenderer
 from executive.errors import InputError
-from executive.geometry import Array
 from executive.processes import WorkerPool
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.labelled_image import LabelledImage
+from executive.training.scene_renderer import IMAGE_SIZE, SceneRenderer
 
 ResultT = TypeVar("ResultT")
 ReportProgress = Callable[[int, int], None]
@@ -99,20 +97,18 @@ def _render_blocks(
     return [results[number] for number in image_numbers]
 
 
-def _render_samples(
+def _render_images(
     cells: Sequence[CellConfig], seed: int, image_numbers: range, scene: SceneConfig | None = None
-) -> Iterator[tuple[int, str, Sample]]:
-    """Yield image number, camera name and sample of random scenes; without `scene`, scenes vary more."""
+) -> Iterator[tuple[int, LabelledImage]]:
+    """Yield number and labelled image of random scenes; without `scene`, scenes vary more."""
     cv2.setNumThreads(1)
-    cameras = [next(iter(cell.cameras)) for cell in cells]
     with contextlib.ExitStack() as stack:
-        renderers = [SceneRenderer(cell, camera, scene) for cell, camera in zip(cells, cameras, strict=True)]
+        renderers = [SceneRenderer(cell, scene) for cell in cells]
         for renderer in renderers:
             stack.callback(renderer.close)
         for number in image_numbers:
-            cell_index = number % len(cells)
-            sample_seed = int(np.random.SeedSequence([seed, number]).generate_state(1, np.uint64)[0])
-            yield number, cameras[cell_index], renderers[cell_index].render_sample(sample_seed)
+            image_seed = int(np.random.SeedSequence([seed, number]).generate_state(1, np.uint64)[0])
+            yield number, renderers[number % len(cells)].render_image(image_seed, number)
 
 
 def _render_dataset_images(
@@ -120,10 +116,17 @@ def _render_dataset_images(
 ) -> dict[int, DatasetEntry]:
     """Render and save images in a worker process; return their dataset entries by image number."""
     entries = {}
-    for number, camera, sample in _render_samples(cells, seed, image_numbers):
-        split, file = "train" if number < train_count else "valid", f"{camera}_{number:06d}.jpg"
-        save_image(build_image_path(out, layout, split, file), sample.image)
-        entries[number] = _make_dataset_entry(sample, split, file, camera)
+    for number, image in _render_images(cells, seed, image_numbers):
+        split, file = "train" if number < train_count else "valid", f"{image.file}.jpg"
+        save_image(build_image_path(out, layout, split, file), image.image)
+        # The ground truth for evaluations is stored as JSON.
+        truth = {**image.truth, "matrix": image.truth["matrix"].tolist()}
+        for name, digits in (("positions", 6), ("centres", 6), ("visible_fraction", 4)):
+            truth[name] = truth[name].round(digits).tolist()
+        size = (IMAGE_SIZE, IMAGE_SIZE)
+        entries[number] = DatasetEntry(
+            split, file, size, image.labels, image.boxes, image.ignored_boxes, truth
+        )
     return entries
 
 
@@ -131,49 +134,4 @@ def _render_frames(
     config: CellConfig, scene: SceneConfig, seed: int, image_numbers: range
 ) -> dict[int, LabelledImage]:
     """Render frames in a worker process, and return them by image number."""
-    samples = _render_samples([config], seed, image_numbers, scene)
-    return {i: to_labelled_frame(sample, camera, f"{camera}_{i:06d}") for i, camera, sample in samples}
-
-
-def _make_dataset_entry(sample: Sample, split: str, file: str, camera: str) -> DatasetEntry:
-    """Return the dataset entry of a sample, with the ground truth for evaluations as JSON values."""
-    truth = _collect_truth(sample, camera, sample.region)
-    truth["matrix"] = sample.matrix.tolist()
-    for name, digits in (("positions", 6), ("centres", 6), ("visible_fraction", 4)):
-        truth[name] = truth[name].round(digits).tolist()
-    boxes, ignored_boxes = _to_boxes(sample.boxes), _to_boxes(sample.ignored)
-    return DatasetEntry(split, file, (IMAGE_SIZE, IMAGE_SIZE), sample.labels, boxes, ignored_boxes, truth)
-
-
-def to_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
-    """Return the full frame of a sample; `sample.image` is a scaled part of the full frame."""
-    assert sample.frame is not None
-    height, width = sample.frame.shape[:2]
-    left, top, right, _ = sample.region
-    scale, corner = (right - left) / IMAGE_SIZE, [left, top, left, top]
-    return LabelledImage(
-        file=file, image=sample.frame, labels=sample.labels,
-        boxes=_to_boxes(sample.boxes * scale + corner),
-        ignored_boxes=_to_boxes(sample.ignored * scale + corner),
-        truth=_collect_truth(sample, camera, (0, 0, width, height)),
-        region=sample.region, depth=sample.depth, second_image=sample.second_frame,
-    )  # fmt: skip
-
-
-def _collect_truth(sample: Sample, camera: str, part: Box) -> dict[str, Any]:
-    """Return the ground truth of an image that shows the region `part` of the camera's frame [pixel]."""
-    return {
-        "camera": camera,
-        "part": part,
-        "matrix": sample.matrix,
-        "X_WC": sample.X_WC.to_rounded_list(9),
-        "labels": sample.labels,
-        "positions": sample.positions,
-        "centres": sample.centres,
-        "visible_fraction": sample.visible_fraction,
-    }
-
-
-def _to_boxes(boxes: Array) -> tuple[Box, ...]:
-    """Return the rows of an array `(N, 4)` [pixel] as boxes."""
-    return tuple((left, top, right, bottom) for left, top, right, bottom in boxes.tolist())
+    return dict(_render_images([config], seed, image_numbers, scene))

@@ -5,13 +5,12 @@ from __future__ import annotations
 import pytest
 
 from executive.cells.sim.scene_file import DECLARED_SCENE
-from executive.cells.sim.scenes import SceneRenderer
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
 from executive.perception.detectors.onnx_model import read_labels
 from executive.training.evaluation.cell_detector import CellDetector
 from executive.training.evaluation.evaluate import evaluate
-from executive.training.labelled_image import LabelledImage
+from executive.training.scene_renderer import SceneRenderer
 
 
 def test_the_weights_fit_into_a_package_and_a_card_goes_with_them(missions):
@@ -39,19 +38,13 @@ def test_fresh_scenes_of_a_shipped_cell_are_read_almost_without_error(
     missions, name, scenes, randomized, precision, recall
 ):
     config = load_cell(missions / "cells" / f"{name}.yaml")
-    renderer = SceneRenderer(config, next(iter(config.cameras)), None if randomized else DECLARED_SCENE)
-    samples = []
-    for seed in scenes:
-        drawn = renderer.render_sample(seed)
-        boxes, ignored = (tuple(map(tuple, found.tolist())) for found in (drawn.boxes, drawn.ignored))
-        truth = {
-            "part": drawn.region, "matrix": drawn.matrix.tolist(), "X_WC": drawn.X_WC.to_rounded_list(9),
-            "positions": drawn.positions.tolist(),
-        }  # fmt: skip
-        samples.append(LabelledImage(str(seed), drawn.image, drawn.labels, boxes, ignored, truth))
+    renderer = SceneRenderer(config, None if randomized else DECLARED_SCENE)
+    images = [renderer.render_image(seed, seed) for seed in scenes]
     renderer.close()
-    detector = CellDetector(config.detectors, next(iter(config.detectors)), base=missions / "cells")
-    measured = evaluate(detector, samples)
+    camera = None if randomized else next(iter(config.cameras.values()))
+    detectors, base = config.detectors, missions / "cells"
+    detector = CellDetector(detectors, next(iter(detectors)), base=base, camera=camera)
+    measured = evaluate(detector, images)
     detector.close()
     assert measured.objects > 20
     assert (measured.precision >= precision, measured.recall >= recall) == (True, True)

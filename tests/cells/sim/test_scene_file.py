@@ -24,7 +24,6 @@ from executive.cells.sim.models import load_mesh
 from executive.cells.sim.renderer import CELL_LIGHT
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, load_scene
 from executive.cells.sim.scene_world import apply_scene
-from executive.cells.sim.scenes import SceneRenderer
 from executive.cells.sim.spawn import build_initial_world
 from executive.cells.sim.world import World
 from executive.errors import InputError
@@ -33,6 +32,7 @@ from executive.geometry import Pose
 from executive.mission.findings import MissionError
 from executive.perception.camera_model import compute_calibration, project
 from executive.testing.oracle import TrueFrame, make_oracle_kind
+from executive.training.scene_renderer import SceneRenderer
 
 Build = Callable[..., World]
 SEED = 3
@@ -258,17 +258,13 @@ def test_evaluated_frames_are_of_the_scene_and_say_what_the_cell_declares(overhe
     changed = scene(
         camera={"shift": [0.02, 0.0, 0.0]}, unknown={"count": [1, 1]}, objects={"any": {"colours": [BLACK]}}
     )
-    usual, other = (SceneRenderer(overhead, "overhead", s) for s in (DECLARED_SCENE, changed))
-    one, sample = usual.render_sample(1), other.render_sample(1)
-    assert (sample.X_WC.to_rounded_list(), UNKNOWN_LABEL in sample.labels) == (
-        one.X_WC.to_rounded_list(),
-        False,
-    )
-    scale = (sample.region[2] - sample.region[0]) / 256
-    boxes = sample.boxes * scale + [*sample.region[:2], *sample.region[:2]]
-    for box, centre in zip(boxes, sample.centres, strict=True):
+    usual, other = (SceneRenderer(overhead, s) for s in (DECLARED_SCENE, changed))
+    one, image = usual.render_image(1, 1), other.render_image(1, 1)
+    truth, matrix, X_WC = image.truth, image.truth["matrix"], image.truth["X_WC"]
+    assert (X_WC, UNKNOWN_LABEL in image.labels) == (one.truth["X_WC"], False)
+    for box, centre in zip(image.boxes, truth["centres"], strict=True):
         middle = np.array([(box[0] + box[2]) / 2, (box[1] + box[3]) / 2])
-        declared = project(sample.matrix, sample.X_WC, centre)
+        declared = project(matrix, Pose.of(X_WC[:3], X_WC[3:]), centre)
         # 0.02 m along x is up in the image, at 461 pixels focal length and 1.17 m distance.
         assert middle - declared == pytest.approx([0.0, 0.02 * 461 / 1.17], abs=3.0)
     usual.close()
