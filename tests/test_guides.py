@@ -28,7 +28,7 @@ from executive.mission.load import LoadedMission, load_mission
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.schema.file_schemas import make_mission_schema
 from executive.mission.source import Source
-from executive.mission.text.yaml_text import parse_yaml, to_python_value
+from executive.mission.text.yaml_text import parse_yaml
 from executive.plugins import load_cell_kind, load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.run_skill import run_skill
@@ -94,7 +94,7 @@ def test_the_mission_on_the_front_page_does_its_work(tmp_path: Path) -> None:
 def test_an_editor_marks_nothing_in_the_missions_of_the_mission_guides(name: str) -> None:
     root, _ = parse_yaml(Source(name, FILES[name].text))
     assert root is not None
-    jsonschema.validate(to_python_value(root), make_mission_schema(load_skills(), load_control_nodes()))
+    jsonschema.validate(root.python_value, make_mission_schema(load_skills(), load_control_nodes()))
 
 
 @pytest.mark.parametrize("name", MISTAKES)

@@ -12,7 +12,6 @@ from typing import cast
 
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
 from executive.mission.model.mission import Mission, Quota, Subtree
-from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import (
     InnerNode,
     InvalidNode,
@@ -182,7 +181,7 @@ class _Expander:
 
         for _, variable in find_control_node_outputs(node):
             if variable.name in values:
-                message = explain(get_type_name(node), variable.name)
+                message = explain(node.type_name, variable.name)
                 yield make_error(variable.span, "shadowed-param", message, "Rename one of them.")
         if not isinstance(node, SkillNode) or node.skill not in self.skills:
             return

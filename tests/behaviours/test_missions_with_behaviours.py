@@ -16,7 +16,7 @@ from executive.mission.findings import MissionError
 from executive.mission.load import load_mission
 from executive.mission.schema.file_schemas import make_mission_schema
 from executive.mission.source import Source
-from executive.mission.text.yaml_text import parse_yaml, to_python_value
+from executive.mission.text.yaml_text import parse_yaml
 from executive.plugins import load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
@@ -272,7 +272,7 @@ def test_an_editor_accepts_the_mission(tree: str, write: Write) -> None:
     root, _ = parse_yaml(Source("tried.yaml", write(tree).read_text()))
     assert root is not None
     schema = make_mission_schema(load_skills(), load_control_nodes())
-    jsonschema.validate(to_python_value(root), schema)
+    jsonschema.validate(root.python_value, schema)
 
 
 def test_an_editor_misses_the_class(write: Write) -> None:
@@ -280,4 +280,4 @@ def test_an_editor_misses_the_class(write: Write) -> None:
     assert root is not None
     schema = make_mission_schema(load_skills(), load_control_nodes())
     with pytest.raises(jsonschema.ValidationError, match="'class' is a required property"):
-        jsonschema.validate(to_python_value(root), schema)
+        jsonschema.validate(root.python_value, schema)

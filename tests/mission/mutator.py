@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from executive.mission.source import Source
-from executive.mission.text.yaml_text import parse_yaml, to_python_value
+from executive.mission.text.yaml_text import parse_yaml
 from tests.mission.mutations import Draft, mutate_text, roles
 
 _TEXTUAL = 0.15
@@ -66,4 +66,4 @@ class Mutator:
 def _data(base: Base) -> Any:
     root, findings = parse_yaml(Source(base.file, base.text))
     assert root is not None, findings
-    return to_python_value(root)
+    return root.python_value

@@ -17,7 +17,7 @@ from executive.mission.schema.file_schemas import make_library_schema, make_miss
 from executive.mission.schema.types import make_cell_schema
 from executive.mission.source import Source
 from executive.mission.text.file_search import get_shipped_folder
-from executive.mission.text.yaml_text import parse_yaml, to_python_value
+from executive.mission.text.yaml_text import parse_yaml
 from executive.plugins import load_skills
 from executive.skill import Skill
 from executive.tree.node_registry import load_control_nodes
@@ -48,7 +48,7 @@ def problems(schema: dict[str, Any], text: str) -> list[str]:
     root, findings = parse_yaml(Source("shown.yaml", text))
     assert root is not None
     assert not findings
-    found = Draft7Validator(schema, registry=SHIPPED).iter_errors(to_python_value(root))
+    found = Draft7Validator(schema, registry=SHIPPED).iter_errors(root.python_value)
     return [f"{'.'.join(map(str, problem.absolute_path))}: {problem.message}" for problem in found]
 
 

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 
 from executive.mission.source import Source
 from executive.mission.text.scalars import convert_scalar
-from executive.mission.text.yaml_text import YamlMapping, YamlScalar, parse_yaml, to_python_value
+from executive.mission.text.yaml_text import YamlMapping, YamlScalar, parse_yaml
 
 
 def read(text: str) -> tuple[Any, list[str]]:
     root, findings = parse_yaml(Source("a.yaml", text))
-    return (None if root is None else to_python_value(root)), [str(finding) for finding in findings]
+    return (None if root is None else root.python_value), [str(finding) for finding in findings]
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_half_a_surrogate_pair_is_refused() -> None:
     assert [(f.line, f.col, f.message) for f in findings] == [
         (1, 4, "a surrogate (U+D800 to U+DFFF) is no character")
     ]
-    assert to_python_value(root) == {"a": "x?"}
+    assert root.python_value == {"a": "x?"}
 
 
 FRAGMENTS = [

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, make_error
-from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode, iterate_keys, list_nodes
 from executive.skill import ANY, Direction, Skill
 
@@ -16,7 +15,7 @@ def find_non_conditions(context: CheckContext, parent: InnerNode) -> Iterator[Fi
     for key, value in iterate_keys(parent):
         for node in list_nodes(value) if key.requires_conditions else ():
             if problem := _find_problem(context, node):
-                message = f"{problem}, but {get_type_name(parent)}.{key.name} needs a condition"
+                message = f"{problem}, but {parent.type_name}.{key.name} needs a condition"
                 yield make_error(node.span, "no-condition", message, _make_hint(context))
 
 
@@ -31,7 +30,7 @@ def _find_problem(context: CheckContext, node: Node) -> str:
             effects = [*list_condition_violations(skill), "is not declared as a condition (is_condition)"]
             return "" if skill.is_condition else f"{node.skill} {effects[0]}"
         case InnerNode() if not node.declaring_class.is_condition:
-            return "a list runs as a sequence" if node.is_list else f"{get_type_name(node)} is no condition"
+            return "a list runs as a sequence" if node.is_list else f"{node.type_name} is no condition"
     return ""
 
 

@@ -12,7 +12,6 @@ from executive.mission.check.skill_settings import find_unknown_names
 from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model.conversion import find_problem
-from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import InnerNode, KeyValue, Node, SkillNode
 from executive.mission.model.port_types import describe_type, find_element_type, find_fields, is_assignable
 from executive.mission.model.values import Literal, Reference
@@ -62,9 +61,8 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
             elements = node.values.get(key.list_key, ()) if isinstance(node, InnerNode) else ()
             list_writers = _find_list_writers(node, elements, all_writers)
             if isinstance(elements, Reference):
-                keyword = get_type_name(node)
-                yield from _check_field(keyword, elements, all_writers.get(elements.name, ()))
-                yield from _check_lists(f"{keyword}.{key.list_key}", elements, list_writers)
+                yield from _check_field(node.type_name, elements, all_writers.get(elements.name, ()))
+                yield from _check_lists(f"{node.type_name}.{key.list_key}", elements, list_writers)
             loop_writers = {**loop_writers, variable.name: [*_make_element_writers(node, list_writers)]}
         for wire in context.find_wires(node, Direction.IN):
             writers = loop_writers.get(wire.variable, skill_writers.get(wire.variable, ()))
@@ -85,8 +83,8 @@ def _find_list_writers(node: Node, elements: KeyValue, writers: WritersByVariabl
     if not isinstance(elements, Literal):
         return []
     if elements.value == "items":
-        return [Writer(get_type_name(node), node.span, list[Item], "item")]
-    return [Writer(get_type_name(node), node.span, list[Any], "", (elements,))]
+        return [Writer(node.type_name, node.span, list[Item], "item")]
+    return [Writer(node.type_name, node.span, list[Any], "", (elements,))]
 
 
 def _check_lists(name: str, reference: Reference, list_writers: Iterable[Writer]) -> Iterator[Finding]:
@@ -113,9 +111,9 @@ def _make_element_writers(node: Node, list_writers: Iterable[Writer]) -> Iterato
                 if isinstance(constant.value, list)
                 for index, element in enumerate(constant.value)
             ]
-            yield Writer(get_type_name(node), node.span, Any, "", tuple(elements))
+            yield Writer(node.type_name, node.span, Any, "", tuple(elements))
         elif (element_type := find_element_type(writer.type)) is not None:
-            yield Writer(get_type_name(node), node.span, element_type, writer.refers_to)
+            yield Writer(node.type_name, node.span, element_type, writer.refers_to)
 
 
 def _check_field(reader: str, reference: Reference, writers: Iterable[Writer]) -> Iterator[Finding]:
@@ -195,8 +193,5 @@ def describe_values(declared_type: object, refers_to: str) -> str:
     if not refers_to:
         return describe_type(declared_type)
     is_list = not is_assignable(str, declared_type)
-    return f"a list of names of {refers_to}s" if is_list else f"the name of {_add_article(refers_to)}"
-
-
-def _add_article(noun: str) -> str:
-    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
+    article = "an" if refers_to[0] in "aeiou" else "a"
+    return f"a list of names of {refers_to}s" if is_list else f"the name of {article} {refers_to}"

@@ -12,7 +12,6 @@ from executive.cell.protocols import MinTimes
 from executive.mission.findings import suggest_choice
 from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model.mission import Mission
-from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.values import Reference
 from executive.mission.model.wiring import Wire, find_control_node_inputs, find_wires, find_written_variables
@@ -94,7 +93,7 @@ class CheckContext:
         """Yield every read of a variable by `root` and the nodes below it."""
         for node in root.walk():
             for reference in find_control_node_inputs(node):
-                yield VariableRead(node, get_type_name(node), reference.name, reference.span, True, False)
+                yield VariableRead(node, node.type_name, reference.name, reference.span, True, False)
             for wire in self.find_wires(node, Direction.IN):
                 flags = wire.is_explicit, wire.port.is_required
                 yield VariableRead(node, str(wire), wire.variable, wire.span, *flags)

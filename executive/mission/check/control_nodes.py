@@ -13,7 +13,6 @@ from executive.mission.findings import Finding, make_error, make_warning, sugges
 from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model.conversion import ValueProblem, convert_constant
 from executive.mission.model.instance import find_upper_bound, get_mission_node, make_inspection_instance
-from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import InnerNode, KeyValue, NodeSection, SkillNode, iterate_keys
 from executive.mission.model.values import Literal, LocatedReason, Reference
 from executive.skill import Skill
@@ -128,7 +127,7 @@ class CheckerAnalysis:
 
     def get_name(self, child: Child) -> str:
         """Return the last part of the path of a child."""
-        return get_path_name(get_mission_node(child))
+        return get_mission_node(child).path_name
 
     def describe_place(self, reason: Reason, relative_to: Reason) -> str:
         """Return the line of `reason` as a text, with the file if `relative_to` is in another file."""

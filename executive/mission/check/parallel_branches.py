@@ -9,7 +9,6 @@ from typing import TypeAlias
 from executive.mission.check.context import CheckContext, VariableRead
 from executive.mission.findings import Finding, make_error
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
-from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.wiring import find_control_node_outputs
 from executive.mission.source import Span
@@ -120,8 +119,8 @@ def _find_first_writes(context: CheckContext, branch: Node) -> dict[str, _Variab
     writes: dict[str, _VariableWrite] = {}
     for node in branch.walk():
         for key, variable in find_control_node_outputs(node):
-            hint = f"Let {get_type_name(node)} write another variable: {key.name}: other."
-            writes.setdefault(variable.name, (get_type_name(node), variable.span, hint))
+            hint = f"Let {node.type_name} write another variable: {key.name}: other."
+            writes.setdefault(variable.name, (node.type_name, variable.span, hint))
         for wire in context.find_wires(node, Direction.OUT):
             hint = f"Let {wire.skill} write another variable: {wire.port.name}: $other."
             writes.setdefault(wire.variable, (wire.skill, wire.span, hint))

@@ -8,7 +8,6 @@ from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, make_error, make_warning
 from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model.instance import make_inspection_instance
-from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode
 from executive.mission.source import Span
 from executive.skill import EMPTY, HOLDING
@@ -27,7 +26,7 @@ def _find_unreachable_below(node: Node, flow: FlowAnalysis) -> Iterator[Finding]
             yield from _find_unreachable_below(child, flow)
         elif instance and instance.unreachable_reason:
             is_list = isinstance(child, InnerNode) and child.is_list and not child.label
-            name = "this list" if is_list else get_path_name(child)
+            name = "this list" if is_list else child.path_name
             yield make_warning(
                 child.span, "unreachable", f"{name} can never run: {instance.unreachable_reason}"
             )

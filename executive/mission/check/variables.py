@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 
 from executive.mission.check.context import CheckContext, VariableRead
 from executive.mission.findings import Finding, make_error, make_warning, suggest_choice
-from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import Node, SubtreeNode
 from executive.mission.model.values import Reference
 from executive.mission.model.wiring import find_control_node_outputs, find_written_variables
@@ -62,7 +61,7 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
     for node in context.tree.walk():
         for _, variable in find_control_node_outputs(node):
             if variable.name not in read_variables | set(context.mission.params):
-                message = f"no node in this {get_type_name(node)} reads ${variable.name}"
+                message = f"no node in this {node.type_name} reads ${variable.name}"
                 hint = f"Write ${variable.name} where a node needs the value."
                 yield make_warning(variable.span, "unread", message, hint)
         for wire in context.find_wires(node, Direction.OUT):
@@ -84,14 +83,13 @@ def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
     skill_writes = {wire.variable: (str(wire), wire.span) for wire in wires}
 
     def check_node_and_children(node: Node, loop_writes: Mapping[str, tuple[str, Span]]) -> Iterator[Finding]:
-        keyword = get_type_name(node)
         for _, variable in find_control_node_outputs(node):
             if write := skill_writes.get(variable.name, loop_writes.get(variable.name)):
                 name, span = write
                 place = span.describe_place(variable.span.source)
-                message = f"{keyword} writes ${variable.name}, and so does {name} in {place}"
+                message = f"{node.type_name} writes ${variable.name}, and so does {name} in {place}"
                 yield make_error(variable.span, "shadowed-variable", message, "Rename the loop variable.")
-            loop_writes = {**loop_writes, variable.name: (f"another {keyword}", variable.span)}
+            loop_writes = {**loop_writes, variable.name: (f"another {node.type_name}", variable.span)}
         for child in node.children:
             yield from check_node_and_children(child, loop_writes)
 

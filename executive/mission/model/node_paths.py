@@ -28,30 +28,13 @@ def assign_paths(root: Node) -> Node:
     return _assign_path(root, "", "tree")
 
 
-def get_path_name(node: Node) -> str:
-    """Return the name of a node in paths: its label, otherwise its skill, subtree or keyword."""
-    return node.label or get_type_name(node)
-
-
-def get_type_name(node: Node) -> str:
-    """Return the name of the skill or subtree, the keyword of the control node, or "unknown"."""
-    match node:
-        case SkillNode():
-            return node.skill
-        case SubtreeNode():
-            return node.name
-        case InnerNode():
-            return node.declaring_class.keyword
-    return "unknown"
-
-
 def _assign_path(node: Node, parent_path: str, key_path: str, name: str = "") -> Node:
     """Return the node with its path and the paths of its descendants.
 
     `key_path` is the part of the path for the key of the parent that contains the node, or "". `name` is the
-    last part of the path; the default is `get_path_name(node)`, and for a list no name.
+    last part of the path; the default is `node.path_name`, and for a list no name.
     """
-    path = _join(parent_path, key_path, name or ("" if _is_list(node) else get_path_name(node)))
+    path = _join(parent_path, key_path, name or ("" if _is_list(node) else node.path_name))
     match node:
         case InnerNode():
             return replace(node, path=path, values=_assign_value_paths(node, path))
@@ -89,10 +72,10 @@ def _assign_value_paths(owner: NodeOrSection, path: str, section_path: str = "")
 
 
 def _assign_list_paths(nodes: tuple[Node, ...], parent_path: str) -> tuple[Node, ...]:
-    counts = Counter(map(get_path_name, nodes))
+    counts = Counter(node.path_name for node in nodes)
 
     def get_unique_name(index: int, node: Node) -> str:
-        name = get_path_name(node)
+        name = node.path_name
         has_own_name = bool(node.label) or isinstance(node, SkillNode | SubtreeNode)
         return name if has_own_name and counts[name] == 1 else f"{index}:{name}"
 

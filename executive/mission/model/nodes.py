@@ -34,6 +34,16 @@ class Node:
         """The children of the node, in the order of the keys that its class declares."""
         return ()
 
+    @property
+    def type_name(self) -> str:
+        """Name of the skill or subtree, keyword of the control node, or "unknown"."""
+        return "unknown"
+
+    @property
+    def path_name(self) -> str:
+        """Name of the node in paths: its label, otherwise its skill, subtree or keyword."""
+        return self.label or self.type_name
+
     def walk(self) -> Iterator[Node]:
         """Yield this node and every node below it, parents before children."""
         yield self
@@ -54,6 +64,11 @@ class SkillNode(Node):
     skill: str
     settings: Mapping[str, Setting]
     variables_by_port: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def type_name(self) -> str:
+        """Name of the skill."""
+        return self.skill
 
 
 @dataclass(frozen=True)
@@ -97,6 +112,11 @@ class InnerNode(Node):
     values: Mapping[str, KeyValue]
     is_list: bool = False
 
+    @property
+    def type_name(self) -> str:
+        """Keyword of the control node."""
+        return self.declaring_class.keyword
+
     @cached_property
     def children(self) -> tuple[Node, ...]:
         """The nodes in the values of the keys and in sections."""
@@ -120,6 +140,11 @@ class SubtreeNode(Node):
     returns: Mapping[str, Setting] = field(default_factory=dict)
     written_variables: tuple[str, ...] = ()
     body: Node | None = None
+
+    @property
+    def type_name(self) -> str:
+        """Name of the subtree."""
+        return self.name
 
     @property
     def children(self) -> tuple[Node, ...]:

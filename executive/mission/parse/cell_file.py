@@ -16,15 +16,7 @@ from executive.mission.parse.overrides import CELL_PREFIX, make_override_source,
 from executive.mission.parse.validate import KeyPath, find_span, validate
 from executive.mission.source import Source
 from executive.mission.text.file_search import find_file_below, read_source
-from executive.mission.text.yaml_text import (
-    YamlEntry,
-    YamlMapping,
-    YamlNode,
-    YamlScalar,
-    describe_node,
-    parse_yaml,
-    to_python_value,
-)
+from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, parse_yaml
 
 BASE_KEY = "base"
 """Key with the path of the base file, which supplies the missing top-level keys."""
@@ -144,7 +136,7 @@ class _CellFileReader:
             source = read_source(path)
             root = self.read_tree(path, source, files)
             if root is not None and not isinstance(root, YamlMapping):
-                raise InputError(f"{source.path} must be a mapping, not {describe_node(root)}")
+                raise InputError(f"{source.path} must be a mapping, not {root.description}")
         except InputError as problem:
             self.findings.append(make_error(reference.span, "no-base", str(problem)))
             return None
@@ -164,7 +156,7 @@ def _merge_entry(entry: YamlEntry, base: YamlMapping) -> YamlEntry:
     entries = []
     for detector in detectors.entries:
         base_detector = base_detectors.get(detector.key.text)
-        if base_detector is None or to_python_value(detector.value) is not None:
+        if base_detector is None or detector.value.python_value is not None:
             entries.append(replace(detector, value=_merge_detector(detector.value, base_detector)))
     detectors_of_file = replace(detectors, entries=tuple(entries))
     return replace(entry, value=_inherit_entries(detectors_of_file, base_detectors, detectors.keys))
@@ -175,7 +167,7 @@ def _merge_detector(detector: YamlNode, base_detector: YamlNode | None) -> YamlN
     if not isinstance(detector, YamlMapping) or not isinstance(base_detector, YamlMapping):
         return detector
     kind, base_kind = detector.get("kind"), base_detector.get("kind")
-    is_same_kind = kind is None or (base_kind and to_python_value(kind) == to_python_value(base_kind))
+    is_same_kind = kind is None or (base_kind and kind.python_value == base_kind.python_value)
     return _inherit_entries(detector, base_detector) if is_same_kind else detector
 
 

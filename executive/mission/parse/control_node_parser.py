@@ -10,14 +10,7 @@ from executive.mission.model.nodes import InnerNode, InvalidNode, KeyValue, Node
 from executive.mission.model.values import InvalidValue, LocatedName
 from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
 from executive.mission.source import Span
-from executive.mission.text.yaml_text import (
-    YamlEntry,
-    YamlMapping,
-    YamlNode,
-    YamlScalar,
-    YamlSequence,
-    describe_node,
-)
+from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.tree.keys import Key, KeyKind, KeyOwner
 from executive.tree.node import ControlNode
 
@@ -166,7 +159,7 @@ def _read_sections(parser: NodeParser, key: Key, yaml_node: YamlNode) -> Iterabl
     """Yield the sections of a list, or a single section."""
     kind = "mapping with " + " and ".join(f'"{name}"' for name in key.section.keys)
     if not isinstance(yaml_node, YamlSequence | YamlMapping):
-        message = f"{key.name} must be a {kind}, or a list of such mappings, not {describe_node(yaml_node)}"
+        message = f"{key.name} must be a {kind}, or a list of such mappings, not {yaml_node.description}"
         parser.add_error(yaml_node.span, "wrong-type", message)
         return
     if isinstance(yaml_node, YamlSequence) and not yaml_node.items:

@@ -12,15 +12,7 @@ from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model.grammar import AllowedKeys
 from executive.mission.model.values import InvalidValue, Literal, LocatedReason, Reference, Setting, Value
 from executive.mission.source import Span
-from executive.mission.text.yaml_text import (
-    YamlMapping,
-    YamlNode,
-    YamlScalar,
-    YamlSequence,
-    describe_node,
-    iterate_scalars,
-    to_python_value,
-)
+from executive.mission.text.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, iterate_scalars
 
 NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 """Matches the names of params, arguments, variables and subtrees."""
@@ -47,7 +39,7 @@ class MappingReader:
         self.owner, self.span, self.findings = owner, span, findings
         self._mapping = node if isinstance(node, YamlMapping) else YamlMapping(node.span, ())
         if not isinstance(node, YamlMapping):
-            message = f"{owner} must be a mapping, not {describe_node(node)}"
+            message = f"{owner} must be a mapping, not {node.description}"
             self.add_error(node.span, "wrong-type", message, f"Its keys: {', '.join(keys)}.")
             return
         for entry in self._mapping.entries:
@@ -78,7 +70,7 @@ class MappingReader:
             return ""
         if isinstance(node, YamlScalar) and node.value is not None:
             return node.text
-        message = f"{self._describe_key(key)} must be a text, not {describe_node(node)}"
+        message = f"{self._describe_key(key)} must be a text, not {node.description}"
         self.add_error(node.span, "wrong-type", message)
         return ""
 
@@ -102,7 +94,7 @@ class MappingReader:
                 rule = f"{self._describe_key(key)} must name failures as Skill.reason or label.reason"
                 if section_keys:
                     rule += f", or be a mapping with {' or '.join(section_keys)}"
-                message = f'{rule}, not "{text}"' if text else f"{rule}, not {describe_node(item)}"
+                message = f'{rule}, not "{text}"' if text else f"{rule}, not {item.description}"
                 self.add_error(item.span, "bad-match", message)
         return tuple(names)
 
@@ -120,7 +112,7 @@ class MappingReader:
             for entry in node.entries:
                 yield entry.key.text, entry.key.span, entry.value
         elif node is not None and not is_empty(node):
-            message = f"{self._describe_key(key)} must be a mapping, not {describe_node(node)}"
+            message = f"{self._describe_key(key)} must be a mapping, not {node.description}"
             self.add_error(node.span, "wrong-type", message)
 
     def check_name(self, name: str, span: Span, kind: str, hint: str = "") -> None:
@@ -150,7 +142,7 @@ def read_settings(
     if is_empty(node):
         return {}
     if not isinstance(node, YamlMapping):
-        message = f"the value of {owner} must be a mapping of names to values, not {describe_node(node)}"
+        message = f"the value of {owner} must be a mapping of names to values, not {node.description}"
         hint = f"Write {owner}: {{{example_key}: {node.text}}}." if isinstance(node, YamlScalar) else ""
         findings.append(make_error(node.span, "wrong-type", message, hint))
         return {}
@@ -172,7 +164,7 @@ def read_value(node: YamlNode, findings: list[Finding]) -> Value:
 def make_literal(node: YamlNode) -> Literal:
     """Return a node as a constant with its position and the positions of its elements."""
     element_spans = tuple(item.span for item in node.items) if isinstance(node, YamlSequence) else ()
-    return Literal(to_python_value(node), node.span, element_spans=element_spans)
+    return Literal(node.python_value, node.span, element_spans=element_spans)
 
 
 def _find_misplaced_dollars(node: YamlNode) -> Iterator[Finding]:

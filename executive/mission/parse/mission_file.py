@@ -13,7 +13,7 @@ from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, 
 from executive.mission.parse.node_parser import NodeParser
 from executive.mission.parse.params import parse_params
 from executive.mission.source import Span
-from executive.mission.text.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, describe_node
+from executive.mission.text.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence
 
 _MISSION_NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 """Matches the names of missions; the names of run directories contain the name of the mission."""
@@ -86,7 +86,7 @@ def _read_names(reader: MappingReader, items: Iterable[YamlNode], rule: str) -> 
         if isinstance(item, YamlScalar) and isinstance(item.value, str):
             names.append(LocatedName(item.text, item.span))
         else:
-            reader.add_error(item.span, "wrong-type", f"{rule}, not {describe_node(item)}")
+            reader.add_error(item.span, "wrong-type", f"{rule}, not {item.description}")
     return tuple(names)
 
 

@@ -19,14 +19,7 @@ from executive.mission.parse.control_node_parser import (
 )
 from executive.mission.parse.mapping_reader import is_empty, read_settings
 from executive.mission.source import Span
-from executive.mission.text.yaml_text import (
-    YamlEntry,
-    YamlMapping,
-    YamlNode,
-    YamlScalar,
-    YamlSequence,
-    describe_node,
-)
+from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.plugins import load_behaviour
 from executive.skill import Skill
 from executive.tree.node_registry import ControlNodes
@@ -70,7 +63,7 @@ class NodeParser:
     def read_nodes(self, yaml_node: YamlNode, owner: str) -> tuple[Node, ...]:
         """Return the nodes of a list; for other values, add an error with the name `owner` and return ()."""
         if not isinstance(yaml_node, YamlSequence):
-            message = f"{owner} must be a list of nodes, not {describe_node(yaml_node)}"
+            message = f"{owner} must be a list of nodes, not {yaml_node.description}"
             self.add_error(yaml_node.span, "wrong-type", message)
             return ()
         if not yaml_node.items:
@@ -161,7 +154,7 @@ class NodeParser:
         siblings = [(key, value) for key in grammar.USE_SIBLINGS if (value := mapping.get(key)) is not None]
         settings = {key: read_settings(value, key, self.findings) for key, value in siblings}
         if not (isinstance(entry.value, YamlScalar) and isinstance(entry.value.value, str)):
-            message = f"use must be the name of a subtree, not {describe_node(entry.value)}"
+            message = f"use must be the name of a subtree, not {entry.value.description}"
             self.add_error(entry.value.span, "wrong-type", message)
             return InvalidNode(entry.key.span, "")
         arguments, returns = settings.get("with", {}), settings.get("returns", {})
@@ -197,7 +190,7 @@ class NodeParser:
         value = mapping.get("as")
         if value is None:
             return ""
-        description = describe_node(value)
+        description = value.description
         if isinstance(value, YamlScalar):
             description = f'"{value.text}"'
             if isinstance(value.value, str) and re.fullmatch(grammar.LABEL_PATTERN, value.text):

@@ -15,7 +15,7 @@ from executive.mission.model.mission import MissionParam
 from executive.mission.model.values import InvalidValue, Literal
 from executive.mission.parse.mapping_reader import MappingReader, make_literal
 from executive.mission.parse.overrides import CELL_PREFIX, make_override_source, parse_override
-from executive.mission.text.yaml_text import YamlMapping, to_python_value
+from executive.mission.text.yaml_text import YamlMapping
 from executive.skill import param
 
 PARAM_TYPES = {"text": str, "integer": int, "number": float, "boolean": bool, "list": list[Any]}
@@ -49,14 +49,14 @@ def parse_params(reader: MappingReader, overrides: Mapping[str, str]) -> dict[st
 
 def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> MissionParam:
     """Return the param that a mapping with keys such as `default` and `min` declares."""
-    default, choices = reader.get("default"), reader.get("choices")
+    default, items = reader.get("default"), reader.list_items("choices")
     reader.read_text("doc")
     declaration = param(
         ge=_read_bound(reader, "min"),
         le=_read_bound(reader, "max"),
-        choices=None if choices is None else tuple(map(to_python_value, reader.list_items("choices"))),
+        choices=tuple(item.python_value for item in items) if reader.get("choices") else None,
     )
-    default_type = _infer_type(None if default is None else to_python_value(default))
+    default_type = _infer_type(None if default is None else default.python_value)
     declaration = replace(declaration, type=_read_type(reader) or default_type)
     without_value = MissionParam(reader.span, InvalidValue(reader.span), declaration)
     problem = f"{name} cannot have any value"
@@ -93,7 +93,7 @@ def _read_bound(reader: MappingReader, key: str) -> float | None:
     if (node := reader.get(key)) is None:
         return None
     try:
-        return cast("float", convert_value(to_python_value(node), float))
+        return cast("float", convert_value(node.python_value, float))
     except ValueProblem as problem:
         reader.add_error(node.span, "wrong-type", f"{key} of {reader.owner} {problem}")
     return None

@@ -14,14 +14,7 @@ from pydantic_core import ErrorDetails
 from executive.mission.descriptions import describe_validation_error
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.source import Span
-from executive.mission.text.yaml_text import (
-    YamlMapping,
-    YamlNode,
-    YamlScalar,
-    YamlSequence,
-    iterate_scalars,
-    to_python_value,
-)
+from executive.mission.text.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, iterate_scalars
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 """Type of the content of a file."""
@@ -48,7 +41,7 @@ def validate(root: YamlNode, model: type[ModelT]) -> tuple[ModelT | None, list[F
         return None, findings
     try:
         # In strict mode, pydantic converts lists to tuples and integers to floats only from JSON.
-        content = model.model_validate_json(json.dumps(to_python_value(root)), strict=True)
+        content = model.model_validate_json(json.dumps(root.python_value), strict=True)
     except ValidationError as error:
         return None, [_make_finding(root, model, details) for details in error.errors(include_url=False)]
     return content, []

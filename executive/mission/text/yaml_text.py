@@ -46,20 +46,45 @@ _LINE_LENGTH = 1000
 
 
 @dataclass(frozen=True)
-class YamlScalar:
-    """A value that is no list or mapping; `text` is its text in the file without quotes."""
+class _Node:
+    """Base class of the nodes."""
 
     span: Span
-    value: ScalarValue
-    text: str
+
+    @property
+    def python_value(self) -> JsonValue:
+        """The node as plain Python values."""
+        raise NotImplementedError
+
+    @property
+    def description(self) -> str:
+        """Description of the value, for the end of a sentence."""
+        return describe_value(self.python_value)
 
 
 @dataclass(frozen=True)
-class YamlSequence:
+class YamlScalar(_Node):
+    """A value that is no list or mapping; `text` is its text in the file without quotes."""
+
+    value: ScalarValue
+    text: str
+
+    @property
+    def python_value(self) -> JsonValue:
+        """The value."""
+        return self.value
+
+
+@dataclass(frozen=True)
+class YamlSequence(_Node):
     """A list of nodes."""
 
-    span: Span
     items: tuple[YamlNode, ...]
+
+    @property
+    def python_value(self) -> JsonValue:
+        """The list of the values of the items."""
+        return [item.python_value for item in self.items]
 
 
 @dataclass(frozen=True)
@@ -71,11 +96,15 @@ class YamlEntry:
 
 
 @dataclass(frozen=True)
-class YamlMapping:
+class YamlMapping(_Node):
     """Entries with unique keys, in the order of the text."""
 
-    span: Span
     entries: tuple[YamlEntry, ...]
+
+    @property
+    def python_value(self) -> JsonValue:
+        """The values by key."""
+        return {entry.key.text: entry.value.python_value for entry in self.entries}
 
     def get_entry(self, key: str) -> YamlEntry | None:
         """Return the entry of `key`, or None."""
@@ -93,20 +122,6 @@ class YamlMapping:
 
 
 YamlNode = YamlScalar | YamlSequence | YamlMapping
-
-
-def to_python_value(node: YamlNode) -> JsonValue:
-    """Return the node as plain Python values."""
-    if isinstance(node, YamlScalar):
-        return node.value
-    if isinstance(node, YamlSequence):
-        return [to_python_value(item) for item in node.items]
-    return {entry.key.text: to_python_value(entry.value) for entry in node.entries}
-
-
-def describe_node(node: YamlNode) -> str:
-    """Return a description of the value of a node, for the end of a sentence."""
-    return describe_value(to_python_value(node))
 
 
 def iterate_scalars(node: YamlNode) -> Iterator[YamlScalar]:

@@ -9,7 +9,6 @@ from pathlib import Path, PurePath
 
 from executive.events import RunEnded
 from executive.mission.load import LoadedMission
-from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import Node, SkillNode
 from executive.record.diagnosis.advice import list_advice
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, FailureNode, ItemFailure, LostItem
@@ -112,7 +111,7 @@ def _make_deciding_node(run: FailedRun) -> DecidingNode | None:
     node = run.deciding_node
     if node is None:
         return None
-    name = run.format_skill_name(node.path) if isinstance(node, SkillNode) else get_path_name(node)
+    name = run.format_skill_name(node.path) if isinstance(node, SkillNode) else node.path_name
     return DecidingNode(node.path, name, _format_source_location(node))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
-from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import InnerNode, Node, SubtreeNode
 from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
@@ -36,7 +35,7 @@ class FailurePathNode:
     @property
     def name(self) -> str:
         """Name of the node with its subtree: `look: retry`."""
-        name = get_path_name(self.node)
+        name = self.node.path_name
         return f"{self.subtree}: {name}" if self.subtree else name
 
     @property
