@@ -17,24 +17,11 @@ from executive.cells.sim.scene_file import load_scene
 from executive.errors import InputError, explain_os_errors
 from executive.mission.findings import suggest_choice
 from executive.perception.detectors.detector_registry import find_detector_errors
-from executive.perception.envelope.measurement import (
-    MEASUREMENT_SUFFIX,
-    ErrorCounts,
-    Measurement,
-    compute_fingerprint,
-    format_measurements,
-    read_measurements,
-)
+from executive.perception.envelope import measurement
 from executive.perception.localization import CellLocalizer
 from executive.record.atomic_file import write_atomically
+from executive.training.evaluation import evaluate
 from executive.training.evaluation.cell_detector import CellDetector
-from executive.training.evaluation.evaluate import (
-    MIN_CONFIDENCE,
-    MODEL_NAME,
-    evaluate,
-    find_label_file,
-    make_model_config,
-)
 from executive.training.evaluation.metrics import NO_OBJECT, Evaluation
 from executive.training.evaluation.worst_mistakes import WorstMistakes
 from executive.training.labelled_image import LabelledImage
@@ -106,9 +93,10 @@ def list_detectors(
     """
     fixed_configs: dict[str, DetectorConfig] = {}
     if model_file is not None:
-        fixed_configs = {MODEL_NAME: make_model_config(model_file, label_file or find_label_file(model_file))}
+        label_file = label_file or evaluate.find_label_file(model_file)
+        fixed_configs = {evaluate.MODEL_NAME: evaluate.make_model_config(model_file, label_file)}
     elif not cells:
-        fixed_configs = {"embedded": DetectorConfig(kind="embedded", floor=MIN_CONFIDENCE)}
+        fixed_configs = {"embedded": DetectorConfig(kind="embedded", floor=evaluate.MIN_CONFIDENCE)}
     if not cells:
         yield DetectorUnderTest(None, fixed_configs, next(iter(fixed_configs)), Path())
     for cell_file, cell in cells.items():
@@ -163,7 +151,7 @@ def measure_detector(
             classes=tuple(detector.cell.objects) if detector.cell else None,
         )
         with contextlib.closing(cell_detector), progress(f"running {detector.name}") as update:
-            return evaluate(
+            return evaluate.evaluate(
                 cell_detector, _iterate_with_progress(samples, update), mistakes=worst_mistakes,
                 localizer=_build_localizer(cell_of_images) if cell_of_images else None,
                 table=cell_of_images.table if cell_of_images else None, threshold=threshold,
@@ -233,19 +221,19 @@ def store_evaluation(
         InputError: The detector gave no usable answer to any image, or the file cannot be read or written.
     """
     assert detector.cell is not None
-    path = out or detector.base_folder / f"{detector.cell.cell}{MEASUREMENT_SUFFIX}"
+    path = out or detector.base_folder / f"{detector.cell.cell}{measurement.MEASUREMENT_SUFFIX}"
     if evaluation.reliability is None:
         problem = f"detector {detector.name} gave no usable answer: {evaluation.why}"
         raise InputError(f"{problem}; nothing was measured")
-    measurement = Measurement(
+    new_measurement = measurement.Measurement(
         detector=detector.name,
-        fingerprint=dict(compute_fingerprint(detector.cell, detector.name, detector.base_folder)),
+        fingerprint=dict(measurement.compute_fingerprint(detector.cell, detector.name, detector.base_folder)),
         command=command,
         seconds=round(duration, 1),
         images=evaluation.images,
         rates=evaluation.reliability.rates,
         classes={
-            label: ErrorCounts(
+            label: measurement.ErrorCounts(
                 objects=sum(row.values()),
                 missed=row.get(NO_OBJECT, 0),
                 confused=sum(row.values()) - row.get(NO_OBJECT, 0) - row.get(label, 0),
@@ -255,12 +243,15 @@ def store_evaluation(
             if label != NO_OBJECT
         },
         counts={
-            str(count): ErrorCounts(**{name: errors.get(name, 0) for name in ErrorCounts.model_fields})
+            str(count): measurement.ErrorCounts(
+                **{name: errors.get(name, 0) for name in measurement.ErrorCounts.model_fields}
+            )
             for count, errors in sorted(evaluation.by_count.items())
         },
         frames=evaluation.frames,
     )
     advice = "name another file with --out, and copy it into the folder of your cell file"
     with explain_os_errors(InputError, f"the measurement {path} cannot be written", advice):
-        write_atomically(path, format_measurements(read_measurements(path), measurement))
+        old_measurements = measurement.read_measurements(path)
+        write_atomically(path, measurement.format_measurements(old_measurements, new_measurement))
     return path

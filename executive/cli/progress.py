@@ -9,16 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import click
+from rich import progress
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    Task,
-    TextColumn,
-    TimeRemainingColumn,
-)  # fmt: skip
 from rich.text import Text
 
 from executive.cli.streams import open_unescaped_stderr
@@ -27,10 +19,10 @@ LINE_PERIOD = 10.0
 """Minimum time between two progress lines if stderr is not a terminal [s]."""
 
 
-class RateColumn(ProgressColumn):
+class RateColumn(progress.ProgressColumn):
     """Column of a progress bar with the number of completed parts per minute."""
 
-    def render(self, task: Task) -> Text:
+    def render(self, task: progress.Task) -> Text:
         """Return the content of the column; empty before the first completed part."""
         return Text(f"{60 * task.speed:.1f} per minute" if task.speed else "")
 
@@ -54,12 +46,13 @@ def show_progress(
         yield _make_line_printer(description)
         return
     # The remaining time is estimated from all completed parts, because a part may take minutes.
-    with Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), RateColumn(),
-        TimeRemainingColumn(), console=console, disable=is_hidden, speed_estimate_period=math.inf,
-    ) as progress:  # fmt: skip
-        task = progress.add_task(description, total=None)
-        yield lambda completed, total: progress.update(task, completed=completed, total=total)
+    with progress.Progress(
+        progress.TextColumn("{task.description}"), progress.BarColumn(), progress.MofNCompleteColumn(),
+        RateColumn(), progress.TimeRemainingColumn(),
+        console=console, disable=is_hidden, speed_estimate_period=math.inf,
+    ) as bar:  # fmt: skip
+        task = bar.add_task(description, total=None)
+        yield lambda completed, total: bar.update(task, completed=completed, total=total)
 
 
 def _make_line_printer(description: str) -> Callable[[int, int], None]:

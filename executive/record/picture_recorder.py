@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from executive.cell.detection import Detection
 from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, FrameSearched, NodeEnded, TargetSelected, TimedEvent
 from executive.record.pictures.drawing_thread import PictureDrawer
@@ -119,7 +118,7 @@ class PictureRecorder:
         return PictureContent(
             image=frame.image,
             visible=frame.visible,
-            detections=[_to_detection(each) for each in look_event.confident],
+            detections=look_event.confident,
             selected_index=_find_selected_index(selection, look_event.confident, position),
             mission=timeline.started.mission if timeline.started else "",
             clock=timed.clock,
@@ -177,8 +176,3 @@ def _find_selected_index(
         return min(range(len(objects)), key=lambda index: math.dist(objects[index].position, position))
     indices = [index for index, each in enumerate(objects) if each.label == selection.label]
     return indices[0] if len(indices) == 1 else None
-
-
-def _to_detection(detected_object: DetectedObject) -> Detection:
-    left, top, right, bottom = detected_object.box
-    return Detection(detected_object.label, detected_object.confidence, (left, top, right, bottom))

@@ -6,10 +6,12 @@ import contextlib
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Protocol
+
+import yaml
 
 from executive.errors import ExecutiveError
 from executive.events import Observer, RunEnded, TimedEvent
@@ -21,7 +23,7 @@ from executive.record.diagnosis.diagnose import diagnose
 from executive.record.recorded_mission import format_tree
 from executive.record.recorder import Recorder
 from executive.record.result import FINAL_STATUSES, Result, list_requests, write_result
-from executive.record.run_directory import RunDirectory
+from executive.record.run_directory import SCENE_FILE, RunDirectory, make_dated_folder
 from executive.record.timeline.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
@@ -100,16 +102,18 @@ def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, fol
     Raises:
         InputError: The directory cannot be made, or a file cannot be written.
     """
-    scene = "" if options.scene is None else read_source(options.scene).text
-    directory = RunDirectory.create(folder, loaded.mission.name, options.seed, datetime.now())
-    directory.save_inputs(
-        mission=loaded.text,
-        params=loaded.params,
-        cell=loaded.cell_config.model_dump(mode="json", exclude_unset=True),
-        tree=format_tree(make_outline(run.root)),
-        libraries=loaded.libraries,
-        scene=scene,
-    )
+    cell = loaded.cell_config.model_dump(mode="json", exclude_unset=True)
+    texts = {
+        "mission.yaml": loaded.text,
+        "params.yaml": yaml.safe_dump(loaded.params, sort_keys=False, allow_unicode=True),
+        "cell.yaml": yaml.safe_dump(cell, sort_keys=False, allow_unicode=True),
+        "tree.json": format_tree(make_outline(run.root)),
+    }
+    if options.scene is not None:
+        texts[SCENE_FILE] = read_source(options.scene).text
+    name = f"{loaded.mission.name}_s{options.seed}"
+    directory = RunDirectory(make_dated_folder(folder, name, datetime.now()))
+    directory.save_inputs(texts, loaded.libraries)
     run.workcell.log_to(directory.world_log)
     return directory
 
@@ -169,23 +173,18 @@ class RecordedRun:
         workcell, path, timeline = self.run.workcell, self.directory.path, self._timeline
         accounts, arm = workcell.accounts, workcell.cell.arm
         item_counts = accounts.count_states()
+        end_values = asdict(run_end)
+        end_values["robot_time_s"] = end_values.pop("robot_time")
         return Result(
+            **end_values,
             mission=self.loaded.mission.name,
-            status=run_end.status,
-            reason=run_end.reason,
-            message=run_end.message,
-            node=run_end.node,
-            held_item=run_end.held_item,
             seed=seed,
             items=ItemCounts(**item_counts),
             unknown_labels=accounts.unknown_labels,
             assumption_reasons=accounts.assumption_reasons,
-            is_table_empty=run_end.is_table_empty,
             audit=None if audit is None else Audit.from_counts(item_counts, audit, run_end.is_table_empty),
             planning=timeline.planning,
             requests=list_requests(timeline),
-            ticks=run_end.ticks,
-            robot_time_s=run_end.robot_time,
             wall_time_s=round(wall_time, 3),
             trace=self.recorder.trace,
             run=str(path),

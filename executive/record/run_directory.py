@@ -9,8 +9,6 @@ from collections.abc import Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
 
-import yaml
-
 from executive.errors import InputError, describe_os_error
 from executive.record.atomic_file import write_atomically
 
@@ -50,53 +48,25 @@ class RunDirectory:
         path = self.path / SCENE_FILE
         return path if path.is_file() else None
 
-    @staticmethod
-    def create(runs: Path, mission: str, seed: int, start_time: datetime) -> RunDirectory:
-        """Make and return a directory below the folder `runs`, named after start time, mission and seed.
-
-        Raises:
-            InputError: The directory cannot be made.
-        """
-        return RunDirectory(make_dated_folder(runs, f"{mission}_s{seed}", start_time))
-
-    def save_inputs(
-        self,
-        *,
-        mission: str,
-        params: Mapping[str, object],
-        cell: Mapping[str, object],
-        tree: str = "",
-        libraries: Mapping[str, str] | None = None,
-        scene: str = "",
-    ) -> None:
+    def save_inputs(self, texts: Mapping[str, str], libraries: Mapping[str, str]) -> None:
         """Write and sync the inputs of the run, and let the link `runs/latest` point to this directory.
 
         Args:
-            mission: Text of the mission file.
-            params: Values of the params, which YAML can represent exactly.
-            cell: Content of the cell file, which YAML can represent exactly.
-            tree: Text of `tree.json`, or "" to write no file.
+            texts: Text of each input file, by the name of the file.
             libraries: Text of each library, by the path of the library relative to the mission.
-            scene: Text of the scene file, or "" to write no file.
 
         Raises:
             InputError: A file cannot be written; each existing file is complete.
         """
         with convert_os_errors(f'write to the run directory "{self.path}"'):
-            # Mission and cell are written after the libraries, so that no library replaces them.
-            for relative_path, text in (libraries or {}).items():
+            # The inputs are written after the libraries, so that no library replaces them.
+            for relative_path, text in libraries.items():
                 path = self.path / relative_path
                 if path not in (self.journal, self.result) and self.pictures not in path.parents:
                     path.parent.mkdir(parents=True, exist_ok=True)
                     write_atomically(path, text)
-            write_atomically(self.path / "mission.yaml", mission)
-            for name, content in (("params.yaml", params), ("cell.yaml", cell)):
-                text = yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True)
+            for name, text in texts.items():
                 write_atomically(self.path / name, text)
-            if tree:
-                write_atomically(self.tree, tree)
-            if scene:
-                write_atomically(self.path / SCENE_FILE, scene)
         _update_latest_link(self.path.parents[1], self.path)
 
 

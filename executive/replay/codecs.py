@@ -120,16 +120,11 @@ def decode_answer(value: Any) -> Answer:
 
 def encode_observations(observations: Sequence[Observation]) -> list[Any]:
     """Return the attributes of each observation as a list."""
-    return [
-        [
-            encode_detection(seen.detection),
-            seen.position.tolist(),
-            seen.std,
-            seen.is_confident,
-            seen.contradiction,
-        ]
-        for seen in observations
-    ]
+    encoded = []
+    for seen in observations:
+        detection, position = encode_detection(seen.detection), seen.position.tolist()
+        encoded.append([detection, position, seen.std, seen.is_confident, seen.contradiction])
+    return encoded
 
 
 def decode_observations(value: Any) -> list[Observation]:

@@ -94,8 +94,8 @@ def test_a_picture_says_what_the_run_is_about(tmp_path, drawn):
     assert (scene.running_skills, scene.failed_attempts) == (["SelectTarget"], 1)
     assert (scene.item, scene.bin) == ("cube-1", "red_bin")
     assert [(seen.label, seen.box) for seen in scene.detections] == [
-        ("duck", (20, 90, 50, 120)),
-        ("cube", (20, 40, 50, 70)),
+        ("duck", [20, 90, 50, 120]),
+        ("cube", [20, 40, 50, 70]),
     ]
     assert (scene.selected_index, scene.failure, scene.message) == (1, "", "")
     assert scene.outcomes == {"yellow_bin": ["duck-1"]}

@@ -9,12 +9,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor
 from typing import TYPE_CHECKING
 
+from executive.campaign.cluster import environment
 from executive.campaign.cluster.bundle import make_bundle
-from executive.campaign.cluster.environment import (
-    INSTALLATION_ADVICE,
-    check_environment,
-    describe_environment,
-)
 from executive.campaign.cluster.returned_run import unpack_run
 from executive.campaign.pool import MAX_CRASHES
 from executive.campaign.results.rows import RunRecord
@@ -57,7 +53,7 @@ def run_jobs_on_cluster(
         from executive.campaign.cluster.worker import BundlePlugin, execute_on_worker
 
         _check_workers(client, address)
-        plugin = BundlePlugin(make_bundle(jobs), describe_environment())
+        plugin = BundlePlugin(make_bundle(jobs), environment.describe_environment())
         client.register_plugin(plugin)
 
         def submit(index: int) -> Future:
@@ -118,9 +114,9 @@ def _connect(address: str) -> Client:
 def _check_workers(client: Client, address: str) -> None:
     """Raise InputError unless there are workers, and all have the software of this computer."""
     try:
-        results = client.run(check_environment, describe_environment())
+        results = client.run(environment.check_environment, environment.describe_environment())
     except (ImportError, AttributeError) as error:
-        message = f"a worker cannot import this project: {error}; {INSTALLATION_ADVICE}"
+        message = f"a worker cannot import this project: {error}; {environment.INSTALLATION_ADVICE}"
         raise InputError(message) from error
     if not results:
         raise InputError(f"the scheduler has no workers; start one: `dask worker {address} --nthreads 1`")

@@ -25,17 +25,13 @@ class DecidingNode:
 
 
 @dataclass(frozen=True)
-class FailureNode:
+class FailureNode(DecidingNode):
     """Control node that did not handle a failure, or node in which the failure began (origin).
 
     Attributes:
-        path, name, place: Path of the node in the tree; its name with item or subtree; its file and line.
         explanation: Reason why the node did not handle the failure; "" for the origin.
     """
 
-    path: str
-    name: str
-    place: str
     explanation: str
 
 

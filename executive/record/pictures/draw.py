@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.frame import Box
 from executive.record.pictures.captions import draw_captions
 from executive.record.pictures.palette import BACKGROUND, OUTLINE, choose_class_colour, to_bgr
 from executive.record.pictures.picture_content import PictureContent
@@ -53,7 +54,7 @@ def _shade_occlusions(image: NDArray[np.uint8], visible: NDArray[np.bool_] | Non
     return shaded_image
 
 
-def _draw_close_up(image: NDArray[np.uint8], box: Box, colour: str) -> NDArray[np.uint8]:
+def _draw_close_up(image: NDArray[np.uint8], box: Sequence[float], colour: str) -> NDArray[np.uint8]:
     """Return the enlarged square region around a box, `(STATUS_BAR_HEIGHT, STATUS_BAR_HEIGHT, 3)` BGR."""
     left, top, right, bottom = box
     side = max(2.0, CLOSE_UP_SCALE * max(right - left, bottom - top))

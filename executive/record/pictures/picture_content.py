@@ -8,7 +8,7 @@ from dataclasses import KW_ONLY, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.detection import Detection
+from executive.events import DetectedObject
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class PictureContent:
     image: NDArray[np.uint8]
     visible: NDArray[np.bool_] | None = None
     _: KW_ONLY
-    detections: Sequence[Detection] = ()
+    detections: Sequence[DetectedObject] = ()
     selected_index: int | None = None
     mission: str = ""
     clock: float = 0.0

@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.cell.detection import Detection
+from executive.events import DetectedObject
 from executive.record.pictures.draw import PICTURE_WIDTH, draw_picture, make_captions
 from executive.record.pictures.palette import BACKGROUND, PALETTE, choose_class_colour, to_bgr
 from executive.record.pictures.picture_content import PictureContent
 from executive.record.pictures.status_bar import STATUS_BAR_HEIGHT
 
 GREY = 150
-CUBE = Detection("cube", 0.9, (100.0, 200.0, 160.0, 260.0))
-DUCK = Detection("duck", 0.7, (300.0, 100.0, 340.0, 140.0))
+CUBE = DetectedObject("cube", 0.9, (100.0, 200.0, 160.0, 260.0), (0.0, 0.0, 0.0), "")
+DUCK = DetectedObject("duck", 0.7, (300.0, 100.0, 340.0, 140.0), (0.0, 0.0, 0.0), "")
 CLASSES = ("cube", "duck")
 
 
-def scene(*seen: Detection, height: int = 480, width: int = 640, **more) -> PictureContent:
+def scene(*seen: DetectedObject, height: int = 480, width: int = 640, **more) -> PictureContent:
     image = np.full((height, width, 3), GREY, np.uint8)
     return PictureContent(image, detections=seen, classes=CLASSES, **more)
 

@@ -7,14 +7,14 @@ import threading
 import cv2
 import numpy as np
 
-from executive.cell.detection import Detection
+from executive.events import DetectedObject
 from executive.record.pictures import drawing_thread as module
 from executive.record.pictures.drawing_thread import MAX_QUEUED_PICTURES, PictureDrawer
 from executive.record.pictures.picture_content import PictureContent
 
 SCENE = PictureContent(
     np.full((480, 640, 3), 150, np.uint8),
-    detections=[Detection("cube", 0.9, (100, 200, 160, 260))],
+    detections=[DetectedObject("cube", 0.9, (100, 200, 160, 260), (0.0, 0.0, 0.0), "")],
     selected_index=0,
     classes=("cube",),
 )
