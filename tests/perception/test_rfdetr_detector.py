@@ -50,7 +50,7 @@ def found_by(detector, frame, view):
 
 def spots(left, top, view):
     """Return the spots that a model finds."""
-    detector = RfdetrDetector(BrightSpots(), DetectorConfig(kind="rfdetr"), context())
+    detector = RfdetrDetector(BrightSpots(), DetectorConfig(kind="rfdetr"), context(), {})
     return found_by(detector, frame_with_spot(left, top), view)
 
 

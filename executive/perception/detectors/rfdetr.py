@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,11 +51,7 @@ class RfdetrDetector(ThreadedDetector):
     """
 
     def __init__(
-        self,
-        model: OnnxModel,
-        config: DetectorConfig,
-        context: DetectorContext,
-        class_map: Mapping[str, str] = MappingProxyType({}),
+        self, model: OnnxModel, config: DetectorConfig, context: DetectorContext, class_map: Mapping[str, str]
     ) -> None:
         super().__init__(config, context)
         self._model, self._class_map = model, class_map
@@ -71,14 +66,13 @@ class RfdetrDetector(ThreadedDetector):
         folder = context.cell_folder
         for _, message in cls.check(config, folder, {}):
             raise InputError(message)
-        options = RfdetrOptions.read(config)
+        options = cls._read_options(config)
         model = OnnxModel.load(folder / options.model_path, options.read_names(folder), options.threads)
         return cls(model, config, context, options.class_map)
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each missing, unknown or invalid option, with an error message; load no model."""
-        del all_configs
         errors = list(RfdetrOptions.find_errors(config))
         yield from errors
         if errors:
@@ -93,22 +87,26 @@ class RfdetrDetector(ThreadedDetector):
             return
         yield from find_class_map_errors(config, options.class_map, names)
 
-    @staticmethod
-    def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
+    @classmethod
+    def labels(cls, config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
         """Return the class names of the cell that the model can find; None if the options are invalid."""
         try:
-            options = RfdetrOptions.read(config)
+            options = cls._read_options(config)
             return tuple(options.class_map.get(name, name) for name in options.read_names(base))
         except InputError:
             return None
 
-    @staticmethod
-    def weights(config: DetectorConfig, base: Path) -> Path | None:
+    @classmethod
+    def weights(cls, config: DetectorConfig, base: Path) -> Path | None:
         """Return the path of the model file; None if the options are invalid."""
         try:
-            return base / RfdetrOptions.read(config).model_path
+            return base / cls._read_options(config).model_path
         except InputError:
             return None
+
+    @staticmethod
+    def _read_options(config: DetectorConfig) -> RfdetrOptions:
+        return RfdetrOptions.read(config)
 
     def _search(self, image: NDArray[np.uint8], regions: Sequence[Region]) -> list[Detection]:
         detect = partial(self._model.detect, min_confidence=self._config.floor)
