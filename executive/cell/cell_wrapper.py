@@ -3,33 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
-from executive.cell.protocols import Cell
 from executive.cell.visuals import Visuals
-from executive.cell.workcell import Accounts, Workcell
+from executive.cell.workcell import Workcell
 
 
-@dataclass(eq=False)
 class CellWrapper:
     """Work cell that forwards each call to another work cell; a subclass overrides some methods.
 
     Attributes:
         inner: The wrapped work cell.
+        cell: Interface of the work cell for skills.
+        accounts: The ledger; the run closes it at its end, so that each item has a final state.
     """
 
-    inner: Workcell
-
-    @property
-    def cell(self) -> Cell:
-        """Interface of the work cell for skills."""
-        return self.inner.cell
-
-    @property
-    def accounts(self) -> Accounts:
-        """The ledger; the run closes it at its end, so that each item has a final state."""
-        return self.inner.accounts
+    def __init__(self, inner: Workcell) -> None:
+        self.inner, self.cell, self.accounts = inner, inner.cell, inner.accounts
 
     @property
     def steps(self) -> int:

@@ -11,7 +11,6 @@ from typing import Any
 from executive import errors
 from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.clock import StepClock
-from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
 from executive.events import InputRead
@@ -99,14 +98,9 @@ class ReplayedCell(CellWrapper):
         self._has_raised_stop = False
         self.is_live = False
         clock = StepClock(self._read_clock, self.log.control_period)
-        self._cell = replace(intercept(inner.cell, self._handle_access, RECORDED_ROLES), clock=clock)
+        self.cell = replace(intercept(inner.cell, self._handle_access, RECORDED_ROLES), clock=clock)
         self._begin_step(0)
         self.pending_interruption = self._make_final_interruption(0)
-
-    @property
-    def cell(self) -> Cell:
-        """The cell that skills use."""
-        return self._cell
 
     @property
     def steps(self) -> int:

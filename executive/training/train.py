@@ -97,7 +97,7 @@ def train(
             "weights stored as": "int8",
         },
         epochs=read_epochs(out / "metrics.csv"),
-        evaluations={"validation images": accuracy},
+        accuracy=accuracy,
     )
     (out / "card.md").write_text(card, encoding="utf-8")
 

@@ -175,10 +175,13 @@ def test_a_card_states_settings_and_figures():
         summary="Finds cubes.",
         settings={"seed": "1"},
         epochs=[{"train/loss": 6.5, "val/mAP_50": 0.5}],
-        evaluations={"overhead": EVALUATION},
+        accuracy=EVALUATION,
     )
     assert text.startswith("# Small model\n\nFinds cubes.\n")
     assert "| seed | 1 |" in text
-    assert "| overhead | 300 | 900 | 0.9910 | 0.9900 | 0.9950 | 0.8000 | 0.60 / 1.50 / 2.90 |  |" in text
+    assert (
+        "| validation images | 300 | 900 | 0.9910 | 0.9900 | 0.9950 | 0.8000 | 0.60 / 1.50 / 2.90 |  |"
+        in text
+    )
     assert "at confidence 0.5" in text
     assert "| 1 | 6.5000 | 0.5000 |  |  |  |" in text

@@ -9,7 +9,6 @@ from functools import partial
 from typing import Any
 
 from executive.cell.cell_wrapper import CellWrapper
-from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
 from executive.errors import Fault, InputError
@@ -55,12 +54,7 @@ class FaultyCell(CellWrapper):
         self._time_faults = [(effect, time) for effect, time in faults if isinstance(time, TimeSpan)]
         self._activation_counts: Counter[int] = Counter()
         self._occurrences: list[Occurrence] = []
-        self._cell = intercept(inner.cell, self._intercept_access, _INTERCEPTED_ROLES)
-
-    @property
-    def cell(self) -> Cell:
-        """The cell with the faults, as skills see it."""
-        return self._cell
+        self.cell = intercept(inner.cell, self._intercept_access, _INTERCEPTED_ROLES)
 
     @property
     def world(self) -> WorldAccess:
