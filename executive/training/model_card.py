@@ -37,14 +37,8 @@ def render_card(
     environment = Environment(
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=StrictUndefined
     )
-    values = {
-        "title": title,
-        "summary": summary,
-        "settings": settings,
-        "epochs": epochs,
-        "accuracy": accuracy,
-    }
-    return environment.from_string(template).render(values, columns=EPOCH_COLUMNS)
+    values = {"title": title, "summary": summary, "settings": settings, "epochs": epochs}
+    return environment.from_string(template).render(values, accuracy=accuracy, columns=EPOCH_COLUMNS)
 
 
 def read_epochs(metrics_file: Path) -> list[dict[str, float]]:

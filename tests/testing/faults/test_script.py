@@ -156,7 +156,7 @@ def test_the_world_of_a_wrapped_cell_is_opened_and_that_of_an_unknown_cell_is_re
     fake.world.put("cube", 0.5, 0.0)
     assert [thing.label for thing in open_world(CellWrapper(CellWrapper(fake))).objects] == ["cube"]
     gone = [after(0.0, effects.object_removed(1))]
-    strange: Any = SimpleNamespace(cell=FakeCell().cell, advance=lambda: None)
+    strange: Any = SimpleNamespace(cell=FakeCell().cell, accounts=None, advance=lambda: None)
     with pytest.raises(
         InputError, match="faults cannot change the world of a SimpleNamespace; pass a function `open_world`"
     ):
