@@ -65,7 +65,7 @@ def assert_does_its_work(loaded: LoadedMission) -> None:
     # A detector behind a server cannot be measured here.
     assert [one for one in loaded.warnings if one.code != "not-measured"] == []
     options = RunOptions(0, [*loaded.routes], make_cell=FakeCell)
-    run = assemble(loaded, load_skills(), options, [in_time])
+    run = assemble(loaded, options, [in_time])
     try:
         outcome = run.execute()
         assert (outcome.status, outcome.message) == ("SUCCESS", "")

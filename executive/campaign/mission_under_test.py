@@ -9,23 +9,20 @@ from executive.cell.workcell import Workcell
 from executive.errors import InputError
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import load_cell_kind, load_skills
-from executive.skill import Skill
 
 
 @dataclass(frozen=True)
 class MissionUnderTest:
-    """A mission with the cell, the skills and the seed of its test runs.
+    """A mission with the cell and the seed of its test runs.
 
     Attributes:
         loaded: The mission, checked together with its cell file.
-        skills: Installed skills, and behaviours of py_trees that the mission names, by name.
         make_cell: Function that makes the work cell.
         cell_description: Kind of the cell, and source of the detections, for reports.
         seed: Random seed; in a series of runs, the seed of the first run.
     """
 
     loaded: LoadedMission
-    skills: Mapping[str, type[Skill]]
     make_cell: Callable[..., Workcell]
     cell_description: str
     seed: int
@@ -49,15 +46,13 @@ def load_mission_under_test(
     Raises:
         InputError: The mission does not exist or has errors, or `has_oracle` requires a simulated cell.
     """
-    skills = load_skills()
-    loaded = load_mission(mission, skills, overrides, load_cell_kind)
-    skills |= loaded.behaviours
+    loaded = load_mission(mission, load_skills(), overrides, load_cell_kind)
     kind = loaded.cell_config.kind
     if not has_oracle:
-        return MissionUnderTest(loaded, skills, load_cell_kind(kind), kind, seed)
+        return MissionUnderTest(loaded, load_cell_kind(kind), kind, seed)
     if kind != "sim":
         name = loaded.mission.name
         raise InputError(f"--oracle requires a simulated cell, but the cell of {name} is of kind {kind}")
     from executive.testing.oracle import make_oracle_kind
 
-    return MissionUnderTest(loaded, skills, make_oracle_kind(), "sim, true detections", seed)
+    return MissionUnderTest(loaded, make_oracle_kind(), "sim, true detections", seed)

@@ -18,7 +18,6 @@ from executive.plugins import load_skills
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.timeline.timeline import Timeline
 from executive.run.assembly import RunOptions
-from executive.skill import Skill
 from executive.view.report.page import try_write_report
 from executive.view.terminal.summary import format_repeat_command
 
@@ -93,10 +92,10 @@ def run_sweep(
 def run_job(job: SweepJob) -> RunRecord:
     """Execute and record one run, and return its rows; write a report if the run has a problem."""
     settings, timeline = job.settings, Timeline()
-    loaded, skills = _load_mission(settings.mission, tuple({**settings.overrides, **job.variant}.items()))
+    loaded = _load_mission(settings.mission, tuple({**settings.overrides, **job.variant}.items()))
     options = RunOptions(job.seed, scene=settings.scene)
     record_options = RecordOptions(saves_pictures=settings.saves_pictures, timeline=timeline)
-    result = record_run(loaded, skills, options, job.runs_folder, record_options)
+    result = record_run(loaded, options, job.runs_folder, record_options)
     record = make_record(job.index, job.variant, result, timeline)
     if record.run.problem:
         try_write_report(result.run)
@@ -113,9 +112,6 @@ def make_fault_record(job: SweepJob, error: BaseException) -> RunRecord:
 
 
 @functools.lru_cache(maxsize=4)
-def _load_mission(
-    mission: str, overrides: tuple[tuple[str, str], ...]
-) -> tuple[LoadedMission, Mapping[str, type[Skill]]]:
-    """Return mission and skills; cached, because a worker runs the same mission many times."""
-    skills = load_skills()
-    return load_mission(mission, skills, dict(overrides)), skills
+def _load_mission(mission: str, overrides: tuple[tuple[str, str], ...]) -> LoadedMission:
+    """Return the mission; cached, because a worker runs the same mission many times."""
+    return load_mission(mission, load_skills(), dict(overrides))

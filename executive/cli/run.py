@@ -127,8 +127,7 @@ def _run_mission(
     from executive.plugins import load_cell_kind, load_skills
     from executive.record.recorded_run import record_run
 
-    skills = load_skills()
-    loaded_mission = load_mission(mission, skills, overrides, load_cell_kind)
+    loaded_mission = load_mission(mission, load_skills(), overrides, load_cell_kind)
     for warning in loaded_mission.warnings if record.views else ():
         click.echo(str(warning), err=True)
     if run_options.scene is not None:
@@ -136,7 +135,7 @@ def _run_mission(
 
         # Only simulated cells read the scene file, but its errors are reported for every cell.
         load_scene(run_options.scene, loaded_mission.cell_config)
-    return record_run(loaded_mission, skills, run_options, runs, record)
+    return record_run(loaded_mission, run_options, runs, record)
 
 
 def _resume(

@@ -60,11 +60,10 @@ def command(
         from executive.view.tree.svg import make_svg
         from executive.view.tree.tree_text import draw_text, fold_subtrees
 
-        skills = load_skills()
-        loaded = load_mission(mission, skills, overrides)
+        loaded = load_mission(mission, load_skills(), overrides)
         # No node of the tree is executed, so that none needs a clock or a ledger.
         placeholder_cell = cast("Cell", SimpleNamespace(clock=None, ledger=None))
-        nodes = make_outline(build_tree(loaded, skills, placeholder_cell, Blackboard(), discard_event))
+        nodes = make_outline(build_tree(loaded, loaded.skills, placeholder_cell, Blackboard(), discard_event))
         nodes = fold_subtrees(nodes) if fold else nodes
         match "".join(formats).removeprefix("--format ").removeprefix("--"):
             case "svg":
@@ -74,7 +73,7 @@ def command(
             case "json":
                 output, as_json = json.loads(format_tree(nodes)), True
             case "btcpp":
-                output = format_btcpp(loaded.mission, {**skills, **loaded.behaviours})
+                output = format_btcpp(loaded.mission, loaded.skills)
             case _:
                 output = draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
     print_json(output) if as_json else click.echo(output)

@@ -32,13 +32,14 @@ def build_tree(
 ) -> TreeNode:
     """Return the root of a new behaviour tree; every node of the tree has a unique, readable `path`.
 
-    `substitutes` contains skills that run in place of the mission's skills, by pattern of node paths. In a
-    pattern, `*` matches any characters, including `/`. The first matching pattern applies.
+    `skills` contains the installed skills by name. `substitutes` contains skills that run in place of the
+    mission's skills, by pattern of node paths. In a pattern, `*` matches any characters, including `/`. The
+    first matching pattern applies.
 
     Raises:
         InputError: A pattern matches no skill node.
     """
-    builder = TreeBuilder({**skills, **loaded.behaviours}, cell, blackboard, emit, substitutes or {})
+    builder = TreeBuilder({**loaded.skills, **skills}, cell, blackboard, emit, substitutes or {})
     root = builder.build_node(loaded.tree)
     paths = [node.path for node in root.iterate() if isinstance(node, SkillLeaf)]
     for pattern in builder.substitutes:

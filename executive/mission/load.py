@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
 
@@ -49,7 +49,7 @@ class LoadedMission:
         unhandled_failures: Failures that can end the mission, because no node handles them.
         warnings: Findings that do not prevent a run.
         overrides: Values of `--set` as text, by name of a param or by `cell.<key>.<key>`.
-        behaviours: Skill classes made from the py_trees behaviours in the mission, by class name.
+        skills: Installed skills by name, and skills for the py_trees behaviours in the mission by class name.
     """
 
     mission: Mission
@@ -59,10 +59,10 @@ class LoadedMission:
     path: Path
     cell_path: Path
     libraries: Mapping[str, str]
-    unhandled_failures: tuple[UnhandledFailure, ...] = ()
-    warnings: tuple[Finding, ...] = ()
-    overrides: Mapping[str, str] = field(default_factory=dict)
-    behaviours: Mapping[str, type[Skill]] = field(default_factory=dict)
+    unhandled_failures: tuple[UnhandledFailure, ...]
+    warnings: tuple[Finding, ...]
+    overrides: Mapping[str, str]
+    skills: Mapping[str, type[Skill]]
 
     @property
     def params(self) -> dict[str, JsonValue]:
@@ -136,7 +136,7 @@ def load_mission(
     return LoadedMission(
         mission, tree, config, files.source.text, mission_path, cell.path, files.libraries,
         find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
-        dict(overrides or {}), files.behaviours,
+        dict(overrides or {}), skills,
     )  # fmt: skip
 
 

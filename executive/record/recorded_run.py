@@ -27,7 +27,6 @@ from executive.record.run_directory import SCENE_FILE, RunDirectory, make_dated_
 from executive.record.timeline.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
-from executive.skill import Skill
 
 
 class View(Protocol):
@@ -65,7 +64,6 @@ class RecordOptions:
 
 def record_run(
     loaded: LoadedMission,
-    skills: Mapping[str, type[Skill]],
     options: RunOptions,
     runs_folder: Path,
     record: RecordOptions = RecordOptions(),
@@ -74,7 +72,6 @@ def record_run(
 
     Args:
         loaded: The mission and its cell.
-        skills: Installed skills by name.
         options: Options of the run; the run directory gets a copy of the scene file.
         runs_folder: Folder of the run directories.
         record: Options of the record.
@@ -84,11 +81,11 @@ def record_run(
         ExecutiveError: The result cannot be written.
     """
     start_time = time.perf_counter()
-    run = assemble(loaded, skills, options)
+    run = assemble(loaded, options)
     with closing(run):
         directory = make_run_directory(run, loaded, options, runs_folder)
         recorder = Recorder(directory, saves_pictures=record.saves_pictures)
-        recorded_run = RecordedRun(run, loaded, skills, directory, recorder, record)
+        recorded_run = RecordedRun(run, loaded, directory, recorder, record)
         result = recorded_run.execute(options.seed, start_time)
     if not record.saves_pictures and result.status in FINAL_STATUSES:
         # Only a resumption and a film need the log of the simulated world.
@@ -125,7 +122,6 @@ class RecordedRun:
     Attributes:
         run: Run without views and recorder.
         loaded: Mission of the run.
-        skills: Installed skills by name.
         directory: The run directory.
         recorder: Recorder of the run.
         options: Views of the run, and whether the run starts paused.
@@ -135,7 +131,6 @@ class RecordedRun:
 
     run: Run
     loaded: LoadedMission
-    skills: Mapping[str, type[Skill]]
     directory: RunDirectory
     recorder: Recorder
     options: RecordOptions = RecordOptions()
@@ -188,7 +183,7 @@ class RecordedRun:
             wall_time_s=round(wall_time, 3),
             trace=self.recorder.trace,
             run=str(path),
-            diagnosis=diagnose(timeline, run_end, self.loaded, self.skills, path, lambda: arm.at_rest),
+            diagnosis=diagnose(timeline, run_end, self.loaded, path, lambda: arm.at_rest),
         )
 
     def _execute_with_observers(self) -> tuple[RunEnded, Mapping[str, int] | None]:

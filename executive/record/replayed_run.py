@@ -85,15 +85,13 @@ def replay_run(
         raise InputError(f'"{path}" contains no run that can be replayed: its journal has no inputs of a run')
     loaded = read_mission_of_run(path, start, skills, mission)
     edited = mission is not None and loaded.text != (path / "mission.yaml").read_text(encoding="utf-8")
-    return replay_and_compare(loaded, skills, log, start.seed, edited=edited)
+    return replay_and_compare(loaded, log, start.seed, edited=edited)
 
 
-def replay_and_compare(
-    loaded: LoadedMission, skills: Mapping[str, type[Skill]], log: InputLog, seed: int, edited: bool = False
-) -> ReplayResult:
+def replay_and_compare(loaded: LoadedMission, log: InputLog, seed: int, edited: bool = False) -> ReplayResult:
     """Replay a log with a mission, and compare the decisions with the log."""
     comparison = _Comparison(log, edited)
-    run = assemble_replay(loaded, skills, log, seed, observers=[comparison])
+    run = assemble_replay(loaded, log, seed, observers=[comparison])
     comparison.run = run
     run.execute()
     comparison.compare_end()

@@ -62,7 +62,7 @@ def resume_run(
         loaded = read_mission_of_run(path, start, skills)
         # The control step of a halt or fault is not compared, because a corrected skill may act differently.
         compared_log = log if log.halt is None else log.select_before(log.halt.tick)
-        replay = replay_and_compare(loaded, skills, compared_log, start.seed)
+        replay = replay_and_compare(loaded, compared_log, start.seed)
         if not replay.is_equal:
             raise InputError(
                 f'the run in "{path}" cannot be resumed: {replay.difference}. The executive or a '
@@ -70,7 +70,7 @@ def resume_run(
             )
         options = replace(options, seed=start.seed, requests=start.requests, scene=directory.scene)
         run = assemble_resumed(
-            loaded, skills, options, log, directory.world_log,
+            loaded, options, log, directory.world_log,
             is_complete=replay.is_complete, has_ended=lacks_only_result,
         )  # fmt: skip
     except BaseException:
@@ -81,7 +81,7 @@ def resume_run(
         recorder.add_to_trace(replayed_events)
         earlier_events = [each for each in replayed_events if isinstance(each.event, EVENTS_WITHOUT_REPLAY)]
         message = _describe_missing_commands(run.replayed_cell)
-        recorded_run = RecordedRun(run, loaded, skills, directory, recorder, record, earlier_events, message)
+        recorded_run = RecordedRun(run, loaded, directory, recorder, record, earlier_events, message)
         return recorded_run.execute(start.seed, start_time)
 
 

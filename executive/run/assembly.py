@@ -52,24 +52,18 @@ class RunOptions:
     scene: Path | None = None
 
 
-def assemble(
-    loaded: LoadedMission,
-    skills: Mapping[str, type[Skill]],
-    options: RunOptions,
-    observers: Sequence[Observer] = (),
-) -> Run:
+def assemble(loaded: LoadedMission, options: RunOptions, observers: Sequence[Observer] = ()) -> Run:
     """Return a new run of a mission.
 
     Args:
         loaded: The mission and its cell.
-        skills: Installed skills by name.
         options: Options of the run.
         observers: Observers of the events; each event is passed to the observers in this order.
 
     Raises:
         InputError: The kind of the cell is not installed, or a request names no class of the mission.
     """
-    builder = _RunBuilder(loaded, skills, options, RunContext(observers))
+    builder = _RunBuilder(loaded, options, RunContext(observers))
     workcell = builder.build_workcell()
     builder.context.connect(workcell, LookaheadPlanner(workcell.cell))
     start_event = RunStarted(
@@ -91,7 +85,6 @@ def assemble(
 
 def assemble_resumed(
     loaded: LoadedMission,
-    skills: Mapping[str, type[Skill]],
     options: RunOptions,
     log: InputLog,
     world_log: Path,
@@ -103,7 +96,6 @@ def assemble_resumed(
 
     Args:
         loaded: The mission and its cell.
-        skills: Installed skills by name.
         options: Options of the interrupted run.
         log: The recorded inputs.
         world_log: File from which a simulated cell reconstructs its world.
@@ -113,7 +105,7 @@ def assemble_resumed(
     Raises:
         InputError: The kind of the cell is not installed, or its world cannot be reconstructed.
     """
-    builder = _RunBuilder(loaded, skills, options, RunContext())
+    builder = _RunBuilder(loaded, options, RunContext())
     frame_count, pose_count = (len(log.inputs.get(name, ())) for name in ("camera.frame", "camera.next_pose"))
     request_count = sum(isinstance(timed.event, RequestGiven) for timed in log.events)
     workcell = builder.build_workcell(ResumePoint(world_log, frame_count, pose_count), request_count)
@@ -124,15 +116,11 @@ def assemble_resumed(
 
 
 def assemble_replay(
-    loaded: LoadedMission,
-    skills: Mapping[str, type[Skill]],
-    log: InputLog,
-    seed: int,
-    observers: Sequence[Observer] = (),
+    loaded: LoadedMission, log: InputLog, seed: int, observers: Sequence[Observer] = ()
 ) -> ResumedRun:
     """Return a run that replays a recorded run without hardware or simulation."""
     options = RunOptions(seed, requests=(), make_cell=CellWithoutHardware)
-    builder = _RunBuilder(loaded, skills, options, RunContext(observers))
+    builder = _RunBuilder(loaded, options, RunContext(observers))
     return builder.build_resumed_run(builder.build_workcell(), log)
 
 
@@ -141,13 +129,12 @@ class _RunBuilder:
     """Builder of the work cell, the tree and the run of a mission.
 
     Attributes:
-        loaded, skills, options: Arguments of `assemble`.
+        loaded, options: Arguments of `assemble`.
         context: Cell and events of the run; its method `connect` must be called before `build_tree`.
         control: Control with which other threads stop, pause and step the run.
     """
 
     loaded: LoadedMission
-    skills: Mapping[str, type[Skill]]
     options: RunOptions
     context: RunContext
     control: RunControl = field(default_factory=RunControl)
@@ -175,7 +162,7 @@ class _RunBuilder:
     def build_tree(self) -> TreeNode:
         """Return the behaviour tree of the mission for the cell of `context`."""
         cell, emit = self.context.cell, self.context.emit
-        return build_tree(self.loaded, self.skills, cell, Blackboard(), emit, self.options.substitutes)
+        return build_tree(self.loaded, self.loaded.skills, cell, Blackboard(), emit, self.options.substitutes)
 
     def build_resumed_run(
         self, workcell: Workcell, log: InputLog, interruption: Interruption | None = None

@@ -102,8 +102,7 @@ def run_mission(
         InputError: The mission does not exist, a pattern matches no node, or a substitute is no subclass of
             the skill that it replaces.
     """
-    skills = load_skills()
-    loaded = load_mission(mission, skills, set)
+    loaded = load_mission(mission, load_skills(), set)
     events: list[TimedEvent] = []
 
     def make_arranged_cell(*args: Any, **options: Any) -> Workcell:
@@ -118,12 +117,12 @@ def run_mission(
 
     make_faulty_cell = with_faults(make_arranged_cell, faults, timeout=timeout)
     options = RunOptions(seed, requests, make_cell=make_faulty_cell, substitutes=substitutes or {})
-    run = assemble(loaded, skills, options, [events.append, *observers])
+    run = assemble(loaded, options, [events.append, *observers])
     workcell = run.workcell
     assert isinstance(workcell, FaultyCell)
     try:
         workcell.check_patterns([getattr(node, "path", node.name) for node in run.root.iterate()])
-        _check_substitutes(run, {**skills, **loaded.behaviours})
+        _check_substitutes(run, loaded.skills)
         run.add_observer(workcell.on_event)
         for visitor in visitors:
             run.behaviour_tree.add_visitor(visitor)

@@ -140,9 +140,9 @@ def test_an_exception_is_a_fault_of_the_node(write: Write) -> None:
 
 
 def test_interleaved_runs_count_for_themselves(write: Write) -> None:
-    loaded, skills = load_mission(write(COUNT), load_skills()), load_skills()
+    loaded = load_mission(write(COUNT), load_skills())
     events: list[list[TimedEvent]] = [[], []]
-    runs = [assemble(loaded, skills, RunOptions(0, (), make_cell=FakeCell), [each.append]) for each in events]
+    runs = [assemble(loaded, RunOptions(0, (), make_cell=FakeCell), [each.append]) for each in events]
     for _ in range(20):
         for run in runs:
             if run.root.status is not Status.SUCCESS:
@@ -207,7 +207,7 @@ def test_a_registered_class_may_be_named_by_its_path_too(write: Write) -> None:
 def record(path: Path, tmp_path: Path) -> Path:
     loaded = load_mission(path, load_skills())
     options = RunOptions(0, (), make_cell=FakeCell)
-    record_run(loaded, load_skills(), options, tmp_path / "runs", RecordOptions(saves_pictures=False))
+    record_run(loaded, options, tmp_path / "runs", RecordOptions(saves_pictures=False))
     return find_run("latest", tmp_path / "runs")
 
 
@@ -244,7 +244,7 @@ class _Cutter:
 def test_an_interrupted_run_continues_with_its_blackboard(write: Write, tmp_path: Path) -> None:
     loaded, options = load_mission(write(COUNT), load_skills()), RunOptions(0, (), make_cell=FakeCell)
     with pytest.raises(_Cut):
-        record_run(loaded, load_skills(), options, tmp_path / "runs", RecordOptions([_Cutter()], False))
+        record_run(loaded, options, tmp_path / "runs", RecordOptions([_Cutter()], False))
     run = find_run("latest", tmp_path / "runs")
     result = resume_run(run, load_skills(), options, RecordOptions(saves_pictures=False))
     assert result.status == "SUCCESS"
@@ -262,7 +262,7 @@ def test_the_failure_of_a_recorded_run_is_explained(write: Write, tmp_path: Path
 
 def test_a_substitute_replaces_a_behaviour(write: Write) -> None:
     path = write("  - {PyTree: {class: py_trees.behaviours:Success}}\n")
-    skill = load_mission(path, load_skills()).behaviours["Success"]
+    skill = load_mission(path, load_skills()).skills["Success"]
     result = run_mission(path, substitutes={"*/Success": make_failing(skill, "failed")})
     assert (result.status, result.message) == ("FAILURE", "injected failure")
 

@@ -144,7 +144,7 @@ def _record_whole(subject: MissionUnderTest, runs: Path) -> Snapshots:
     """Run the mission to its end, and return the snapshots of its record."""
     snapshots = Snapshots(runs)
     options = RunOptions(subject.seed, subject.requests, make_cell=subject.make_cell)
-    record_run(subject.loaded, subject.skills, options, runs, RecordOptions([snapshots]))
+    record_run(subject.loaded, options, runs, RecordOptions([snapshots]))
     return snapshots
 
 
@@ -184,13 +184,13 @@ def _report(path: Path) -> None:
 
 
 def _replay(subject: MissionUnderTest, path: Path) -> None:
-    if difference := replay_run(path, read_journal(path / "journal.jsonl"), subject.skills).difference:
+    if difference := replay_run(path, read_journal(path / "journal.jsonl"), subject.loaded.skills).difference:
         raise SystemExit(_tell(1, difference))
 
 
 def _resume_to_first_tick(subject: MissionUnderTest, path: Path) -> None:
     options = RunOptions(subject.seed, make_cell=subject.make_cell)
-    resume_run(path, subject.skills, options, RecordOptions([StopAtFirstTick()], saves_pictures=False))
+    resume_run(path, subject.loaded.skills, options, RecordOptions([StopAtFirstTick()], saves_pictures=False))
 
 
 def _film_first_picture(path: Path) -> None:
@@ -249,13 +249,13 @@ def _resume(subject: MissionUnderTest, path: Path, case: str) -> Figures:
     def resume() -> Figures:
         options = RunOptions(subject.seed, make_cell=subject.make_cell)
         try:
-            result = resume_run(path, subject.skills, options, RecordOptions(saves_pictures=False))
+            result = resume_run(path, subject.loaded.skills, options, RecordOptions(saves_pictures=False))
         except InputError as error:
             has_begun = "was interrupted before its start" not in str(error)
             return {"agrees": True, "status": "refused", "problems": [str(error)] if has_begun else []}
         after = InputLog.from_events(read_journal(path / "journal.jsonl"))
         problems = find_wrong_claims(result)
-        if difference := replay_and_compare(subject.loaded, subject.skills, after, result.seed).difference:
+        if difference := replay_and_compare(subject.loaded, after, result.seed).difference:
             problems.append(f"the replay differs: {difference}")
         return {
             "agrees": not result.disagreement,

@@ -274,7 +274,7 @@ def _run_in_this_process(
     loaded = load_mission(mission, skills, {}, load_cell_kind)
     maker = AuditedCellMaker(detectors)
     options = RunOptions(seed, make_cell=maker, scene=scene)
-    result = record_run(loaded, skills, options, runs, RecordOptions(saves_pictures=False))
+    result = record_run(loaded, options, runs, RecordOptions(saves_pictures=False))
     reports = read_reports(Path(result.run) / "journal.jsonl")
     objects = tuple(
         replace(one, reports=tuple(reports[item] for item in one.items if item in reports))

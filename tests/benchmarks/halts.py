@@ -181,7 +181,6 @@ class _RunWithHalts:
 
         self._run = assemble(
             subject.loaded,
-            subject.skills,
             RunOptions(subject.seed, subject.requests, make_cell=make_cell),
             [lambda event: self._journal(event), self._trace],
         )

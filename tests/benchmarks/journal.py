@@ -25,7 +25,7 @@ def measure(subject: MissionUnderTest, runs: Path) -> Figures:
     times: list[float] = []
     began = time.perf_counter()
     options = RunOptions(subject.seed, subject.requests, make_cell=subject.make_cell)
-    run = assemble(subject.loaded, subject.skills, options)
+    run = assemble(subject.loaded, options)
     with closing(run), tempfile.TemporaryDirectory(prefix=".journal-", dir=runs) as folder:
         with closing(Recorder(RunDirectory(Path(folder)), saves_pictures=False)) as recorder:
 

@@ -120,10 +120,10 @@ def resume_killed_run(subject: MissionUnderTest, seed: int, runs: Path, change: 
     def resume() -> Figures:
         done = change_world(subject, seed, path, past, change) if change else ""
         options = RunOptions(seed, make_cell=subject.make_cell)
-        result = resume_run(path, subject.skills, options, RecordOptions(saves_pictures=False))
+        result = resume_run(path, subject.loaded.skills, options, RecordOptions(saves_pictures=False))
         after = InputLog.from_events(read_journal(path / "journal.jsonl"))
         problems = [*check_result(result, change_made=done), *find_handled_twice(after.events)]
-        difference = replay_and_compare(subject.loaded, subject.skills, after, seed).difference
+        difference = replay_and_compare(subject.loaded, after, seed).difference
         if difference:
             problems.append(f"the replay differs: {difference}")
         ending = f"{result.status} {result.reason}".strip()
@@ -158,7 +158,7 @@ def change_world(subject: MissionUnderTest, seed: int, path: Path, past: InputLo
                 done.append(f"moved {thing.label}")
 
     assert past.start_event is not None
-    loaded = read_mission_of_run(path, past.start_event, subject.skills)
+    loaded = read_mission_of_run(path, past.start_event, subject.loaded.skills)
     meanwhile(path / "world.log", loaded, seed, act, subject.make_cell)
     return "".join(done)
 

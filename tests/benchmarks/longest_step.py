@@ -89,7 +89,7 @@ def measure(subject: MissionUnderTest, runs: Path, run_count: int) -> Figures:
             return workcell
 
         options = RunOptions(seed, subject.requests, make_cell=make_cell)
-        record_run(subject.loaded, subject.skills, options, runs, RecordOptions([timer]))
+        record_run(subject.loaded, options, runs, RecordOptions([timer]))
         walls, cpus = zip(*timer.steps, strict=True)
         row = {
             "seed": seed,

@@ -88,7 +88,7 @@ def run_mission_command(measure: Callable[..., Figures], *options: Option) -> No
 def record_subject(subject: MissionUnderTest, seed: int, runs: Path) -> tuple[Figures, str]:
     """Run a mission to its end, recorded below `runs`; return its result and, if it failed, a sentence."""
     options = RunOptions(seed, subject.requests, make_cell=subject.make_cell)
-    result = record_run(subject.loaded, subject.skills, options, runs, RecordOptions(saves_pictures=False))
+    result = record_run(subject.loaded, options, runs, RecordOptions(saves_pictures=False))
     if result.status == "HALTED":
         raise KeyboardInterrupt
     if result.status == "SUCCESS" and not result.disagreement:

@@ -58,7 +58,7 @@ def measure(subject: MissionUnderTest) -> Figures:
     """Measure the wall time of a recorded run of MISSION, relative to a bare PyBullet loop."""
     options, frames = RunOptions(subject.seed, subject.requests, make_cell=subject.make_cell), FrameLog()
     with tempfile.TemporaryDirectory() as folder:
-        run = assemble(subject.loaded, subject.skills, options)
+        run = assemble(subject.loaded, options)
         with closing(run):
             directory = make_run_directory(run, subject.loaded, options, Path(folder))
             start_time = time.perf_counter()

@@ -170,7 +170,7 @@ def test_runs_of_a_worker_are_equal_to_single_runs(tmp_path: Path) -> None:
     for job in (jobs[0], jobs[5], jobs[1]):
         found = run_job(job)
         loaded = load_mission("sort_fruit", load_skills(), job.variant)
-        single = record_run(loaded, load_skills(), RunOptions(job.seed), tmp_path / "single")
+        single = record_run(loaded, RunOptions(job.seed), tmp_path / "single")
         expected = make_record(
             job.index,
             job.variant,
@@ -205,9 +205,7 @@ def test_simulated_runs_of_a_worker_are_equal_to_single_runs(tmp_path: Path) -> 
     assert found is not None
     loaded = load_mission("sort_overhead", load_skills(), overrides)
     history = Timeline()
-    single = record_run(
-        loaded, load_skills(), RunOptions(7), tmp_path / "single", RecordOptions(timeline=history)
-    )
+    single = record_run(loaded, RunOptions(7), tmp_path / "single", RecordOptions(timeline=history))
     expected = make_record(2, {}, single, history)
     same_run = replace(expected.run, wall_time_s=found.run.wall_time_s, run=found.run.run)
     assert found == replace(expected, run=same_run)

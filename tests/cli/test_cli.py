@@ -46,7 +46,7 @@ def project(monkeypatch):
         named = SimpleNamespace(name=mission)
         return SimpleNamespace(mission=named, warnings=asked.warnings, unhandled_failures=asked.endings)
 
-    def record_run(loaded, skills, options, runs, record):
+    def record_run(loaded, options, runs, record):
         asked.run.append((options, runs, record))
         os.write(1, b"noise from a library\n")
         if asked.run_error is not None:

@@ -164,7 +164,7 @@ def test_a_param_reads_no_variable_of_its_own_name(write: Callable[[str], Path])
 
 def test_a_field_is_shown_in_drawings(write: Callable[[str], Path]) -> None:
     loaded = load_mission(write(compare("$target.label", "cube")), load_skills())
-    run = assemble(loaded, load_skills(), RunOptions(0, make_cell=FakeCell), [])
+    run = assemble(loaded, RunOptions(0, make_cell=FakeCell), [])
     try:
         (node,) = (node for node in make_outline(run.root) if node.skill == "IsEqual")
     finally:

@@ -124,7 +124,7 @@ def _run(loaded: LoadedMission, skills: Mapping[str, type[Skill]], seed: int) ->
     witness = Witness(loaded, skills, scope := Blackboard())
     with mock.patch.object(assembly, "Blackboard", lambda: scope):
         options = RunOptions(seed, wishes, make_cell=UnkindCell)
-        run = assemble(loaded, skills, options, [witness])
+        run = assemble(loaded, options, [witness])
     assert isinstance(run.workcell, UnkindCell)
     witness.cell = run.workcell
     outcome = run.execute()

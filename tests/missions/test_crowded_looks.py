@@ -116,7 +116,7 @@ def run_crowded(
     skills = load_skills()
     loaded = load_mission(mission, skills, find_cell_kind=load_cell_kind)
     options = RunOptions(1, has_keyboard=False, make_cell=kind)
-    result = record_run(loaded, skills, options, runs, RecordOptions(saves_pictures=False))
+    result = record_run(loaded, options, runs, RecordOptions(saves_pictures=False))
     return result, (Path(result.run) / "journal.jsonl").read_text()
 
 

@@ -77,7 +77,7 @@ class Dropping(Spoilt):
 def test_everything_is_in_its_bin_and_the_books_are_right(
     tmp_path: Path, kind: type[FakeCell], seed: int
 ) -> None:
-    run = assemble(loaded(tmp_path, "sort_overhead"), load_skills(), RunOptions(seed, make_cell=kind))
+    run = assemble(loaded(tmp_path, "sort_overhead"), RunOptions(seed, make_cell=kind))
     try:
         outcome, items, audit = run.execute(), run.count_items(), dict(run.count_ground_truth() or {})
     finally:

@@ -132,12 +132,12 @@ def cut_run(tmp_path: Path) -> Iterator[tuple[Path, Any]]:
 
     ended: list[int] = []
     whole = RecordOptions([Watcher(ended)], saves_pictures=False)
-    result = record_run(loaded, load_skills(), RunOptions(0, make_cell=Cell), tmp_path, whole)
+    result = record_run(loaded, RunOptions(0, make_cell=Cell), tmp_path, whole)
     assert result.status == "SUCCESS"
     views = [Cutter(ended[0] + 400)]
     with pytest.raises(Cut):
         options = RecordOptions(views, saves_pictures=False)
-        record_run(loaded, load_skills(), RunOptions(0, make_cell=Cell), tmp_path, options)
+        record_run(loaded, RunOptions(0, make_cell=Cell), tmp_path, options)
     yield find_run("latest", tmp_path), Cell
 
 

@@ -59,7 +59,7 @@ def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = F
     # Where an operator is asked, every class is asked for until there can be none of it left.
     requests = [*mission.routes] * 6
     options = RunOptions(seed, requests, make_cell=kind)
-    run = assemble(mission, load_skills(), options, [observe])
+    run = assemble(mission, options, [observe])
     try:
         outcome = run.execute()
         return Done(

@@ -59,7 +59,7 @@ class FailedRun:
         self.loaded = load_mission(file, load_skills(), overrides or {})
         self.timeline = Timeline(has_history=False)
         options = RunOptions(3, requests, make_cell=FakeCell)
-        self.run = assemble(self.loaded, load_skills(), options, [self.timeline])
+        self.run = assemble(self.loaded, options, [self.timeline])
         assert isinstance(self.run.workcell, FakeCell)
         self.fake = self.run.workcell
         if objects:
@@ -73,7 +73,7 @@ class FailedRun:
 
     def diagnose(self, end: RunEnded, is_at_rest: Callable[[], bool]) -> Diagnosis | None:
         """Return the diagnosis of the run, which has ended."""
-        return diagnose(self.timeline, end, self.loaded, load_skills(), Path(), is_at_rest)
+        return diagnose(self.timeline, end, self.loaded, Path(), is_at_rest)
 
     def at_every_step(self, do: Callable[[], None]) -> None:
         """Have something done after every control step."""

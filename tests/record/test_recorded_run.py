@@ -49,7 +49,7 @@ def run(bring_one, tmp_path, monkeypatch):
         try:
             record = RecordOptions(views, **options)
             run_options = RunOptions(3, make_cell=FakeCell)
-            return record_run(loaded, load_skills(), run_options, tmp_path / "runs", record)
+            return record_run(loaded, run_options, tmp_path / "runs", record)
         finally:
             assert len(closed) == 1
 

@@ -39,7 +39,7 @@ def recorded(missions: Path, runs: Path, name: str, kind: Any = FakeCell) -> Pat
     loaded = load_mission(missions / f"{name}.yaml", load_skills())
     requests = [*loaded.routes] * 4
     options = RunOptions(3, requests, make_cell=kind)
-    record_run(loaded, load_skills(), options, runs, RecordOptions(saves_pictures=False))
+    record_run(loaded, options, runs, RecordOptions(saves_pictures=False))
     return find_run("latest", runs)
 
 
@@ -101,8 +101,8 @@ def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
     file, skills = missions / "sort_overhead.yaml", load_skills()
     four_times = [during("*/Grasp", seal_fails(), activations=(1, 2, 3, 4))]
     log = InputLog.from_events(run_mission(file, seed=3, faults=four_times).events)
-    assert replay_and_compare(load_mission(file, skills), skills, log, 3).is_equal
-    done = replay_and_compare(load_mission(file, skills, {"attempts": "2"}), skills, log, 3, edited=True)
+    assert replay_and_compare(load_mission(file, skills), log, 3).is_equal
+    done = replay_and_compare(load_mission(file, skills, {"attempts": "2"}), log, 3, edited=True)
     assert done.replayed.event.node == "RejectTarget"
 
 
@@ -130,6 +130,6 @@ def test_a_decision_too_many_is_a_difference_in_a_run_that_was_cut_off_too(missi
     decided = NodeStarted | NodeEnded | BranchChosen | TargetSelected | ItemChanged | ToolCommanded
     without = [one for n, one in enumerate(cut) if n < missing or not isinstance(one.event, decided)]
     loaded = load_mission(file, skills)
-    assert replay_and_compare(loaded, skills, InputLog.from_events(cut), 3).is_equal
-    done = replay_and_compare(loaded, skills, InputLog.from_events(without), 3)
+    assert replay_and_compare(loaded, InputLog.from_events(cut), 3).is_equal
+    done = replay_and_compare(loaded, InputLog.from_events(without), 3)
     assert (done.recorded, done.replayed and type(done.replayed.event)) == (None, ToolCommanded)

@@ -74,10 +74,9 @@ def load(missions: Path, name: str) -> LoadedMission:
 
 def run_of(loaded: LoadedMission, runs: Path, **options: Any) -> Result:
     """Run a mission on the fake cell, asking for every class four times."""
-    skills, views = options.pop("skills", load_skills()), options.pop("views", ())
-    frames = options.pop("frames", False)
+    views, frames = options.pop("views", ()), options.pop("frames", False)
     run = RunOptions(SEED, [*loaded.routes] * 4, **{"make_cell": FakeCell, **options})
-    return record_run(loaded, skills, run, runs, RecordOptions(views, saves_pictures=frames))
+    return record_run(loaded, run, runs, RecordOptions(views, saves_pictures=frames))
 
 
 def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
@@ -252,7 +251,7 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
 def test_a_run_that_a_bug_ended_resumes_after_the_repair(missions: Path, tmp_path: Path, name) -> None:
     skills = load_skills()
     buggy = {**skills, name: make_raising(skills[name], ZeroDivisionError("a bug"), delay_steps=3)}
-    first = run_of(load(missions, "sort_overhead"), tmp_path, skills=buggy)
+    first = run_of(replace(load(missions, "sort_overhead"), skills=buggy), tmp_path)
     assert (first.status, "a bug" in first.message) == ("FAULT", True)
     run = Path(first.run)
     again = resumed(run, skills=buggy)

@@ -62,7 +62,7 @@ def halt(missions: Path, tmp_path_factory: pytest.TempPathFactory, request: pyte
     earliest, file = request.param, tmp_path_factory.mktemp("halt") / "journal.jsonl"
     loaded = load_mission(missions / "sort_overhead.yaml", load_skills())
     journal = Journal(file)
-    run = assemble(loaded, load_skills(), RunOptions(2, make_cell=make_oracle_kind()), [journal])
+    run = assemble(loaded, RunOptions(2, make_cell=make_oracle_kind()), [journal])
     workcell = run.workcell
     assert isinstance(workcell, SimCell)
     client, arm, advance = workcell._world.client, workcell._arm, workcell.advance

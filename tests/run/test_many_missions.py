@@ -100,7 +100,7 @@ def items_of(workcell: Workcell) -> dict[str, object]:
 
 def story_of(name: str, seed: int) -> Story:
     trace = Trace()
-    run = assemble(loaded(name), skills(), RunOptions(seed, [], make_cell=FakeCell), [trace])
+    run = assemble(loaded(name), RunOptions(seed, [], make_cell=FakeCell), [trace])
     try:
         outcome = run.execute()
         return (

@@ -134,12 +134,12 @@ def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions
     type_in("")
     loaded = load_mission(missions / "pick_on_request.yaml", load_skills())
     events: list[TimedEvent] = []
-    run = assemble(loaded, load_skills(), RunOptions(1, make_cell=FakeCell), [events.append, interrupt])
+    run = assemble(loaded, RunOptions(1, make_cell=FakeCell), [events.append, interrupt])
     outcome = run.execute()
     assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
     ends = {one.event.status for one in events if isinstance(one.event, NodeEnded)}
     assert ends == {"INVALID"}, "nothing failed, and nobody quit"
-    again = replay_and_compare(loaded, load_skills(), InputLog.from_events(events), 1)
+    again = replay_and_compare(loaded, InputLog.from_events(events), 1)
     assert again.difference == ""
     assert again.decisions == sum(isinstance(one.event, NodeStarted | NodeEnded) for one in events) > 0
 

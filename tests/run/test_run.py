@@ -24,7 +24,7 @@ def make(
     events: list[Event] = []
     loaded = load_mission(missions / f"{name}.yaml", load_skills())
     observers = [events.append, *options.pop("observers", [])]
-    return assemble(loaded, load_skills(), RunOptions(seed, make_cell=FakeCell, **options), observers), events
+    return assemble(loaded, RunOptions(seed, make_cell=FakeCell, **options), observers), events
 
 
 def fake_of(run: Run) -> FakeCell:
@@ -114,7 +114,7 @@ def test_an_unknown_kind_of_cell_names_the_installed_ones(missions: Path) -> Non
     with pytest.raises(
         InputError, match='no installed package offers cells of kind "hardware"; installed: fake, sim'
     ):
-        assemble(loaded, load_skills(), RunOptions(1))
+        assemble(loaded, RunOptions(1))
 
 
 def test_a_box_that_stays_in_doubt_ends_in_an_empty_table_and_not_in_a_failure(missions: Path) -> None:

@@ -19,7 +19,7 @@ from executive.run.run_control import RunControl
 
 def make(missions: Path, observer) -> Run:
     loaded = load_mission(missions / "sort_overhead.yaml", load_skills())
-    return assemble(loaded, load_skills(), RunOptions(3, make_cell=FakeCell), [observer])
+    return assemble(loaded, RunOptions(3, make_cell=FakeCell), [observer])
 
 
 @pytest.mark.parametrize("steps", [0, 3])

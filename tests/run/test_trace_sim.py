@@ -16,7 +16,7 @@ from executive.testing.oracle import make_oracle_kind
 def trace_of(missions: Path, seed: int) -> str:
     trace = Trace()
     loaded = load_mission(missions / "sort_wrist.yaml", load_skills())
-    run = assemble(loaded, load_skills(), RunOptions(seed, make_cell=make_oracle_kind()), [trace])
+    run = assemble(loaded, RunOptions(seed, make_cell=make_oracle_kind()), [trace])
     try:
         assert run.execute().status == "SUCCESS"
     finally:

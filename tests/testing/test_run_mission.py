@@ -89,7 +89,7 @@ def test_without_disturbances_a_mission_goes_as_it_always_goes() -> None:
 
     events: list[TimedEvent] = []
     loaded, options = load_mission("sort_overhead", load_skills()), RunOptions(7, (), make_cell=FakeCell)
-    run = assemble(loaded, load_skills(), options, [events.append])
+    run = assemble(loaded, options, [events.append])
     run.execute()
     assert without_images(run_mission("sort_overhead", seed=7).events) == without_images(events)
 

@@ -94,7 +94,7 @@ class _FaultLister:
     """Lists the faults of one mission."""
 
     def __init__(self, mission: MissionUnderTest, nominal_run: NominalRun) -> None:
-        self._skills, self._nominal_run = mission.skills, nominal_run
+        self._skills, self._nominal_run = mission.loaded.skills, nominal_run
         self._table = mission.loaded.cell_config.table
         self._causes = list_causes(self._table)
         self.nodes = list_skill_nodes(mission)

@@ -49,7 +49,7 @@ def execute_nominal_run(mission: MissionUnderTest) -> NominalRun:
     """
     timeline = Timeline()
     options = RunOptions(mission.seed, mission.requests, make_cell=mission.make_cell)
-    run = assemble(mission.loaded, mission.skills, options, [timeline])
+    run = assemble(mission.loaded, options, [timeline])
     with closing(run):
         end = run.execute()
         if end.status == "HALTED":

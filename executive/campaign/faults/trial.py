@@ -49,7 +49,7 @@ def record_trial(
     run, loaded = trial_run.run, mission.loaded
     with closing(run):
         directory = make_run_directory(run, loaded, trial_run.options, runs)
-        recorded_run = RecordedRun(run, loaded, mission.skills, directory, Recorder(directory))
+        recorded_run = RecordedRun(run, loaded, directory, Recorder(directory))
         result = recorded_run.execute(mission.seed, start_time)
         try_write_report(result.run)
         assert trial_run.timeline.ended is not None, "every run emits its end"
@@ -67,14 +67,14 @@ class _TrialRun:
         self.timeline = Timeline()
         self._is_stopped = False
         cell_faults = [fault for fault in injected_faults if isinstance(fault, ScheduledFault)]
-        skills_by_path = {node.path: mission.skills[node.skill] for node in list_skill_nodes(mission)}
+        skills_by_path = {node.path: mission.loaded.skills[node.skill] for node in list_skill_nodes(mission)}
         self.options = RunOptions(
             mission.seed,
             mission.requests,
             make_cell=with_faults(mission.make_cell, cell_faults, timeout=nominal_run.timeout),
             substitutes=make_substitutes(self._skill_faults, skills_by_path),
         )
-        self.run = assemble(mission.loaded, mission.skills, self.options, [self._store_event, self.timeline])
+        self.run = assemble(mission.loaded, self.options, [self._store_event, self.timeline])
         assert isinstance(self.run.workcell, FaultyCell)
         self._workcell = self.run.workcell
         self.run.add_observer(self._workcell.on_event)

@@ -42,7 +42,6 @@ def diagnose(
     timeline: Timeline,
     end: RunEnded,
     loaded: LoadedMission,
-    skills: Mapping[str, type[Skill]],
     run_folder: Path,
     is_at_rest: Callable[[], bool],
 ) -> Diagnosis | None:
@@ -52,7 +51,6 @@ def diagnose(
         timeline: Timeline of the run.
         end: End of the run.
         loaded: Mission of the run.
-        skills: Installed skills by name.
         run_folder: Run directory with all pictures of the run.
         is_at_rest: Function that returns True if the arm is at rest; called only after a fault.
     """
@@ -60,7 +58,7 @@ def diagnose(
         return None
     run = FailedRun(loaded, timeline, end)
     arm_state = _describe_arm(is_at_rest) if end.status == "FAULT" else "at rest"
-    readings = list(_list_deciding_readings(run, {**skills, **loaded.behaviours}))
+    readings = list(_list_deciding_readings(run, loaded.skills))
     journal = RunDirectory(run_folder).journal
     has_journal = journal.exists() and journal.stat().st_size > 0
     items = timeline.items.find_items_in_states("seen", "dropped", "held")

@@ -12,9 +12,7 @@ from executive.plugins import load_skills
 
 
 def subject_of(mission: str, seed: int = 0, **overrides: str) -> MissionUnderTest:
-    return MissionUnderTest(
-        load_mission(mission, load_skills(), overrides), load_skills(), FakeCell, "fake", seed
-    )
+    return MissionUnderTest(load_mission(mission, load_skills(), overrides), FakeCell, "fake", seed)
 
 
 @pytest.fixture(scope="session")

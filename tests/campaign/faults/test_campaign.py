@@ -52,7 +52,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> MissionUnderTest:
     shutil.copy(missions / "cells" / "fruit.yaml", folder / "cells")
     (folder / "small.yaml").write_text(MISSION)
     loaded = load_mission(folder / "small.yaml", load_skills(), {"cell.table.objects": "[1, 1]"})
-    return MissionUnderTest(loaded, load_skills(), FakeCell, "fake", 0)
+    return MissionUnderTest(loaded, FakeCell, "fake", 0)
 
 
 @pytest.fixture(scope="module")

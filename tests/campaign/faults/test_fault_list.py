@@ -20,13 +20,13 @@ from executive.testing.faults import ScheduledFault
     "mission", ["pick_on_request", pytest.param("sort_overhead", marks=pytest.mark.slow)]
 )
 def test_every_reason_of_every_node_is_there_once_and_lasting_and_so_is_a_bug_in_each(mission: str) -> None:
-    subject = MissionUnderTest(load_mission(mission, load_skills()), load_skills(), FakeCell, "fake", 0)
+    subject = MissionUnderTest(load_mission(mission, load_skills()), FakeCell, "fake", 0)
     listed = {(fault.location, fault.kind, fault.occasion) for fault in Campaign(subject).faults}
     nodes = list_skill_nodes(subject)
     assert len(nodes) >= 20
     for node in nodes:
         assert (node.path, "raises", "first") in listed
-        for reason in subject.skills[node.skill].reasons:
+        for reason in subject.loaded.skills[node.skill].reasons:
             assert {(node.path, reason, "first"), (node.path, reason, "lasting")} <= listed
 
 

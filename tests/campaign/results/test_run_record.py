@@ -68,7 +68,7 @@ def test_a_phase_contains_all_activations_of_a_skill() -> None:
 def test_the_rows_follow_from_the_record_of_the_run(seed: int, tmp_path: Path) -> None:
     skills, history = load_skills(), Timeline()
     loaded = load_mission("sort_fruit", skills, {}, load_cell_kind)
-    result = record_run(loaded, skills, RunOptions(seed), tmp_path, RecordOptions(timeline=history))
+    result = record_run(loaded, RunOptions(seed), tmp_path, RecordOptions(timeline=history))
     record = make_record(5, {"a": "1"}, result, history)
     journal = read_journal(Path(result.run) / "journal.jsonl")
     stored = read_result(RunDirectory(Path(result.run)), journal)

@@ -171,7 +171,7 @@ def test_a_mission_is_rehearsed_in_a_cell_of_kind_fake_and_its_trays_fill_evenly
         "    times: 4\n"
         "    do: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]\n"
     )
-    run = assemble(load_mission(file, load_skills()), load_skills(), RunOptions(1))
+    run = assemble(load_mission(file, load_skills()), RunOptions(1))
     assert isinstance(run.workcell, FakeCell)
     outcome = run.execute()
     assert outcome.status == "SUCCESS", outcome

@@ -65,7 +65,7 @@ def mission(missions: Path):
 def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
     """One run, and what it would have left at some of its control steps."""
     folder = tmp_path_factory.mktemp("logs")
-    run = assemble(mission, load_skills(), RunOptions(SEED, make_cell=make_oracle_kind()))
+    run = assemble(mission, RunOptions(SEED, make_cell=make_oracle_kind()))
     cell = run.workcell
     assert isinstance(cell, SimCell)
     cell.log_to(folder / "log")

@@ -88,7 +88,7 @@ def sort(arrange, stub):
 
         path, overrides = arrange(FALLBACK, objects, deadline=1.0)
         loaded = load_mission(path, load_skills(), overrides)
-        run = assemble(loaded, load_skills(), RunOptions(1), [restart_server])
+        run = assemble(loaded, RunOptions(1), [restart_server])
         with contextlib.closing(run):
             outcome, truth = run.execute(), run.count_ground_truth()
         assert SECRET not in repr(events)

@@ -22,5 +22,5 @@ def filmed_run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
     (folder / "bring_one.yaml").write_text(MISSION)
     skills = load_skills()
     loaded = load_mission(folder / "bring_one.yaml", skills)
-    result = record_run(loaded, skills, RunOptions(5, make_cell=make_oracle_kind()), folder / "runs")
+    result = record_run(loaded, RunOptions(5, make_cell=make_oracle_kind()), folder / "runs")
     return RunDirectory(Path(result.run))

@@ -60,7 +60,7 @@ def watch(text: str, folder: Path, do: Callable[[Watched], Awaitable[None]]) -> 
     page = LivePage()
     # In real time, so that there is something to pause.
     options = RunOptions(3, has_keyboard=False, is_realtime=True, make_cell=FakeCell)
-    run = assemble(loaded, load_skills(), options, [page])
+    run = assemble(loaded, options, [page])
     run.control.pause()
     page.open(run)
     outcomes: list[RunEnded] = []
@@ -152,9 +152,7 @@ def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
     file = tmp_path / "mission.yaml"
     file.write_text(MISSION)
     page = LivePage()
-    run = assemble(
-        load_mission(file, load_skills()), load_skills(), RunOptions(3, make_cell=FakeCell), [page]
-    )
+    run = assemble(load_mission(file, load_skills()), RunOptions(3, make_cell=FakeCell), [page])
     page.open(run)
     page._server.kill()
     assert run.execute().status == "SUCCESS"

@@ -63,7 +63,7 @@ def recorded(folder: Path, kind: Callable[..., FakeCell]) -> Path:
     file.write_text(MISSION)
     loaded = load_mission(file, load_skills(), {"cell.kind": "fake", "cell.table.objects": "[2, 2]"})
     with contextlib.suppress(Cut):
-        record_run(loaded, load_skills(), RunOptions(3, (), make_cell=kind), folder / "my runs")
+        record_run(loaded, RunOptions(3, (), make_cell=kind), folder / "my runs")
     return find_run("latest", folder / "my runs")
 
 

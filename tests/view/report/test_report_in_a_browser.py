@@ -18,7 +18,7 @@ MISSION = Path(__file__).parents[3] / "missions" / "sort_wrist.yaml"
 
 def test_verdict_pictures_timeline_and_tree_are_to_be_seen(visit, tmp_path: Path) -> None:
     skills = load_skills()
-    result = record_run(load_mission(MISSION, skills), skills, RunOptions(3), tmp_path)
+    result = record_run(load_mission(MISSION, skills), RunOptions(3), tmp_path)
     file = write_report(Path(result.run))
     visit.page.goto(f"file://{file.resolve()}")
     assert visit.page.inner_text("h1") == "3 of 3 objects are in their bins."
