@@ -10,8 +10,7 @@ from pathlib import Path
 
 from executive.campaign.pool import run_jobs
 from executive.campaign.results.database import ResultsDatabase
-from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings
-from executive.campaign.results.run_record import make_record
+from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings, make_record
 from executive.errors import ExecutiveError
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import load_skills

@@ -20,7 +20,7 @@ import click
 import numpy as np
 from py_trees.common import Status
 
-from executive.campaign.end_checks import check_arm_at_rest, check_held_item, check_journal
+from executive.campaign.faults.trial_checks import check_arm_at_rest, check_held_item, check_journal
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.clock import STEP

@@ -18,8 +18,7 @@ import pytest
 
 from executive.campaign.pool import run_jobs
 from executive.campaign.results.database import ResultsDatabase
-from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings
-from executive.campaign.results.run_record import make_record
+from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings, make_record
 from executive.campaign.results.tables import RUNS
 from executive.campaign.sweep import (
     SweepJob,

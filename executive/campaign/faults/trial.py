@@ -9,7 +9,6 @@ from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 
-from executive.campaign.end_checks import check_arm_at_rest, check_held_item, check_journal
 from executive.campaign.faults import trial_checks
 from executive.campaign.faults.fault_list import list_skill_nodes
 from executive.campaign.faults.nominal_run import NominalRun
@@ -92,12 +91,12 @@ class _TrialRun:
         problems = [
             *trial_checks.check_end(run_end, faults, self._mission.loaded.unhandled_failures, is_bug_raised),
             *trial_checks.check_tree(run.root),
-            *check_journal(self._events, run_end),
+            *trial_checks.check_journal(self._events, run_end),
             *trial_checks.check_ledger(run_end, items, audit, removed_count, unobserved),
             *trial_checks.check_detection(run_end, audit, self.timeline),
             *trial_checks.check_losses(audit, self.timeline),
-            *check_held_item(run_end, self._workcell),
-            *check_arm_at_rest(self._workcell),
+            *trial_checks.check_held_item(run_end, self._workcell),
+            *trial_checks.check_arm_at_rest(self._workcell),
         ]
         return Trial(
             **asdict(run_end),

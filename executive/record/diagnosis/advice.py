@@ -8,8 +8,7 @@ from executive.errors import Unavailable
 from executive.mission.model.instance import get_mission_node
 from executive.mission.model.nodes import InnerNode
 from executive.mission.model.values import Literal
-from executive.record.diagnosis.failed_run import FailedRun
-from executive.record.diagnosis.failure_path import FailurePathNode
+from executive.record.diagnosis.failed_run import FailedRun, FailurePathNode
 from executive.record.timeline.activation import Reading
 from executive.record.timeline.items import ItemHistory
 from executive.tree.inspection import Advice

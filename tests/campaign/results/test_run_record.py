@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.campaign.results.rows import ItemRow, PhaseRow
-from executive.campaign.results.run_record import make_record
+from executive.campaign.results.rows import ItemRow, PhaseRow, make_record
 from executive.events import ItemChanged, NodeEnded, NodeStarted, RunEnded, TargetSelected, TimedEvent
 from executive.mission.load import load_mission
 from executive.plugins import load_cell_kind, load_skills

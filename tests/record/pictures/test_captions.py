@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.record.pictures.captions import MIN_GAP, place_caption
+from executive.record.pictures.draw import MIN_GAP, place_caption
 
 SIZE, IMAGE_SIZE = (60, 12), (640, 480)
 CORNERS = st.tuples(st.integers(-50, 700), st.integers(-50, 550))

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from events import at, item_changed
 
-from executive.campaign.end_checks import check_arm_at_rest, check_held_item, check_journal
+from executive.campaign.faults.trial_checks import check_arm_at_rest, check_held_item, check_journal
 from executive.cell.arm import Task
 from executive.cells.fake.cell import FakeCell
 from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent
