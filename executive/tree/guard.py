@@ -9,18 +9,13 @@ from py_trees.common import Status
 from executive.errors import Fault
 from executive.skill import HOLDING
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
-from executive.tree.inspection import (
-    Counterpart,
-    MinTimeFunction,
-    NodeAnalysis,
-    NodeFinding,
-    PropagatedFailure,
-)
+from executive.tree.inspection import Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, key
+from executive.tree.node import BodyNode
 from executive.tree.reactive_node import ReactiveNode
 
 
-class Guard(ReactiveNode):
+class Guard(ReactiveNode, BodyNode):
     """Run the body while a condition holds; when the condition fails, halt the body and fail with `broken`.
 
     Every tick checks the condition before it ticks the body. If the condition fails at the first tick, the
@@ -66,10 +61,6 @@ class Guard(ReactiveNode):
         if (broken_state := join_states(ends)) is not None:
             failures[PossibleFailure(self.keyword, "broken", self.path)] = broken_state
         return Flow(body.success, failures, body.halted)
-
-    def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time of the body [s]."""
-        return get_min_time(self.do)
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield an error if the body can never run, and a warning if the guard can never stop the body."""

@@ -337,6 +337,16 @@ class ControlNode(KeyOwner, TreeNode):
                     raise InputError(f"{self.path}: {message}") from None
 
 
+class BodyNode(ControlNode):
+    """Control node that succeeds only when its body `do` has succeeded."""
+
+    do: Child
+
+    def min_time(self, get_min_time: MinTimeFunction) -> float:
+        """Return the minimum time of the body [s]."""
+        return get_min_time(self.do)
+
+
 def _find_nodes(value: object) -> list[Child]:
     """Return all nodes in the value of a key, which is a node, a list, a section or a constant."""
     if isinstance(value, KeySection):

@@ -10,16 +10,10 @@ from executive.skill import Seconds
 from executive.tree.failure import format_reasons
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, find_fixed_point, join_states
 from executive.tree.generator_node import NodeRun
-from executive.tree.inspection import (
-    Advice,
-    Counterpart,
-    MinTimeFunction,
-    NodeAnalysis,
-    NodeFinding,
-    PropagatedFailure,
-)
+from executive.tree.inspection import Advice, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeySection, Reasons, key
 from executive.tree.loop import Loop
+from executive.tree.node import BodyNode
 
 _GIVE_UP = "give up: the recovery failed"
 """Choice that a retry reports after a failure of its recovery."""
@@ -45,7 +39,7 @@ class Backoff(KeySection):
             return self.max
 
 
-class Retry(Loop):
+class Retry(Loop, BodyNode):
     """Run the body again after a failure.
 
     Failures that `on` does not list, and the failure of the last attempt, are passed on. Before every further
@@ -116,10 +110,6 @@ class Retry(Loop):
         }
         delay_state = compute_retry_state(body) if self.backoff else None
         return Flow(body.success, failures, join_states((body.halted, recovery.halted, delay_state)))
-
-    def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time of one attempt [s]."""
-        return get_min_time(self.do)
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield a warning if nothing changes between the attempts, or if there is only one attempt."""

@@ -8,22 +8,15 @@ from py_trees.common import Status
 
 from executive.skill import Seconds
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure
-from executive.tree.inspection import (
-    Advice,
-    Counterpart,
-    MinTimeFunction,
-    NodeAnalysis,
-    NodeFinding,
-    PropagatedFailure,
-)
+from executive.tree.inspection import Advice, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, key
-from executive.tree.node import ControlNode
+from executive.tree.node import BodyNode
 
 CLOCK_TOLERANCE = 0.005
 """Maximum time by which `Clock.sleep` ends too early [s]: half of a control step of 10 ms."""
 
 
-class Timeout(ControlNode):
+class Timeout(BodyNode):
     """Fail with the reason `timeout` if the body takes longer than a limit on the clock of the run.
 
     A body that ends in the same tick in which the clock reaches the limit is in time.
@@ -67,10 +60,6 @@ class Timeout(ControlNode):
         if flow.halted is not None:
             failures[PossibleFailure(self.keyword, "timeout", self.path)] = flow.halted
         return Flow(flow.success, failures, flow.halted)
-
-    def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time of the body [s]."""
-        return get_min_time(self.do)
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield an error if the limit is shorter than the minimum time of the body."""
