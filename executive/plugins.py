@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from packaging.utils import canonicalize_name
 from py_trees.behaviour import Behaviour
@@ -36,6 +36,8 @@ SKILL_GROUP = "executive.skills"
 """Entry-point group of skills."""
 CELL_KIND_GROUP = "executive.cells"
 """Entry-point group of kinds of cells."""
+Skills: TypeAlias = Mapping[str, type[Skill]]
+"""Installed skills by name."""
 PY_TREES_MODULES = ("py_trees.behaviours", "py_trees.timers")
 """Modules of py_trees whose behaviours a mission may use."""
 _CLASS_PATH = re.compile(r"\w+(\.\w+)*:\w+(\.\w+)*")

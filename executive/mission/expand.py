@@ -24,7 +24,8 @@ from executive.mission.model.nodes import (
 from executive.mission.model.values import InvalidValue, Literal, LocatedName, Reference, Value
 from executive.mission.model.wiring import find_control_node_outputs, find_written_variables
 from executive.mission.source import Span
-from executive.skill import Direction, Skill
+from executive.plugins import Skills
+from executive.skill import Direction
 from executive.tree.keys import KeyKind
 
 _MAX_DEPTH = 40
@@ -36,6 +37,8 @@ _CALLER_PREFIX = "^"
 
 ValuesByName = Mapping[str, Value]
 """Values of params and arguments by name."""
+PredefinedLists = Mapping[str, Sequence[str]]
+"""Names in each predefined list, such as `bins`."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +58,7 @@ class ExpandedMission:
     findings: tuple[Finding, ...]
 
 
-def expand(
-    mission: Mission, skills: Mapping[str, type[Skill]], predefined_lists: Mapping[str, Sequence[str]]
-) -> ExpandedMission:
+def expand(mission: Mission, skills: Skills, predefined_lists: PredefinedLists) -> ExpandedMission:
     """Return the mission with expanded subtrees, params, arguments and predefined lists.
 
     `predefined_lists` contains the names in each list; a list without an entry, such as `items`, remains.
@@ -95,12 +96,7 @@ class _Expander:
         used_subtree_names: Names of used subtrees; for a misspelt name, also the most similar name.
     """
 
-    def __init__(
-        self,
-        mission: Mission,
-        skills: Mapping[str, type[Skill]],
-        predefined_lists: Mapping[str, Sequence[str]],
-    ) -> None:
+    def __init__(self, mission: Mission, skills: Skills, predefined_lists: PredefinedLists) -> None:
         self.mission, self.skills, self._predefined_lists = mission, skills, predefined_lists
         self.params: ValuesByName = {name: param.value for name, param in mission.params.items()}
         self.findings: list[Finding] = []

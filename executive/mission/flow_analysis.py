@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from executive.mission.findings import find_similar_word
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.wiring import find_wires
+from executive.plugins import Skills
 from executive.skill import HOLDING, Direction, Skill
 from executive.tree.flow import (
     INITIAL_STATE,
@@ -45,12 +45,7 @@ class FlowAnalysis:
     """
 
     def __init__(
-        self,
-        tree: Node,
-        skills: Mapping[str, type[Skill]],
-        entry: FlowState = INITIAL_STATE,
-        *,
-        is_first_tick: bool = False,
+        self, tree: Node, skills: Skills, entry: FlowState = INITIAL_STATE, *, is_first_tick: bool = False
     ) -> None:
         self.nodes = {node.path: node for node in tree.walk()}
         self.entry_states: dict[str, FlowState] = {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -83,9 +83,9 @@ class CheckContext:
         """Yield every control node of the tree and of the unused subtrees."""
         return (node for node in self.iterate_nodes() if isinstance(node, InnerNode))
 
-    def iterate_installed_skills(self) -> Iterator[tuple[SkillNode, type[Skill]]]:
-        """Yield every node of an installed skill, with the skill."""
-        for node in self.iterate_nodes():
+    def find_installed_skills(self, nodes: Iterable[Node]) -> Iterator[tuple[SkillNode, type[Skill]]]:
+        """Yield every node in `nodes` that runs an installed skill, with the skill."""
+        for node in nodes:
             if isinstance(node, SkillNode) and node.skill in self.skills:
                 yield node, self.skills[node.skill]
 

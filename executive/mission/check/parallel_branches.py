@@ -103,10 +103,8 @@ def _find_resource_users(context: CheckContext, branch: Node) -> dict[str, Skill
     users: dict[str, SkillNode] = {}
     cameras = context.cell.cameras.values() if context.cell else ()
     is_camera_on_wrist = any(camera.mount == "wrist" for camera in cameras)
-    for node in branch.walk():
-        if not isinstance(node, SkillNode) or node.skill not in context.skills:
-            continue
-        for resource in context.skills[node.skill].uses:
+    for node, skill in context.find_installed_skills(branch.walk()):
+        for resource in skill.uses:
             if resource == "camera" and is_camera_on_wrist:
                 # The arm must not move while a camera on the wrist takes an image.
                 users.setdefault("arm", node)

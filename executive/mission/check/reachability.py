@@ -36,11 +36,8 @@ def _find_unreachable_below(node: Node, flow: FlowAnalysis) -> Iterator[Finding]
 def check_tool_states(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every skill that may start with the opposite of the required tool state."""
     flow = context.flow_analysis
-    for path, entry_state in flow.entry_states.items():
-        node = flow.nodes[path]
-        if not isinstance(node, SkillNode) or node.skill not in context.skills:
-            continue
-        required_state = context.skills[node.skill].tool_state[0]
+    for node, skill in context.find_installed_skills(flow.nodes[path] for path in flow.entry_states):
+        required_state, entry_state = skill.tool_state[0], flow.entry_states[node.path]
         name, span = context.locate_skill(node)
         if required_state is EMPTY and (tool := entry_state.find_tool_state(HOLDING)):
             message = f"{name} needs an empty tool, but the tool may hold an object here"

@@ -25,7 +25,7 @@ def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
 
 def check_settings(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every setting of a skill that is unknown, missing, or has an invalid value."""
-    for node, skill in context.iterate_installed_skills():
+    for node, skill in context.find_installed_skills(context.iterate_nodes()):
         declarations: dict[str, Param | Port] = {**skill.params, **skill.ports}
         for name, setting in node.settings.items():
             if name not in declarations:
@@ -68,7 +68,7 @@ def _check_reference(
 
 def find_unreplayable_skills(context: CheckContext) -> Iterator[Finding]:
     """Yield a warning for every skill that may have inputs besides the cell, because no run records them."""
-    for node, skill in context.iterate_installed_skills():
+    for node, skill in context.find_installed_skills(context.iterate_nodes()):
         if not skill.is_replayable:
             message = f"{node.skill} may have inputs that no run records, such as a clock"
             hint = f"A replay or a resumed run executes {node.skill} again."
@@ -116,7 +116,8 @@ def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:
     routes = {route.label: route for route in context.mission.routes}
     bins = {label: {bin.name for bin in route.bins} for label, route in routes.items()}
     weighing_skills = [name for name, skill in context.skills.items() if _is_weighing(skill)]
-    is_weighed = any(node.skill in weighing_skills for node, _ in context.iterate_installed_skills())
+    skills = (skill for _, skill in context.find_installed_skills(context.iterate_nodes()))
+    is_weighed = any(map(_is_weighing, skills))
     for label, section in objects.items():
         detected = section.looks_like  # The detector reports this class for objects of the class `label`.
         if detected not in objects:
@@ -160,7 +161,7 @@ def find_undetectable_classes(context: CheckContext) -> Iterator[Finding]:
 def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Span]]:
     """Yield every class in the routes and in the settings of skills, with its position."""
     yield from ((route.label, route.label_span) for route in context.mission.routes)
-    for node, skill in context.iterate_installed_skills():
+    for node, skill in context.find_installed_skills(context.iterate_nodes()):
         for name, value in find_literals(node):
             declaration = skill.params.get(name) or skill.ports.get(name)
             if declaration is not None and declaration.refers_to == "class" and isinstance(value.value, str):

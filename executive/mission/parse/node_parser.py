@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 
 from executive.errors import InputError
@@ -20,12 +19,10 @@ from executive.mission.parse.control_node_parser import (
 from executive.mission.parse.mapping_reader import is_empty, read_settings
 from executive.mission.source import Span
 from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
-from executive.plugins import load_behaviour
+from executive.plugins import Skills, load_behaviour
 from executive.skill import Skill
 from executive.tree.node_registry import ControlNodes
 
-Skills = Mapping[str, type[Skill]]
-"""Installed skills by name."""
 _SKILL_PATTERN = re.compile(r"[A-Z][A-Za-z0-9]*")
 """Matches the names of skills, also of skills that are not installed."""
 

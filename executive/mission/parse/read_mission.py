@@ -12,10 +12,11 @@ from executive.mission.model.mission import Mission, Subtree
 from executive.mission.model.values import LocatedName
 from executive.mission.parse.cell_file import CellFile, read_cell
 from executive.mission.parse.mission_file import parse_library, parse_mission
-from executive.mission.parse.node_parser import NodeParser, Skills
+from executive.mission.parse.node_parser import NodeParser
 from executive.mission.source import Source
 from executive.mission.text.file_search import find_file_below, read_source
 from executive.mission.text.yaml_text import parse_yaml
+from executive.plugins import Skills
 from executive.tree.node_registry import ControlNodes
 
 

@@ -9,7 +9,6 @@ from executive.mission.model import grammar
 from executive.mission.model.grammar import AllowedKeys, GrammarKey, GrammarKeys
 from executive.mission.parse.control_node_parser import find_inner_keys, find_shorthand_key, is_value_optional
 from executive.mission.parse.mapping_reader import NAME_PATTERN
-from executive.mission.parse.node_parser import Skills
 from executive.mission.parse.params import PARAM_TYPES
 from executive.mission.schema.types import (
     DIALECT,
@@ -20,6 +19,7 @@ from executive.mission.schema.types import (
     make_settings_schema,
     make_value_or_reference_schema,
 )
+from executive.plugins import Skills
 from executive.tree.keys import PREDEFINED_LISTS, Key, KeyKind
 from executive.tree.node import ControlNode
 from executive.tree.node_registry import ControlNodes
