@@ -18,7 +18,6 @@ from executive.cli.main import main as command_line
 from executive.cli.skills import Declaration, collect_declarations
 from executive.mission.findings import MEANING_BY_CODE
 from executive.mission.model import grammar
-from executive.mission.parse.control_node_parser import find_inner_keys
 from executive.mission.schema.types import Schema, make_type_schema
 from executive.mission.text.file_search import list_shipped_missions
 from executive.perception.detectors.detector_registry import find_detector_kinds
@@ -121,7 +120,7 @@ def _key_rows(owner: str, node: type[ControlNode | KeySection], prefix: str = ""
     for name, key in node.keys.items():
         written = f"`{prefix}{name}`" + (f", beside `{owner}`" if key.sibling else "")
         if key.shorthand:
-            written = (f"{written}, or " if find_inner_keys(node) else "") + f"the value of `{owner}`"
+            written = (f"{written}, or " if grammar.find_inner_keys(node) else "") + f"the value of `{owner}`"
         value = KINDS.get(key.kind) or _value(key.make_validator().json_schema())
         value = value.replace("node", "condition") if key.requires_conditions else value
         value += f", at most {key.max_count}" if key.max_count else ""

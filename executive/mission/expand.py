@@ -12,15 +12,7 @@ from typing import cast
 
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
 from executive.mission.model.mission import Mission, Quota, Subtree
-from executive.mission.model.nodes import (
-    InnerNode,
-    InvalidNode,
-    Node,
-    SkillNode,
-    SubtreeNode,
-    iterate_keys,
-    map_parts,
-)
+from executive.mission.model.nodes import InnerNode, InvalidNode, Node, SkillNode, SubtreeNode, map_parts
 from executive.mission.model.values import InvalidValue, Literal, LocatedName, Reference, Value
 from executive.mission.model.wiring import find_control_node_outputs, find_written_variables
 from executive.mission.source import Span
@@ -162,7 +154,7 @@ class _Expander:
         if not isinstance(node, InnerNode):
             return node
         values = dict(node.values)
-        for key, value in iterate_keys(node):
+        for key, value in node.iterate_keys():
             if key.kind is KeyKind.ELEMENTS and isinstance(value, Literal) and isinstance(value.value, str):
                 names = self._predefined_lists.get(value.value)
                 values[key.name] = value if names is None else replace(value, value=list(names))

@@ -12,13 +12,11 @@ from executive.plugins import Skills
 from executive.skill import HOLDING, Direction, Skill
 from executive.tree.flow import (
     INITIAL_STATE,
-    UNKNOWN_NAME,
     UNKNOWN_STATE,
     Flow,
     FlowState,
     PossibleFailure,
     join_states,
-    make_unknown_flow,
 )
 from executive.tree.keys import Child
 from executive.tree.node import ControlNode
@@ -82,7 +80,7 @@ class FlowAnalysis:
                 return self._compute_subtree_flow(node, body, state)
         for child in node.children:
             self._analyse(child, UNKNOWN_STATE)
-        return make_unknown_flow(UNKNOWN_NAME, node.path)
+        return Flow.make_unknown(node.path)
 
     def _analyse_child(self, child: Child, state: FlowState) -> Flow:
         return self._analyse(get_mission_node(child), state)
@@ -90,7 +88,7 @@ class FlowAnalysis:
     def _compute_skill_flow(self, node: SkillNode, state: FlowState) -> Flow:
         skill = self.find_skill_or_most_similar(node.skill)
         if skill is None:
-            return make_unknown_flow(node.skill, node.path)
+            return Flow.make_unknown(node.path, node.skill)
         precondition, postcondition = skill.tool_state
         state = state.apply_precondition(precondition, node.path)
         outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]

@@ -192,6 +192,12 @@ class Flow:
     failures: Mapping[PossibleFailure, FlowState]
     halted: FlowState | None
 
+    @classmethod
+    def make_unknown(cls, path: str, source: str = UNKNOWN_NAME) -> Flow:
+        """Return the possible outcomes of the node `source` at `path`, whose effects are unknown."""
+        failure = PossibleFailure(source, UNKNOWN_NAME, path)
+        return cls(UNKNOWN_STATE, {failure: UNKNOWN_STATE}, UNKNOWN_STATE)
+
     def with_label(self, label: str) -> Flow:
         """Return the flow with the label of the node added to all failures; "" adds no label."""
         if not label:
@@ -201,12 +207,6 @@ class Flow:
             labelled_failure = replace(failure, labels=failure.labels | {label})
             failures[labelled_failure] = state.join(failures.get(labelled_failure, state))
         return replace(self, failures=failures)
-
-
-def make_unknown_flow(source: str, path: str) -> Flow:
-    """Return the possible outcomes of the node `source` at `path`, whose effects are unknown."""
-    failure = PossibleFailure(source, UNKNOWN_NAME, path)
-    return Flow(UNKNOWN_STATE, {failure: UNKNOWN_STATE}, UNKNOWN_STATE)
 
 
 FlowFunction: TypeAlias = Callable[[Child, FlowState], Flow]

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, make_error
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode, iterate_keys, list_nodes
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode, list_nodes
 from executive.skill import ANY, Direction, Skill
 
 
 def find_non_conditions(context: CheckContext, parent: InnerNode) -> Iterator[Finding]:
     """Yield an error for each child that is not a condition although its key allows only conditions."""
-    for key, value in iterate_keys(parent):
+    for key, value in parent.iterate_keys():
         for node in list_nodes(value) if key.requires_conditions else ():
             if problem := _find_problem(context, node):
                 message = f"{problem}, but {parent.type_name}.{key.name} needs a condition"

@@ -13,7 +13,7 @@ from executive.mission.findings import Finding, make_error, make_warning, sugges
 from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model.conversion import ValueProblem, convert_constant
 from executive.mission.model.instance import find_upper_bound, get_mission_node, make_inspection_instance
-from executive.mission.model.nodes import InnerNode, KeyValue, NodeSection, SkillNode, iterate_keys
+from executive.mission.model.nodes import InnerNode, KeyValue, NodeSection, SkillNode
 from executive.mission.model.values import Literal, LocatedReason, Reference
 from executive.skill import Skill
 from executive.tree.failure import Reason
@@ -30,7 +30,7 @@ def check_constants(context: CheckContext) -> Iterator[Finding]:
 
 
 def _check_keys(context: CheckContext, owner: InnerNode | NodeSection, name: str) -> Iterator[Finding]:
-    for key, value in iterate_keys(owner):
+    for key, value in owner.iterate_keys():
         for item in value if isinstance(value, tuple) else (value,):
             if isinstance(item, NodeSection):
                 yield from _check_keys(context, item, key.name)

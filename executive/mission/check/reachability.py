@@ -25,7 +25,7 @@ def _find_unreachable_below(node: Node, flow: FlowAnalysis) -> Iterator[Finding]
         if child.path in flow.entry_states:
             yield from _find_unreachable_below(child, flow)
         elif instance and instance.unreachable_reason:
-            is_list = isinstance(child, InnerNode) and child.is_list and not child.label
+            is_list = child.is_list and not child.label
             name = "this list" if is_list else child.path_name
             yield make_warning(
                 child.span, "unreachable", f"{name} can never run: {instance.unreachable_reason}"

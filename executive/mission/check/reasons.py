@@ -8,7 +8,7 @@ from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model import grammar
-from executive.mission.model.nodes import InnerNode, Node, NodeSection, SkillNode, iterate_keys, list_nodes
+from executive.mission.model.nodes import InnerNode, Node, NodeSection, SkillNode, list_nodes
 from executive.mission.model.values import LocatedReason
 from executive.mission.source import Span
 from executive.tree.flow import UNKNOWN_NAME, PossibleFailure
@@ -71,7 +71,7 @@ def _find_names_with_bodies(node: Node) -> Iterator[tuple[LocatedReason, str, No
 
 def _find_failure_names(owner: InnerNode | NodeSection) -> Iterator[tuple[Key, LocatedReason]]:
     """Yield the names of failures in the keys of a node and of its sections."""
-    for key, value in iterate_keys(owner):
+    for key, value in owner.iterate_keys():
         for item in value if isinstance(value, tuple) else (value,):
             if isinstance(item, LocatedReason):
                 yield key, item

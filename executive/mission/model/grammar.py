@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from executive.tree.keys import Key
+from executive.tree.keys import Key, KeyOwner
 
 
 @dataclass(frozen=True)
@@ -105,3 +105,25 @@ PARAM_KEYS: GrammarKeys = {
     "doc": GrammarKey("text", "Meaning of the param, one sentence."),
 }
 """The keys of a param whose declaration is a mapping."""
+
+
+def find_shorthand_key(owner: type[KeyOwner]) -> Key | None:
+    """Return the key whose value may directly follow the keyword of a node or section, or None."""
+    return next((key for key in owner.keys.values() if key.shorthand), None)
+
+
+def is_value_optional(node_class: type[KeyOwner]) -> bool:
+    """Return True if the keyword of a node may stand alone, without a value."""
+    shorthand_key = find_shorthand_key(node_class)
+    return shorthand_key is not None and not shorthand_key.is_required
+
+
+def find_inner_keys(owner: type[KeyOwner]) -> Mapping[str, Key]:
+    """Return the keys of the mapping below a keyword; no keys if the value must not be a mapping."""
+    inner_keys = {name: key for name, key in owner.keys.items() if not key.sibling}
+    return {} if all(key.shorthand for key in inner_keys.values()) else inner_keys
+
+
+def find_sibling_keys(owner: type[KeyOwner]) -> Mapping[str, Key]:
+    """Return the keys at the level of the keyword."""
+    return {name: key for name, key in owner.keys.items() if key.sibling}

@@ -14,11 +14,10 @@ from executive.mission.model.nodes import (
     InvalidNode,
     KeyValue,
     Node,
-    NodeOrSection,
     NodeSection,
     SkillNode,
     SubtreeNode,
-    iterate_keys,
+    ValueOwner,
 )
 from executive.tree.keys import KeyKind
 
@@ -34,7 +33,7 @@ def _assign_path(node: Node, parent_path: str, key_path: str, name: str = "") ->
     `key_path` is the part of the path for the key of the parent that contains the node, or "". `name` is the
     last part of the path; the default is `node.path_name`, and for a list no name.
     """
-    path = _join(parent_path, key_path, name or ("" if _is_list(node) else node.path_name))
+    path = _join(parent_path, key_path, name or ("" if node.is_list else node.path_name))
     match node:
         case InnerNode():
             return replace(node, path=path, values=_assign_value_paths(node, path))
@@ -45,17 +44,17 @@ def _assign_path(node: Node, parent_path: str, key_path: str, name: str = "") ->
     return replace(node, path=path)
 
 
-def _assign_value_paths(owner: NodeOrSection, path: str, section_path: str = "") -> dict[str, KeyValue]:
+def _assign_value_paths(owner: ValueOwner, path: str, section_path: str = "") -> dict[str, KeyValue]:
     """Return the values by key, with paths for the nodes in the values; `path` is that of the control node.
 
     If `owner` is a section, `section_path` is its path in the control node: `backoff`, or `cases/2`.
     """
     values: dict[str, KeyValue] = {}
-    for key, value in iterate_keys(owner):
+    for key, value in owner.iterate_keys():
         # In the path of a child below `do` of a section, the key `do` is omitted.
         key_path = section_path if section_path and key.name == "do" else _join(section_path, key.name)
         if isinstance(value, Node):
-            value = _assign_path(value, path, key_path if key.in_path or _is_list(value) else "")
+            value = _assign_path(value, path, key_path if key.in_path or value.is_list else "")
         elif isinstance(value, NodeSection):
             value = replace(value, values=_assign_value_paths(value, path, key_path))
         elif isinstance(value, tuple) and key.kind is KeyKind.NODES:
@@ -81,10 +80,6 @@ def _assign_list_paths(nodes: tuple[Node, ...], parent_path: str) -> tuple[Node,
 
     names = [get_unique_name(index, node) for index, node in enumerate(nodes, 1)]
     return tuple(_assign_path(node, parent_path, "", name) for node, name in zip(nodes, names, strict=True))
-
-
-def _is_list(node: Node) -> bool:
-    return isinstance(node, InnerNode) and node.is_list
 
 
 def _join(*names: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TypeAlias, TypeVar, cast
+from typing import TypeVar, cast
 
 from executive.mission.model.values import LocatedName, LocatedReason, Setting, Value
 from executive.mission.source import Span
@@ -22,12 +22,14 @@ class Node:
         label: Value of `as:`, or "".
         label_span: Position of the label in the file, or None.
         path: Unique path from the root of the expanded tree; "" before expansion.
+        is_list: True for a sequence that is written as a list, without keyword.
     """
 
     span: Span
     label: str
     label_span: Span | None = field(default=None, kw_only=True)
     path: str = field(default="", kw_only=True)
+    is_list = False
 
     @property
     def children(self) -> tuple[Node, ...]:
@@ -83,8 +85,21 @@ class InvalidNode(Node):
         return self.parts
 
 
+class ValueOwner:
+    """A control node or a section of a control node: values of the keys that a class declares."""
+
+    declaring_class: type[KeyOwner]
+    values: Mapping[str, KeyValue]
+
+    def iterate_keys(self) -> Iterator[tuple[Key, KeyValue]]:
+        """Yield every key that has a value, and the value, in the order of the declarations."""
+        for name, key in self.declaring_class.keys.items():
+            if name in self.values:
+                yield key, self.values[name]
+
+
 @dataclass(frozen=True)
-class NodeSection:
+class NodeSection(ValueOwner):
     """A mapping below a key of a control node, such as `backoff` of `retry`.
 
     Attributes:
@@ -99,7 +114,7 @@ class NodeSection:
 
 
 @dataclass(frozen=True)
-class InnerNode(Node):
+class InnerNode(Node, ValueOwner):
     """A control node.
 
     Attributes:
@@ -120,7 +135,7 @@ class InnerNode(Node):
     @cached_property
     def children(self) -> tuple[Node, ...]:
         """The nodes in the values of the keys and in sections."""
-        return tuple(node for _, value in iterate_keys(self) for node in list_nodes(value))
+        return tuple(node for _, value in self.iterate_keys() for node in list_nodes(value))
 
 
 @dataclass(frozen=True)
@@ -158,21 +173,11 @@ KeyValue = Value | LocatedName | Node | NodeSection | tuple[Node | LocatedReason
 PartT = TypeVar("PartT")
 """Type of a node or of a part of a node."""
 
-NodeOrSection: TypeAlias = InnerNode | NodeSection
-"""Control node, or a section of a control node."""
-
-
-def iterate_keys(owner: NodeOrSection) -> Iterator[tuple[Key, KeyValue]]:
-    """Yield every key that has a value, and the value, in the order of the declarations."""
-    for name, key in owner.declaring_class.keys.items():
-        if name in owner.values:
-            yield key, owner.values[name]
-
 
 def list_nodes(value: KeyValue) -> list[Node]:
     """Return the nodes in the value of a key, without the descendants of these nodes."""
     if isinstance(value, NodeSection):
-        return [node for _, inner_value in iterate_keys(value) for node in list_nodes(inner_value)]
+        return [node for _, inner_value in value.iterate_keys() for node in list_nodes(inner_value)]
     if isinstance(value, tuple):
         return [node for item in value if not isinstance(item, LocatedReason) for node in list_nodes(item)]
     return [value] if isinstance(value, Node) else []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, iterate_keys
+from executive.mission.model.nodes import InnerNode, Node, SkillNode
 from executive.mission.model.values import Literal, LocatedName, Reference
 from executive.mission.source import Span
 from executive.skill import Direction, Param, Port, Skill
@@ -74,7 +74,7 @@ def find_literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
 def find_control_node_outputs(node: Node) -> Iterator[tuple[Key, LocatedName]]:
     """Yield each key of a control node that names an output variable, and the variable."""
     if isinstance(node, InnerNode):
-        for key, value in iterate_keys(node):
+        for key, value in node.iterate_keys():
             if isinstance(value, LocatedName):
                 yield key, value
 
@@ -82,7 +82,7 @@ def find_control_node_outputs(node: Node) -> Iterator[tuple[Key, LocatedName]]:
 def find_control_node_inputs(node: Node) -> Iterator[Reference]:
     """Yield the variables that a control node reads as lists of elements."""
     if isinstance(node, InnerNode):
-        for key, value in iterate_keys(node):
+        for key, value in node.iterate_keys():
             if key.kind is KeyKind.ELEMENTS and isinstance(value, Reference):
                 yield value
 

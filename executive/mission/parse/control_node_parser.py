@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from executive.mission.model import grammar
 from executive.mission.model.nodes import InnerNode, InvalidNode, KeyValue, Node, NodeSection, list_nodes
 from executive.mission.model.values import InvalidValue, LocatedName
 from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
@@ -18,28 +19,6 @@ if TYPE_CHECKING:
     from executive.mission.parse.node_parser import NodeParser
 
 
-def find_shorthand_key(owner: type[KeyOwner]) -> Key | None:
-    """Return the key whose value may directly follow the keyword of a node or section, or None."""
-    return next((key for key in owner.keys.values() if key.shorthand), None)
-
-
-def is_value_optional(node_class: type[KeyOwner]) -> bool:
-    """Return True if the keyword of a node may stand alone, without a value."""
-    shorthand_key = find_shorthand_key(node_class)
-    return shorthand_key is not None and not shorthand_key.is_required
-
-
-def find_inner_keys(owner: type[KeyOwner]) -> Mapping[str, Key]:
-    """Return the keys of the mapping below a keyword; no keys if the value must not be a mapping."""
-    inner_keys = {name: key for name, key in owner.keys.items() if not key.sibling}
-    return {} if all(key.shorthand for key in inner_keys.values()) else inner_keys
-
-
-def find_sibling_keys(owner: type[KeyOwner]) -> Mapping[str, Key]:
-    """Return the keys at the level of the keyword."""
-    return {name: key for name, key in owner.keys.items() if key.sibling}
-
-
 def read_control_node(
     parser: NodeParser, mapping: YamlMapping, entry: YamlEntry, label: str, node_class: type[ControlNode]
 ) -> Node:
@@ -47,7 +26,7 @@ def read_control_node(
 
     `entry` is the entry of the mapping with the keyword; the other entries have sibling keys.
     """
-    keyword, span, sibling_keys = entry.key.text, entry.key.span, find_sibling_keys(node_class)
+    keyword, span, sibling_keys = entry.key.text, entry.key.span, grammar.find_sibling_keys(node_class)
     siblings = tuple(sibling for sibling in mapping.entries if sibling.key.text in sibling_keys)
     values = {
         **_read_inner_keys(parser, keyword, span, entry.value, node_class),
@@ -56,7 +35,7 @@ def read_control_node(
     any_of = node_class.any_of
     inner_keys = entry.value.keys if isinstance(entry.value, YamlMapping) else ()
     # `MappingReader` reports a value that is not a mapping although it must be one.
-    is_form_valid = isinstance(entry.value, YamlMapping) or find_shorthand_key(node_class) is not None
+    is_form_valid = isinstance(entry.value, YamlMapping) or grammar.find_shorthand_key(node_class) is not None
     if any_of and is_form_valid and not {*mapping.keys, *inner_keys} & {*any_of}:
         level = f" at the level of {keyword}" if set(any_of) <= set(sibling_keys) else ""
         alternatives = " or ".join(f'"{name}"' for name in any_of)
@@ -72,7 +51,7 @@ def _read_inner_keys(
     parser: NodeParser, name: str, span: Span, yaml_node: YamlNode, owner: type[KeyOwner]
 ) -> dict[str, KeyValue]:
     """Return the values of the keys of `owner`; `yaml_node` is below the keyword `name`."""
-    shorthand_key, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
+    shorthand_key, inner_keys = grammar.find_shorthand_key(owner), grammar.find_inner_keys(owner)
     is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
     # If the owner has inner keys, a mapping contains these keys, and is no node in shorthand form. A scalar
     # in place of a list is treated like a mapping, so that `MappingReader` reports it and lists the keys.

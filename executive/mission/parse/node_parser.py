@@ -10,12 +10,7 @@ from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model import grammar
 from executive.mission.model.nodes import InnerNode, InvalidNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.values import Literal, Reference
-from executive.mission.parse.control_node_parser import (
-    find_inner_keys,
-    find_sibling_keys,
-    is_value_optional,
-    read_control_node,
-)
+from executive.mission.parse.control_node_parser import read_control_node
 from executive.mission.parse.mapping_reader import is_empty, read_settings
 from executive.mission.source import Span
 from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
@@ -82,7 +77,7 @@ class NodeParser:
         """Return the mission node for a YAML scalar: a skill, or a keyword that needs no body."""
         word = scalar.text
         node_class = self._node_classes.get(word)
-        if node_class is not None and is_value_optional(node_class):
+        if node_class is not None and grammar.is_value_optional(node_class):
             return InnerNode(scalar.span, "", node_class, {})
         if word in self._keywords:
             self.add_error(scalar.span, "missing-node", f'"{word}" needs a body: write {word}: ...')
@@ -115,12 +110,12 @@ class NodeParser:
             parts = [self.make_silent_parser()._read_entry(mapping, entry, "") for entry in surplus_entries]
             return InvalidNode(span, label, (self._read_entry(mapping, node_entry, ""), *parts))
         node_class = self._node_classes.get(name)
-        sibling_keys = find_sibling_keys(node_class) if node_class else {}
+        sibling_keys = grammar.find_sibling_keys(node_class) if node_class else {}
         allowed_keys = ("as", *(grammar.USE_SIBLINGS if name == grammar.USE_KEYWORD else sibling_keys))
         for entry in siblings:
             key = entry.key.text
             if key not in allowed_keys:
-                is_inner_key = node_class is not None and key in find_inner_keys(node_class)
+                is_inner_key = node_class is not None and key in grammar.find_inner_keys(node_class)
                 hint = f"Indent {key}: it is a key below {name}." if is_inner_key else ""
                 hint = hint or suggest_choice(key, allowed_keys, f"Keys at the level of {name}")
                 message = f'"{key}" is not allowed at the level of "{name}"'
@@ -201,7 +196,7 @@ class NodeParser:
         skill = skills_by_lower_case.get(word.replace("_", "").replace(" ", "").lower())
         hints = dict(grammar.KEYWORD_HINTS)
         for name, node_class in self._node_classes.items():
-            keys = find_sibling_keys(node_class)
+            keys = grammar.find_sibling_keys(node_class)
             hints |= {key: f"Write {key} at the level of {name}, not below {name}." for key in keys}
             hints |= node_class.keyword_hints
         hint = hints.get(word) or (f'Did you mean the skill "{skill}"?' if skill else "")

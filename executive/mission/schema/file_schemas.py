@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 
 from executive.mission.model import grammar
 from executive.mission.model.grammar import AllowedKeys, GrammarKey, GrammarKeys
-from executive.mission.parse.control_node_parser import find_inner_keys, find_shorthand_key, is_value_optional
 from executive.mission.parse.mapping_reader import NAME_PATTERN
 from executive.mission.parse.params import PARAM_TYPES
 from executive.mission.schema.types import (
@@ -74,7 +73,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     nodes_without_body = [
         {"const": word, "title": word, "description": _get_first_line(node_class), **NO_ITEM_SUGGESTION}
         for word, node_class in node_classes.items()
-        if is_value_optional(node_class)
+        if grammar.is_value_optional(node_class)
     ]
     siblings: dict[str, Schema] = {grammar.USE_KEYWORD: _make_properties(grammar.USE_SIBLINGS)}
     requirements: dict[str, Schema] = {}
@@ -111,7 +110,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
 
 def _make_control_node_schema(node_class: type[ControlNode]) -> Schema:
     """Return the schema of the value of the keyword of a control node."""
-    shorthand, inner_keys = find_shorthand_key(node_class), find_inner_keys(node_class)
+    shorthand, inner_keys = grammar.find_shorthand_key(node_class), grammar.find_inner_keys(node_class)
     alternatives = [_make_value_schema(shorthand)] if shorthand else []
     if inner_keys:
         any_of = node_class.any_of
@@ -157,7 +156,10 @@ def _make_value_schema(key: Key | GrammarKey) -> Schema:
             section = _make_mapping_schema(key.section.keys)
             return {**section, "type": ["array", "object"], "items": section}
         case KeyKind.SECTION:
-            section, shorthand = _make_mapping_schema(key.section.keys), find_shorthand_key(key.section)
+            section, shorthand = (
+                _make_mapping_schema(key.section.keys),
+                grammar.find_shorthand_key(key.section),
+            )
             if shorthand is None:
                 return section
             value = shorthand.make_validator().json_schema()

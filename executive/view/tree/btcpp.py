@@ -141,15 +141,15 @@ class _Exporter:
             self._add_node(element, child)
         return element
 
-    def _add_custom_node(self, parent: Element, name: str, part: nodes.NodeOrSection) -> Element:
+    def _add_custom_node(self, parent: Element, name: str, part: nodes.ValueOwner) -> Element:
         """Add a custom node for `part`, which is a control node, or a section that contains nodes."""
         keys = part.declaring_class.keys.values()
         ports = [key for key in keys if not _has_nodes(key)]
-        values = {key.name: _format(value) for key, value in nodes.iterate_keys(part) if key in ports}
+        values = {key.name: _format(value) for key, value in part.iterate_keys() if key in ports}
         kinds = [(key.kind, key.is_required) for key in keys if _has_nodes(key)]
         kind = "Decorator" if kinds == [(KeyKind.NODE, True)] else "Control"
         element = self._add_element(parent, kind, name, ports, values)
-        for key, value in nodes.iterate_keys(part):
+        for key, value in part.iterate_keys():
             key_element = element
             if key.kind in (KeyKind.NODE, KeyKind.NODES) and key.name != "do":
                 kind = "Decorator" if key.kind is KeyKind.NODE else "Control"
@@ -192,7 +192,7 @@ def _format(value: nodes.KeyValue) -> str:
         case Reference(name=name) | LocatedName(name=name):
             return _format_pointer(name)
         case nodes.NodeSection() as section:
-            return ",".join(f"{key.name}={_format(one)}" for key, one in nodes.iterate_keys(section))
+            return ",".join(f"{key.name}={_format(one)}" for key, one in section.iterate_keys())
         case tuple() as items:
             return ";".join(str(one) if isinstance(one, Reason) else _format(one) for one in items)
     raise TypeError(f"{value} cannot be written as the value of a port")

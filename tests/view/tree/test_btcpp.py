@@ -15,7 +15,7 @@ import pytest
 from btcpp_rules import BUILT_IN, RULES, Document, list_violations
 
 from executive.mission.model.mission import Mission
-from executive.mission.model.nodes import InnerNode, Node, NodeSection, SkillNode, SubtreeNode, iterate_keys
+from executive.mission.model.nodes import InnerNode, Node, NodeSection, SkillNode, SubtreeNode
 from executive.mission.model.values import Literal
 from executive.mission.parse.read_mission import read_mission
 from executive.mission.text.file_search import find_mission, get_shipped_folder
@@ -241,7 +241,7 @@ class MissionTree:
         """Return the constants of a control node or section, and its branches; `do` is the last branch."""
         ports: dict[str, str] = {}
         branches: list[Branch] = []
-        for key, value in iterate_keys(owner):
+        for key, value in owner.iterate_keys():
             items = value if isinstance(value, tuple) else (value,)
             nodes = [self.describe_node(item) for item in items if isinstance(item, Node)]
             sections = [self.describe_keys(item) for item in items if isinstance(item, NodeSection)]
@@ -261,7 +261,7 @@ class MissionTree:
             case Literal(value=constant):
                 return str(constant).lower() if isinstance(constant, bool) else str(constant)
             case NodeSection() as section:
-                return ",".join(f"{key.name}={self.format(item)}" for key, item in iterate_keys(section))
+                return ",".join(f"{key.name}={self.format(item)}" for key, item in section.iterate_keys())
             case tuple() as items:
                 return ";".join(
                     str(item) if isinstance(item, Reason) else self.format(item) for item in items
