@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from executive.cell.config import CameraConfig
 from executive.cell.frame import Box
@@ -91,6 +92,23 @@ def project(matrix: Array, X_WC: Pose, points: ArrayLike) -> Array:
     """
     p = X_WC.inverse().apply(points) @ matrix.T
     return np.asarray(p[..., :2] / p[..., 2:])
+
+
+def compute_hull_mask(
+    corners: Array, matrix: Array, X_WC: Pose, size: tuple[int, int], *, may_be_cut: bool = False
+) -> NDArray[np.bool_] | None:
+    """Return the mask `(H, W)` of the pixels in the convex hull of world points `(N, 3)` [m].
+
+    Return None if the camera does not see all points; with `may_be_cut`, only if a point is behind it.
+    """
+    if np.any(X_WC.inverse().apply(corners)[:, 2] <= 0):
+        return None
+    pixels = project(matrix, X_WC, corners)
+    if not may_be_cut and (np.any(pixels < 0) or np.any(pixels >= np.array(size))):
+        return None
+    mask = np.zeros((size[1], size[0]), dtype=np.uint8)
+    cv2.fillConvexPoly(mask, cv2.convexHull(np.round(pixels).astype(np.int32)), 1)
+    return mask.astype(bool)
 
 
 def compute_pixel_ray(matrix: Array, X_WC: Pose, pixel: ArrayLike) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ class MountedCamera:
         name: Name of the camera in the cell file.
         config: Section of the camera in the cell file.
         matrix: Camera matrix `(3, 3)` [pixel].
+        scan_poses: Names of the arm poses from which the camera sees the table; the first has the best view.
     """
 
     def __init__(
@@ -47,17 +48,13 @@ class MountedCamera:
         self.name, self.config, self._clock, self._get_change_count = name, config, clock, get_change_count
         self.matrix, self._X_MC = compute_calibration(config)
         self._get_flange_pose = get_flange_pose
+        self.scan_poses, self._size = config.scan_poses, (config.width, config.height)
         self._frame_count = self._pose_count = 0
         self._content_mask = np.ones((config.height, config.width), dtype=bool)
         """Mask `(H, W)` of the pixels that are not in the ignored border of an image with a partial view."""
         if config.partial_views:
             width = round(BORDER_FRACTION * config.height)
             self._content_mask = np.pad(self._content_mask[width:-width, width:-width], width)
-
-    @property
-    def scan_poses(self) -> Sequence[str]:
-        """Names of the arm poses from which the camera sees the table; the first has the best view."""
-        return self.config.scan_poses
 
     def next_pose(self) -> str:
         """Advance to the next scan pose, cyclically, and return its name."""

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import CameraConfig, DetectorConfig, TableConfig
-from executive.cell.detection import Answer, Detection
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import Detection
 from executive.cell.frame import Box, Frame
-from executive.cell.protocols import Clock, Request
+from executive.cell.protocols import Clock
 from executive.cells.fake.world import FakeWorld
 from executive.errors import Unavailable
 from executive.geometry import Pose
+from executive.perception.camera_model import compute_hull_mask
+from executive.perception.detectors.requests import PendingSearch
 from executive.perception.mounted_camera import MountedCamera
-from executive.perception.visibility import compute_hull_mask
 
 DEFAULT_CONFIDENCE = 0.9
 """Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""
@@ -66,38 +67,7 @@ class FakeCamera(MountedCamera):
         return mask
 
     def _is_table_in_image(self) -> bool:
-        size = self.config.width, self.config.height
-        return compute_hull_mask(self._corners, self.matrix, self._compute_pose(), size) is not None
-
-
-@dataclass(frozen=True)
-class FakeRequest:
-    """A request with an answer that becomes available later.
-
-    Attributes:
-        due_time: Time from which the answer is available [s].
-        clock: Clock of the run.
-        answer: Detections, or the message of an unavailable detector.
-        detector: Name of the detector.
-        error_rates: Error rates of the detector.
-    """
-
-    due_time: float
-    clock: Clock
-    answer: Sequence[Detection] | str
-    detector: str
-    error_rates: ErrorRates
-
-    @property
-    def ready(self) -> bool:
-        """True if the answer is available."""
-        return self.clock.now >= self.due_time
-
-    def result(self) -> Answer:
-        """Return the detections, or raise Unavailable if `answer` is a message."""
-        if isinstance(self.answer, str):
-            raise Unavailable(self.answer)
-        return Answer(self.detector, tuple(self.answer), self.error_rates)
+        return compute_hull_mask(self._corners, self.matrix, self._compute_pose(), self._size) is not None
 
 
 @dataclass(eq=False)
@@ -125,7 +95,7 @@ class FakeDetector:
     )
     request_count: int = 0
 
-    def request(self, frame: Frame, view: str) -> Request:
+    def request(self, frame: Frame, view: str) -> PendingSearch:
         """Return a request for the objects in a view of a frame, with the latency of the cell file."""
         self.request_count += 1
         left, top, right, bottom = self.get_view_region(view)
@@ -141,8 +111,13 @@ class FakeDetector:
                 confidence = max(DEFAULT_CONFIDENCE, self.config.threshold)
                 true_detections.append(Detection(fake_object.label, confidence, box))
         answer = self.make_answer(self.request_count, true_detections)
+        future: Future[list[Detection]] = Future()
+        if isinstance(answer, str):
+            future.set_exception(Unavailable(answer))
+        else:
+            future.set_result(list(answer))
         due_time = self.clock.now + self.config.latency
-        return FakeRequest(due_time, self.clock, answer, self.name, self.config.error_rates)
+        return PendingSearch(future, due_time, self.clock, self.name, self.config.error_rates)
 
     def close(self) -> None:
         """Do nothing: the detector holds no resources."""

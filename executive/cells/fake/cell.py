@@ -17,12 +17,7 @@ from executive.cells.fake.arm import MAX_TOOL_SPEED, FakeArm, FakeTool, find_pla
 from executive.cells.fake.camera import FakeCamera, FakeDetector
 from executive.cells.fake.state_log import FakeStateLog, restore_world
 from executive.cells.fake.visuals import FakeVisuals
-from executive.cells.fake.world import (
-    TOUCH_DISTANCE,
-    FakeWorld,
-    describe_lack_of_room,
-    put_random_objects,
-)
+from executive.cells.fake.world import TOUCH_DISTANCE, FakeWorld, describe_lack_of_room, put_random_objects
 from executive.cells.ground_truth import FinalObject, count_outcomes
 from executive.cells.min_times import CellMinTimes
 from executive.cells.without_hardware import CellWithoutHardware

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,15 +14,17 @@ from executive.cell.layout import compute_max_pile_height
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 from executive.motion.arm_model import Kinematics
-from executive.perception.visibility import (
-    TOOL_SPHERE_RADIUS,
-    ArmPart,
-    compute_hull_mask,
-    compute_occlusion_mask,
-)
+from executive.perception.camera_model import compute_hull_mask
 
 MAX_LOAD_OFFSET = 0.015
 """Maximum distance of the centre of a held object from the axis of the cup [m]."""
+TOOL_SPHERE_RADIUS = 0.02
+"""Radius of the spheres that enclose the tool, including tube and fittings [m]."""
+SPHERES_PER_SEGMENT = 9
+"""Number of spheres that cover the segment between two points on the axis of a part of the arm."""
+
+ArmPart = tuple[Sequence[Array], float]
+"""Points `(3,)` [m] along a part of the arm, and the radius of the spheres that enclose the part [m]."""
 
 
 class ArmOcclusion:
@@ -63,9 +66,34 @@ class ArmOcclusion:
         if self._is_loaded():
             load_end = X_WT.apply(np.array([0.0, 0.0, self._load_height]))
             parts.append(([X_WT.position, load_end], self._load_radius))
-        return ~compute_occlusion_mask(parts, matrix, X_WC, size)
+        return ~_compute_occlusion_mask(parts, matrix, X_WC, size)
 
     def is_table_visible(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> bool:
         """Return True if the workspace, up to the height of a pile, is in the image and not occluded."""
         mask = compute_hull_mask(self._workspace_corners, matrix, X_WC, size)
         return mask is not None and bool(np.all(self.compute_visibility_mask(matrix, X_WC, size)[mask]))
+
+
+def _compute_occlusion_mask(
+    parts: Sequence[ArmPart], matrix: Array, X_WC: Pose, size: tuple[int, int]
+) -> NDArray[np.bool_]:
+    """Return the mask `(H, W)` of the pixels that the arm may occlude: projections of its enclosing spheres.
+
+    `parts` are the links, the tool and the held object. `matrix` is the camera matrix `(3, 3)` [pixel], and
+    `size` is the width and height of the image [pixel].
+    """
+    mask = np.zeros((size[1], size[0]), dtype=np.uint8)
+    for points, radius in parts:
+        for start, end in itertools.pairwise(points):
+            for fraction in np.linspace(0.0, 1.0, SPHERES_PER_SEGMENT):
+                x, y, z = X_WC.inverse().apply(start + fraction * (end - start))
+                # A sphere behind the camera is invisible. The link that carries a wrist camera has a sphere
+                # around the camera, which would occlude the whole image.
+                if z <= radius:
+                    continue
+                column, row, _ = matrix @ np.array([x / z, y / z, 1.0])
+                # OpenCV cannot draw circles with very large coordinates.
+                if abs(column) > 4 * size[0] or abs(row) > 4 * size[1]:
+                    continue
+                cv2.circle(mask, (round(column), round(row)), max(1, round(matrix[0, 0] * radius / z)), 1, -1)
+    return mask.astype(bool)

@@ -122,10 +122,6 @@ class SimCamera(MountedCamera):
         """Return a message if a frame shows a displacement of the camera from the declared pose, else ""."""
         return describe_displacement(frame, self._bins)
 
-    @property
-    def _size(self) -> tuple[int, int]:
-        return self.config.width, self.config.height
-
     def _get_true_view(self) -> tuple[Array, Pose]:
         """Return the true camera matrix and the true pose `X_WC`."""
         return compute_calibration(self._true_config)[0], get_camera_pose(self._world, self._true_config)

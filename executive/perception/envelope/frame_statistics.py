@@ -9,7 +9,7 @@ import numpy as np
 
 from executive.cell.config import Section, TableConfig
 from executive.cell.frame import Frame
-from executive.perception.visibility import compute_hull_mask
+from executive.perception.camera_model import compute_hull_mask
 
 MIN_PIXELS = 400
 """Minimum number of visible pixels of the workspace for the computation of statistics."""
