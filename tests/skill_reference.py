@@ -52,7 +52,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("detector = cell.detectors[name]", "cell/protocols.py", "Detector"),
         ("request = detector.request(frame, view)", "cell/protocols.py", "Request"),
         ("answer = request.result()", "cell/detection.py", "Answer"),
-        ("answer.error_rates", "cell/error_rates.py", "ErrorRates"),
+        ("answer.error_rates", "cell/detection.py", "ErrorRates"),
         ("detection = answer.confident[0]", "cell/detection.py", "Detection"),
         ("detections = Detections(...)", "cell/detection.py", "Detections"),
     ],

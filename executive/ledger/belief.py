@@ -11,8 +11,7 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from executive.cell.detection import Detections
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import Detections, ErrorRates
 
 VIEWPOINT_GRID_SPACING = 0.02
 """Spacing of the grid to which camera positions are rounded [m]; equal grid points are one viewpoint."""

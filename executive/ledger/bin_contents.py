@@ -11,8 +11,7 @@ import numpy as np
 
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import LedgerConfig
-from executive.cell.detection import Detections, Observation
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import Detections, ErrorRates, Observation
 from executive.cell.ledger import Presence
 from executive.cell.protocols import Routes
 from executive.cell.quotas import Quotas, is_quota_reached

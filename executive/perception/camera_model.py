@@ -160,3 +160,13 @@ def compute_projection_matrix(matrix: Array, region: Box) -> tuple[float, ...]:
         ]
     )
     return tuple(projection.T.ravel().tolist())
+
+
+def compute_distances(depth_buffer: NDArray[np.float32]) -> Array:
+    """Return the distances along the optical axis [m] for a depth buffer of OpenGL, whose values are 0 to 1.
+
+    The function inverts `compute_projection_matrix`; the buffer has the value 1 at the far plane and beyond.
+    """
+    near, far = NEAR_PLANE, FAR_PLANE
+    with np.errstate(divide="ignore"):
+        return far * near / (far - (far - near) * depth_buffer.astype(np.float64))

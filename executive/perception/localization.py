@@ -14,13 +14,9 @@ from executive.cell.frame import Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import Array
+from executive.perception import evidence
 from executive.perception.camera_model import compute_pixel_ray, intersect_plane
 from executive.perception.depth_image import measure_top_height
-from executive.perception.evidence import (
-    describe_size_contradiction,
-    describe_top_contradiction,
-    is_completely_visible,
-)
 
 RayTest = Callable[[Array, Array], Array | None]
 """Function of origin `(3,)` [m] and direction `(3,)` of a ray; returns the first hit `(3,)` [m], or None."""
@@ -94,12 +90,13 @@ class CellLocalizer:
 
         The result is also "" for a truncated or occluded box, and for an object in a bin.
         """
-        frame, object_class = detections.frame, self.classes[detection.label]
-        is_visible = is_completely_visible(detection, frame, detections.area)
+        frame, classes = detections.frame, self.classes
+        is_visible = evidence.is_completely_visible(detection, frame, detections.area)
         if not is_visible or any(bin.contains(position, BIN_THICKNESS) for bin in self.bins):
             return ""
-        size_contradiction = describe_size_contradiction(detection, position, frame, object_class)
-        return size_contradiction or describe_top_contradiction(detection, position, frame, self.classes)
+        object_class = classes[detection.label]
+        size_contradiction = evidence.describe_size_contradiction(detection, position, frame, object_class)
+        return size_contradiction or evidence.describe_top_contradiction(detection, position, frame, classes)
 
     def _find_height(self, detection: Detection, frame: Frame) -> float:
         """Return the height of the centre of a detected object [m].

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.detection import Answer, Detection, Observation
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import Answer, Detection, ErrorRates, Observation
 from executive.cell.frame import Frame
 from executive.geometry import Array, Pose
 

@@ -22,11 +22,10 @@ from executive.cells.sim.camera import add_depth_noise, add_noise, get_camera_po
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.renderer import CELL_LIGHT, Image, RenderedImage, render
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
-from executive.cells.sim.scene_world import apply_scene, paint_table
+from executive.cells.sim.scene_world import build_world
 from executive.cells.sim.silhouette import compute_bounding_box, compute_silhouette_area
 from executive.cells.sim.spawn import spawn_objects
 from executive.cells.sim.table_top import WOOD_TEXTURE
-from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, intersect_plane, project
 from executive.training.labelled_image import LabelledImage
@@ -59,10 +58,9 @@ class SceneRenderer:
     def __init__(self, config: CellConfig, scene: SceneConfig | None = None) -> None:
         self._scene = scene
         self._camera_name, self._declared_camera = next(iter(config.cameras.items()))
-        self._config = apply_scene(config, scene or DECLARED_SCENE)
+        self._world = build_world(config, scene or DECLARED_SCENE)
+        self._config = self._world.config
         self._camera = self._config.cameras[self._camera_name]
-        self._world = World(self._config)
-        paint_table(self._world, scene or DECLARED_SCENE)
         self._matrix, _ = compute_calibration(self._camera)
 
     def render_image(self, seed: int, number: int) -> LabelledImage:

@@ -16,8 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.cell.detection import Detection
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import Detection, ErrorRates
 from executive.cell.frame import Frame
 from executive.cell.json_values import MAX_INTEGER_BITS, to_json, to_json_or_type_name
 from executive.geometry import Pose

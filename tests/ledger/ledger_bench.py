@@ -9,8 +9,7 @@ import numpy as np
 
 from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
-from executive.cell.detection import Detection, Detections, Observation
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import Detection, Detections, ErrorRates, Observation
 from executive.cell.frame import Frame
 from executive.cell.objects import ObjectClass, Target
 from executive.events import Event

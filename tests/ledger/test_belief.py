@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import bdtrc, expit
 
-from executive.cell.detection import Detection, Observation
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import Detection, ErrorRates, Observation
 from executive.ledger.association import compute_association_distance
 from executive.ledger.belief import Belief, compute_binomial_tail, compute_probability
 from executive.ledger.bin_contents import update_bin_log_odds

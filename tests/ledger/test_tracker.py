@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ledger_bench import Bench, Thing
 
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import ErrorRates
 from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.events import DetectedObject, FrameSearched, ItemChanged

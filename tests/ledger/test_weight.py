@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import ErrorRates
 from executive.cell.objects import ObjectClass
 from executive.geometry import GRAVITY
 from executive.ledger.belief import Belief

@@ -8,8 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from executive.cell.detection import Answer, Detection
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import Answer, Detection, ErrorRates
 from executive.errors import DeadlinePassed, Unavailable
 from executive.perception.detectors.requests import PendingSearch
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from executive.cell.detection import Answer, Detection
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import Answer, Detection, ErrorRates
 from executive.cell.frame import Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import Crowded, Unavailable

@@ -10,7 +10,7 @@ from executive.cell.config.arm import ArmConfig, MotionConfig, ToolConfig
 from executive.cell.config.cameras import CameraConfig
 from executive.cell.config.objects import BinConfig, ObjectConfig, TableConfig
 from executive.cell.config.section import Distance, Length, Name, Seconds, Section, Vector
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import ErrorRates
 
 
 class LedgerConfig(Section):

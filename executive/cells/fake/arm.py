@@ -61,6 +61,7 @@ class FakeArm:
     Attributes:
         poses: Tool pose of each named pose; a run begins at `home`.
         tool_pose: Pose of the tool centre point; changed by `set_tool_pose`.
+        tool_velocity: Velocity zero `(3,)` [m/s]: a released object falls straight down.
         collision: Description of the obstacle that stopped the last motion, or None.
         next_obstacle: Name of an obstacle in the middle of the next motion, or None; set by tests.
         commands: Names of the executed commands, `start` or `stop`, in order, for tests.
@@ -69,7 +70,7 @@ class FakeArm:
     def __init__(self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit) -> None:
         compute_tool_pose = build_kinematics(config).compute_tool_pose
         self.poses = {name: compute_tool_pose(np.radians(q)) for name, q in config.arm.poses_deg.items()}
-        self.tool_pose = self.poses["home"]
+        self.tool_pose, self.tool_velocity = self.poses["home"], np.zeros(3)
         self.collision: str | None = None
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
@@ -86,11 +87,6 @@ class FakeArm:
     def q(self) -> Array:
         """Tool position [m], padded with zeros to the number of joints `(n,)`."""
         return np.concatenate([self.tool_pose.position, np.zeros(self._joint_count - 3)])
-
-    @property
-    def tool_velocity(self) -> Array:
-        """Velocity zero `(3,)` [m/s]: a released object falls straight down."""
-        return np.zeros(3)
 
     @property
     def destination(self) -> Array:

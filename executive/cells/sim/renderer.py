@@ -15,8 +15,7 @@ from executive.cell.config import Colour, Section
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import (
-    FAR_PLANE,
-    NEAR_PLANE,
+    compute_distances,
     compute_projection_matrix,
     compute_view_matrix,
 )
@@ -75,11 +74,7 @@ class RenderedImage:
     @property
     def depth(self) -> Array:
         """Distances along the optical axis `(H, W)` [m], inf at pixels without a body."""
-        # The formula inverts the perspective projection of OpenGL.
-        depth_buffer = self.depth_buffer.astype(np.float64)
-        with np.errstate(divide="ignore"):
-            distances = FAR_PLANE * NEAR_PLANE / (FAR_PLANE - (FAR_PLANE - NEAR_PLANE) * depth_buffer)
-        return np.where(self.depth_buffer < 1.0, distances, np.inf)
+        return np.where(self.depth_buffer < 1.0, compute_distances(self.depth_buffer), np.inf)
 
 
 def render(world: World, matrix: Array, X_WC: Pose, region: Region, light: Light) -> RenderedImage:

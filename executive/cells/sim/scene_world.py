@@ -9,44 +9,31 @@ from numpy.typing import ArrayLike
 from executive.cell.config import CalibrationConfig, CameraConfig, CellConfig, ObjectConfig
 from executive.cell.config.cameras import POSE_AND_FOV_KEYS, TransformConfig
 from executive.cells.sim.arrangements import DAMAGED_MODEL_NUMBER, load_unknown_model, scale_model
-from executive.cells.sim.scene_file import (
-    ANY_CLASS,
-    SceneCameraConfig,
-    SceneConfig,
-    SceneObjectConfig,
-    UnknownConfig,
-)
+from executive.cells.sim.scene_file import ANY_CLASS, SceneConfig, UnknownConfig
 from executive.cells.sim.table_top import WOOD_TEXTURE
 from executive.cells.sim.world import World
 from executive.geometry import Pose
-from executive.perception.camera_model import (
-    compute_calibration,
-    compute_camera_matrix,
-    compute_field_of_view,
-    intersect_plane,
-)
+from executive.perception import camera_model
+
+
+def build_world(config: CellConfig, scene: SceneConfig, *, gui: bool = False) -> World:
+    """Return the world of a scene, without objects; `gui` shows it in a window.
+
+    The attribute `config` of the world is the cell file with the changes of the scene.
+    """
+    world = World(apply_scene(config, scene), gui=gui)
+    if (scene.table.colour, scene.table.texture) != ((1.0, 1.0, 1.0), WOOD_TEXTURE):
+        world.table_top.paint(scene.table.colour, scene.table.texture)
+    return world
 
 
 def apply_scene(config: CellConfig, scene: SceneConfig) -> CellConfig:
     """Return the cell configuration with the objects, the table and the camera of a scene."""
-    table = scene.table.model_dump(include={"objects", "gap", "stacked"}, exclude_none=True)
-    name, camera = next(iter(config.cameras.items()))
-    return config.model_copy(
-        update={
-            "table": config.table.model_copy(update=table),
-            "objects": {
-                label: _change_object(model, scene.objects.get(label, scene.objects.get(ANY_CLASS)))
-                for label, model in config.objects.items()
-            },
-            "cameras": {**config.cameras, name: _change_camera(camera, scene.camera)},
-        }
-    )
-
-
-def paint_table(world: World, scene: SceneConfig) -> None:
-    """Give the table of a world the colour and the texture of a scene."""
-    if (scene.table.colour, scene.table.texture) != ((1.0, 1.0, 1.0), WOOD_TEXTURE):
-        world.table_top.paint(scene.table.colour, scene.table.texture)
+    table_changes = scene.table.model_dump(include={"objects", "gap", "stacked"}, exclude_none=True)
+    table = config.table.model_copy(update=table_changes)
+    objects = {label: _change_object(label, model, scene) for label, model in config.objects.items()}
+    cameras = {name: _change_camera(camera, scene) for name, camera in config.cameras.items()}
+    return config.model_copy(update={"table": table, "objects": objects, "cameras": cameras})
 
 
 def draw_unknown_models(unknown: UnknownConfig | None, rng: np.random.Generator) -> list[ObjectConfig]:
@@ -61,8 +48,9 @@ def draw_unknown_models(unknown: UnknownConfig | None, rng: np.random.Generator)
     return [scale_model(model, unknown.scale).model_copy(update=colours) for model in models]
 
 
-def _change_object(model: ObjectConfig, section: SceneObjectConfig | None) -> ObjectConfig:
+def _change_object(label: str, model: ObjectConfig, scene: SceneConfig) -> ObjectConfig:
     """Return an object class with the colours and the size of a scene."""
+    section = scene.objects.get(label, scene.objects.get(ANY_CLASS))
     if section is None:
         return model
     colours = section.colours or model.colours
@@ -72,19 +60,20 @@ def _change_object(model: ObjectConfig, section: SceneObjectConfig | None) -> Ob
     return scale_model(model, section.scale).model_copy(update={"colours": colours})
 
 
-def _change_camera(camera: CameraConfig, section: SceneCameraConfig) -> CameraConfig:
+def _change_camera(camera: CameraConfig, scene: SceneConfig) -> CameraConfig:
     """Return a camera with the errors of a scene, whose key `calibration` contains pose and intrinsics."""
+    section = scene.camera
     if section.noise is not None:
         camera = camera.model_copy(update={"noise": section.noise})
     if not any((*section.shift, *section.turn_deg, *section.orbit_deg)) and section.fov_factor == 1:
         return camera
-    matrix, X_MC = compute_calibration(camera)
+    matrix, X_MC = camera_model.compute_calibration(camera)
     if any(section.orbit_deg):
-        centre = intersect_plane(matrix, X_MC, matrix[:2, 2], 0.0)
+        centre = camera_model.intersect_plane(matrix, X_MC, matrix[:2, 2], 0.0)
         X_MC = Pose.of(centre) @ _make_rotation(section.orbit_deg) @ Pose.of(-centre) @ X_MC
     X_MC = Pose.of(section.shift) @ X_MC @ _make_rotation(section.turn_deg)
-    fov = compute_field_of_view(matrix, camera.height) * section.fov_factor
-    factor = compute_camera_matrix(camera.width, camera.height, fov)[1, 1] / matrix[1, 1]
+    fov = camera_model.compute_field_of_view(matrix, camera.height) * section.fov_factor
+    factor = camera_model.compute_camera_matrix(camera.width, camera.height, fov)[1, 1] / matrix[1, 1]
     (fx, fy), (cx, cy) = factor * matrix.diagonal()[:2], matrix[:2, 2] - 0.5
     pose = TransformConfig(rotation=tuple(X_MC.rotation_vector), translation=tuple(X_MC.position))
     rows = ((fx, 0.0, cx), (0.0, fy, cy), (0.0, 0.0, 1.0))

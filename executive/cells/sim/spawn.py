@@ -12,7 +12,7 @@ from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.object_positions import draw_positions
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, UnknownConfig
-from executive.cells.sim.scene_world import apply_scene, draw_unknown_models, paint_table
+from executive.cells.sim.scene_world import build_world, draw_unknown_models
 from executive.cells.sim.world import World
 from executive.geometry import Pose, rotate_about_z
 
@@ -45,8 +45,7 @@ def build_initial_world(
     Raises:
         InputError: The workspace has no room for the objects.
     """
-    world = World(apply_scene(config, scene), gui=gui)
-    paint_table(world, scene)
+    world = build_world(config, scene, gui=gui)
     object_seed, *_ = derive_seeds(seed)
     spawn_objects(world, object_seed, scene.unknown)
     world.rest_positions = {body: [world.get_object_pose(body).position] for body in world.labels}

@@ -53,12 +53,14 @@ class SuctionTool:
         noise_seed: Random seed of the noise of `load`.
 
     Attributes:
+        load_std: Standard deviation of the noise of `load` [N].
         dropped_bodies: Bodies whose last seal broke; ground truth, not for skills.
     """
 
     def __init__(self, world: World, config: ToolConfig, noise_seed: int = 0) -> None:
         self._world = world
         self._config = config
+        self.load_std = config.load_std
         self._noise_seed = noise_seed
         self._is_vacuum_on = False
         self._grip: _Grip | None = None
@@ -92,12 +94,7 @@ class SuctionTool:
         force = 0.0 if self._grip is None else -float(self._grip.pull[2])
         # The noise depends only on the physics step, so that a resumed run continues with the same noise.
         random_generator = np.random.default_rng([self._noise_seed, self._world.step_count])
-        return force + float(random_generator.normal(0.0, self._config.load_std))
-
-    @property
-    def load_std(self) -> float:
-        """Standard deviation of the noise of `load` [N]."""
-        return self._config.load_std
+        return force + float(random_generator.normal(0.0, self.load_std))
 
     @property
     def held_body(self) -> int | None:

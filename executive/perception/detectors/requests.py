@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import CameraConfig, DetectorConfig
-from executive.cell.detection import Answer, Detection
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import Answer, Detection, ErrorRates
 from executive.cell.frame import Frame
 from executive.cell.futures import wait_until_done
 from executive.cell.protocols import Clock, Detector, Request

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
 from pydantic import Field, ValidationError
 
 from executive.cell.config import CameraConfig, CellConfig, DetectorConfig, Section
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import ErrorRates
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration
 from executive.perception.detectors.detector_registry import find_detector_kinds
@@ -28,7 +28,7 @@ Fingerprint = Mapping[str, str]
 
 
 class StoredErrorRates(Section):
-    """Error rates of a detector in a measurement file; `executive.cell.error_rates` describes the fields."""
+    """Error rates of a detector in a measurement file; `executive.cell.detection` describes the fields."""
 
     miss_rate: float = Field(gt=0, lt=1)
     confusion_rate: float = Field(gt=0, lt=1)
@@ -101,6 +101,19 @@ def read_measurements(path: Path) -> tuple[Measurement, ...]:
         ) from error
 
 
+def read_folders(folders: Sequence[Path]) -> tuple[list[tuple[str, Measurement]], list[str]]:
+    """Return all stored measurements, each with the name of its cell, and messages about unreadable files."""
+    measurements: list[tuple[str, Measurement]] = []
+    problems = []
+    for file in (file for folder in folders for file in sorted(folder.glob(f"*{MEASUREMENT_SUFFIX}"))):
+        try:
+            cell = file.name.removesuffix(MEASUREMENT_SUFFIX)
+            measurements += [(cell, measurement) for measurement in read_measurements(file)]
+        except InputError as error:
+            problems.append(str(error))
+    return measurements, problems
+
+
 def format_measurements(measurements: Iterable[Measurement], new: Measurement) -> str:
     """Return the text of a measurement file in which `new` replaces the measurement of its detector."""
     others = [measurement for measurement in measurements if measurement.detector != new.detector]
@@ -133,7 +146,7 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Finger
     }
 
 
-def list_changed_properties(measured: Fingerprint, current: Fingerprint) -> str:
+def list_changes(measured: Fingerprint, current: Fingerprint) -> str:
     """Return the names of the properties that differ between two fingerprints; "" if none."""
     names = dict.fromkeys([*measured, *current])
     return ", ".join(name for name in names if measured.get(name) != current.get(name))

@@ -7,20 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from executive.cell.config import CellConfig
-from executive.cell.error_rates import ErrorRates, assume_rates
+from executive.cell.detection import ErrorRates, assume_rates
 from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
-from executive.errors import InputError
 from executive.perception.detectors.detector_registry import build_detectors, find_detector_kinds
 from executive.perception.detectors.requests import ChangedRequest, ClosableDetector
 from executive.perception.envelope.frame_statistics import FrameRange, compute_frame_statistics
-from executive.perception.envelope.measurement import (
-    MEASUREMENT_SUFFIX,
-    Measurement,
-    compute_fingerprint,
-    list_changed_properties,
-    read_measurements,
-)
+from executive.perception.envelope.measurement import compute_fingerprint, list_changes, read_folders
 
 FAKE_KIND = "fake"
 """Kind of cell whose detectors are not measured, because they read the true positions of the objects."""
@@ -108,7 +101,7 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
     cell file are relative to `base`; `folders` contain measurement files `CELL.measured.json`.
     """
     names = list(find_measurable_detectors(config))
-    measurements, problems = _read_all_measurements(folders) if names else ([], [])
+    measurements, problems = read_folders(folders) if names else ([], [])
     envelopes, advice = {}, describe_measurement_command(config)
     for name in names:
         threshold = config.detectors[name].threshold
@@ -120,7 +113,7 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
         own_entries = (entry for cell, entry in measurements if (cell, entry.detector) == (config.cell, name))
         cause = "was never measured in this cell"
         if outdated := next(own_entries, None):
-            changes = list_changed_properties(outdated.fingerprint, fingerprint)
+            changes = list_changes(outdated.fingerprint, fingerprint)
             cause = f"was measured before a change of {changes}"
         cause = f"detector {name} {cause}, so high error rates are assumed"
         envelopes[name] = DetectorEnvelope(assume_rates(threshold, "; ".join([cause, advice, *problems])))
@@ -147,16 +140,3 @@ def find_measurable_detectors(config: CellConfig) -> Iterator[str]:
     for name, section in config.detectors.items():
         if section.kind in kinds and not getattr(kinds[section.kind].load(), "is_fake", False):
             yield name
-
-
-def _read_all_measurements(folders: Sequence[Path]) -> tuple[list[tuple[str, Measurement]], list[str]]:
-    """Return all stored measurements, each with the name of its cell, and messages about unreadable files."""
-    measurements: list[tuple[str, Measurement]] = []
-    problems = []
-    for file in (file for folder in folders for file in sorted(folder.glob(f"*{MEASUREMENT_SUFFIX}"))):
-        try:
-            cell = file.name.removesuffix(MEASUREMENT_SUFFIX)
-            measurements += [(cell, measurement) for measurement in read_measurements(file)]
-        except InputError as error:
-            problems.append(str(error))
-    return measurements, problems

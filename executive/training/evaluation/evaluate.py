@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,11 +16,7 @@ from executive.cell.detection import Answer, Detection
 from executive.cell.frame import Box
 from executive.cell.protocols import Localizer
 from executive.errors import Unavailable
-from executive.perception.envelope.frame_statistics import (
-    FrameRange,
-    FrameStatistics,
-    compute_frame_statistics,
-)
+from executive.perception.envelope.frame_statistics import FrameRange, compute_frame_statistics
 from executive.training.evaluation.cell_detector import CellDetector
 from executive.training.evaluation.error_statistics import ErrorStatistics, RepeatedErrors
 from executive.training.evaluation.matching import BoxMatch, is_ignored, match_detections
@@ -53,7 +49,7 @@ def evaluate(
     """
     errors, repeated_errors = ErrorStatistics(localizer), RepeatedErrors(localizer)
     average_precision = AveragePrecision()
-    statistics_of_frames: list[FrameStatistics] = []
+    statistics_of_frames: list[Mapping[str, float]] = []
     latencies: list[float] = []
     answer_counts: Counter[str] = Counter()
     unavailable_count, unavailable_reason = 0, ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from plain_frames import frame_of
 
-from executive.cell.error_rates import ErrorRates, assume_rates
+from executive.cell.detection import ErrorRates, assume_rates
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.detectors.requests import PendingSearch
 from executive.perception.envelope.frame_statistics import FrameRange
@@ -14,7 +14,7 @@ from executive.perception.envelope.measurement import (
     StoredErrorRates,
     compute_fingerprint,
     format_measurements,
-    list_changed_properties,
+    list_changes,
     read_measurements,
 )
 from executive.perception.envelope.rated_detectors import (
@@ -124,4 +124,4 @@ def test_measurements_of_other_detectors_in_a_file_are_kept(stored):
 
 
 def test_changed_properties_are_named():
-    assert list_changed_properties({"a": "1", "b": "2"}, {"a": "1", "b": "3", "c": "4"}) == "b, c"
+    assert list_changes({"a": "1", "b": "2"}, {"a": "1", "b": "3", "c": "4"}) == "b, c"

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.cell.detection import Answer, Detection
-from executive.cell.error_rates import ErrorRates
+from executive.cell.detection import Answer, Detection, ErrorRates
 from executive.errors import Unavailable
 from executive.training.labelled_image import LabelledImage
 
