@@ -116,10 +116,10 @@ def check_detector(detector: DetectorUnderTest, *, renders_scenes: bool, scene: 
     cell = detector.cell
     if renders_scenes and cell:
         if cell.kind != "sim":
-            raise InputError(
-                f"scenes can be rendered only of cells of kind sim, but {cell.cell} is of kind {cell.kind}; "
-                "measure its detector on your own images with --dataset"
+            kind = (
+                f"{cell.cell} is of kind {cell.kind}; measure its detector on your own images with --dataset"
             )
+            raise InputError(f"scenes can be rendered only of cells of kind sim, but {kind}")
         load_scene(scene, cell)
     for key_path, problem in find_detector_errors(detector.configs, detector.base_folder):
         raise InputError(f"detector {key_path[1]}: {problem}")
@@ -141,14 +141,11 @@ def measure_detector(
     # Images of a dataset and of randomized scenes do not use the camera, table and localizer of the cell.
     cell_of_images = None if dataset is not None or scenes.is_randomized else detector.cell
     camera = next(iter(cell_of_images.cameras.values())) if cell_of_images else None
+    classes = tuple(detector.cell.objects) if detector.cell else None
     with _open_images(detector.cell, dataset, scenes, progress) as samples:
+        configs, name, folder = detector.configs, detector.name, detector.base_folder
         cell_detector = CellDetector(
-            detector.configs,
-            detector.name,
-            base=detector.base_folder,
-            camera=camera,
-            view=scenes.view,
-            classes=tuple(detector.cell.objects) if detector.cell else None,
+            configs, name, base=folder, camera=camera, view=scenes.view, classes=classes
         )
         with contextlib.closing(cell_detector), progress(f"running {detector.name}") as update:
             return evaluate.evaluate(

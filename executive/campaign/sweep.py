@@ -76,16 +76,13 @@ def run_sweep(
         if record.run.status != "HALTED":
             database.append(replace(record, run=replace(record.run, crashes=crash_count)))
 
-    execute_jobs: Callable[..., object]
     if cluster is None:
-        execute_jobs = functools.partial(
-            run_jobs, run_job=run_job, make_failure=make_fault_record, workers=workers
-        )
+        execute_jobs = functools.partial(run_jobs, jobs, run_job, make_fault_record, workers=workers)
+        execute_jobs(progress=progress, on_result=store, on_halt=on_halt)
     else:
         from executive.campaign.cluster.cluster import run_jobs_on_cluster
 
-        execute_jobs = functools.partial(run_jobs_on_cluster, address=cluster)
-    execute_jobs(jobs, progress=progress, on_result=store, on_halt=on_halt)
+        run_jobs_on_cluster(jobs, address=cluster, progress=progress, on_result=store, on_halt=on_halt)
 
 
 def run_job(job: SweepJob) -> RunRecord:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from executive.cell.config import CellConfig
+from executive.cell.config import CellConfig
+from executive.errors import InputError
+from executive.mission.findings import suggest_choice
+from executive.mission.parse.cell_file import load_cell
+from executive.mission.text.file_search import get_shipped_folder
 
 
 def load_cells(
@@ -21,9 +23,6 @@ def load_cells(
     Raises:
         InputError: A cell does not exist, two cells have the same name, or a file is invalid.
     """
-    from executive.errors import InputError
-    from executive.mission.parse.cell_file import load_cell
-
     cells: dict[str, CellConfig] = {}
     for path_or_name in paths_or_names:
         config = load_cell(find_cell(path_or_name), overrides)
@@ -39,10 +38,6 @@ def find_cell(path_or_name: str) -> Path:
     Raises:
         InputError: There is neither a cell file with this path nor a shipped cell with this name.
     """
-    from executive.errors import InputError
-    from executive.mission.findings import suggest_choice
-    from executive.mission.text.file_search import get_shipped_folder
-
     path = Path(path_or_name)
     if path.is_file():
         return path

@@ -53,13 +53,11 @@ def command(
     option_sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests", "scene"))
     has_mission_options = any(source is not click.core.ParameterSource.DEFAULT for source in option_sources)
     has_keyboard = sys.stdin is not None and sys.stdin.isatty()
+    settings_text = "mission, seed, params, requests and scene from the run"
     pauses_forever = paused and not has_page and (quiet or not has_keyboard)
     options.check_usage(
         (mission is None and resume is None, "give a MISSION, or a run with --resume RUN"),
-        (
-            resume is not None and has_mission_options,
-            "--resume takes mission, seed, params, requests and scene from the run; omit them",
-        ),
+        (resume is not None and has_mission_options, f"--resume takes {settings_text}; omit them"),
         (pauses_forever, "--paused needs --view or a keyboard in a terminal to continue the run"),
         # The simulator would end the process if it could not open its window.
         (gui and not os.environ.get("DISPLAY"), "--gui needs a display, but DISPLAY is not set; omit --gui"),

@@ -126,10 +126,9 @@ def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
             elif isinstance(event, InputRead) and not event.exception:
                 check_input(event.name, event.value)
         except ValueError as error:
-            raise InputError(
-                f"{file_name}:{line_number}: this line is no event ({error}); the file was changed or "
-                "damaged after the run, because a run only appends to its journal; restore a copy of the file"
-            ) from error
+            problem = f"{file_name}:{line_number}: this line is no event ({error})"
+            cause = "the file was changed or damaged after the run, because a run only appends to its journal"
+            raise InputError(f"{problem}; {cause}; restore a copy of the file") from error
         events.append(timed)
     return events
 

@@ -79,7 +79,7 @@ def replay_run(
     Raises:
         InputError: The directory contains no run that can be replayed.
     """
-    log = InputLog.from_events(journal)
+    log = InputLog(journal)
     start = log.start_event
     if start is None or not log.inputs:
         raise InputError(f'"{path}" contains no run that can be replayed: its journal has no inputs of a run')

@@ -57,17 +57,16 @@ def resume_run(
     recorder = Recorder(directory, saves_pictures=record.saves_pictures, resume=True)
     try:
         events = read_journal(directory.journal)
-        log, start = InputLog.from_events(events), find_run_start(events, path, "run the mission again")
+        log, start = InputLog(events), find_run_start(events, path, "run the mission again")
         lacks_only_result = _check_end(directory, events)
         loaded = read_mission_of_run(path, start, skills)
         # The control step of a halt or fault is not compared, because a corrected skill may act differently.
         compared_log = log if log.halt is None else log.select_before(log.halt.tick)
         replay = replay_and_compare(loaded, compared_log, start.seed)
         if not replay.is_equal:
-            raise InputError(
-                f'the run in "{path}" cannot be resumed: {replay.difference}. The executive or a '
-                "skill has changed since the run; install the earlier version, or run the mission again"
-            )
+            problem = f'the run in "{path}" cannot be resumed: {replay.difference}'
+            advice = "install the earlier version, or run the mission again"
+            raise InputError(f"{problem}. The executive or a skill has changed since the run; {advice}")
         options = replace(options, seed=start.seed, requests=start.requests, scene=directory.scene)
         run = assemble_resumed(
             loaded, options, log, directory.world_log,

@@ -108,10 +108,10 @@ def find_run(name: str, runs: Path) -> Path:
             return path.resolve()
     run_paths = sorted((path.parent for path in runs.glob("*/*/journal.jsonl")), reverse=True)
     hint = f"the last runs there: {', '.join(str(path.relative_to(runs)) for path in run_paths[:3])}"
-    raise InputError(
-        f'"{name}" is no run directory, and "{runs}" contains no run directory of this name; '
-        f"{hint if run_paths else 'it contains no run at all; name the folder of the runs with --runs DIR'}"
-    )
+    if not run_paths:
+        hint = "it contains no run at all; name the folder of the runs with --runs DIR"
+    problem = f'"{name}" is no run directory, and "{runs}" contains no run directory of this name'
+    raise InputError(f"{problem}; {hint}")
 
 
 def make_unique_folder(day: Path, name: str) -> Path:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -56,9 +56,11 @@ class Halt(NamedTuple):
     is_tree_ticked: bool
 
 
-@dataclass(frozen=True)
 class InputLog:
     """Recorded inputs and interruptions of a run.
+
+    Args:
+        events: Events of a journal.
 
     Attributes:
         events: Events of the journal in order, without the control steps that a resumption discarded.
@@ -67,34 +69,26 @@ class InputLog:
         halt: The last halt, or None.
     """
 
-    events: Sequence[TimedEvent]
-    inputs: Mapping[str, Sequence[RecordedInput]] = field(default_factory=dict)
-    interruptions: Mapping[int, Interruption] = field(default_factory=dict)
-    halt: Halt | None = None
-
-    @staticmethod
-    def from_events(events: Iterable[TimedEvent]) -> InputLog:
-        """Return the log of a journal, without the control steps that a resumption discarded."""
-        kept_events: list[TimedEvent] = []
+    def __init__(self, events: Iterable[TimedEvent]) -> None:
+        self.events: list[TimedEvent] = []
         for timed in events:
             if isinstance(timed.event, RunResumed):
-                kept_events = _select_before(kept_events, timed.event.valid_ticks)
-            kept_events.append(timed)
-        incomplete_end_ticks = _find_incomplete_end_ticks(kept_events)
-        interruptions: dict[int, Interruption] = {}
-        inputs: dict[str, list[RecordedInput]] = defaultdict(list)
-        halt = None
-        for timed in kept_events:
+                self.events = _select_before(self.events, timed.event.valid_ticks)
+            self.events.append(timed)
+        incomplete_end_ticks = _find_incomplete_end_ticks(self.events)
+        self.inputs: dict[str, list[RecordedInput]] = defaultdict(list)
+        self.interruptions: dict[int, Interruption] = {}
+        self.halt: Halt | None = None
+        for timed in self.events:
             tick, event = timed.tick, timed.event
             match event:
                 case RunResumed(count, action):
                     restarts_tree = count - 1 in incomplete_end_ticks
-                    interruptions[count] = Interruption(count, action, restarts_tree, tick)
+                    self.interruptions[count] = Interruption(count, action, restarts_tree, tick)
                 case InputRead(name):
-                    inputs[name].append(RecordedInput(tick, event))
+                    self.inputs[name].append(RecordedInput(tick, event))
                 case RunHalted(is_tree_ticked):
-                    halt = Halt(tick, is_tree_ticked)
-        return InputLog(kept_events, inputs, interruptions, halt)
+                    self.halt = Halt(tick, is_tree_ticked)
 
     @property
     def start_event(self) -> RunStarted | None:
@@ -165,7 +159,7 @@ class InputLog:
 
     def select_before(self, tick: int) -> InputLog:
         """Return the log of the events before control step `tick`, including the start of the run."""
-        return InputLog.from_events(_select_before(self.events, tick))
+        return InputLog(_select_before(self.events, tick))
 
 
 def _select_before(events: Iterable[TimedEvent], tick: int) -> list[TimedEvent]:

@@ -35,26 +35,24 @@ class InputFormat(NamedTuple):
     codec: Codec = codecs.IDENTITY
 
 
+UNCHANGED_INPUTS = (
+    "arm.at_rest", "plan.ready", "tool.touching", "tool.holding", "tool.load", "tool.load_std",
+    "camera.name", "camera.next_pose", "camera.sees_table",
+)  # fmt: skip
+"""Accesses whose results are recorded unchanged, under the name of the access."""
+
 INPUT_FORMATS: Mapping[str, InputFormat] = {
+    **{name: InputFormat(name) for name in UNCHANGED_INPUTS},
     "arm.q": InputFormat("arm.q", codecs.ARRAY),
     "arm.tool_pose": InputFormat("arm.tool_pose", codecs.POSE),
     "arm.tool_velocity": InputFormat("arm.tool_velocity", codecs.ARRAY),
     "arm.destination": InputFormat("arm.destination", codecs.ARRAY),
-    "arm.at_rest": InputFormat("arm.at_rest"),
     "arm.collision": InputFormat("arm.met"),
     "arm.describe_unreachable": InputFormat("arm.unreachable"),
-    "plan.ready": InputFormat("plan.ready"),
     "plan.result": InputFormat("plan", codecs.MOTION),
-    "tool.touching": InputFormat("tool.touching"),
-    "tool.holding": InputFormat("tool.holding"),
     "tool.holding_force": InputFormat("tool.bears"),
-    "tool.load": InputFormat("tool.load"),
-    "tool.load_std": InputFormat("tool.load_std"),
-    "camera.name": InputFormat("camera.name"),
     "camera.scan_poses": InputFormat("camera.scan_poses", codecs.STRINGS),
-    "camera.next_pose": InputFormat("camera.next_pose"),
     "camera.get_view_box": InputFormat("camera.area.{0}", codecs.BOX),
-    "camera.sees_table": InputFormat("camera.sees_table"),
     "camera.capture": InputFormat("camera.frame", codecs.FRAME),
     "camera.describe_displacement": InputFormat("camera.displacement"),
     "request.ready": InputFormat("detector.{detector}.ready"),

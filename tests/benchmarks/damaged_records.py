@@ -253,7 +253,7 @@ def _resume(subject: MissionUnderTest, path: Path, case: str) -> Figures:
         except InputError as error:
             has_begun = "was interrupted before its start" not in str(error)
             return {"agrees": True, "status": "refused", "problems": [str(error)] if has_begun else []}
-        after = InputLog.from_events(read_journal(path / "journal.jsonl"))
+        after = InputLog(read_journal(path / "journal.jsonl"))
         problems = find_wrong_claims(result)
         if difference := replay_and_compare(subject.loaded, after, result.seed).difference:
             problems.append(f"the replay differs: {difference}")

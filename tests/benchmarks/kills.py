@@ -100,13 +100,13 @@ def run_and_kill(subject: MissionUnderTest, seed: int, runs: Path, delay: float)
         entries = read_journal(find_run(LATEST_LINK, runs) / "journal.jsonl")
     except ExecutiveError:
         return False
-    return InputLog.from_events(entries).start_event is not None and find_run_end(entries) is None
+    return InputLog(entries).start_event is not None and find_run_end(entries) is None
 
 
 def resume_killed_run(subject: MissionUnderTest, seed: int, runs: Path, change: str) -> Figures:
     """Change the world if asked to, resume a killed run, and return its figures and problems."""
     path = find_run(LATEST_LINK, runs)
-    past = InputLog.from_events(read_journal(path / "journal.jsonl"))
+    past = InputLog(read_journal(path / "journal.jsonl"))
     nodes = (timed.event for timed in past.events if isinstance(timed.event, NodeStarted | NodeEnded))
     last = {event.node: event for event in nodes if event.skill}
     kill: Figures = {
@@ -121,7 +121,7 @@ def resume_killed_run(subject: MissionUnderTest, seed: int, runs: Path, change: 
         done = change_world(subject, seed, path, past, change) if change else ""
         options = RunOptions(seed, make_cell=subject.make_cell)
         result = resume_run(path, subject.loaded.skills, options, RecordOptions(saves_pictures=False))
-        after = InputLog.from_events(read_journal(path / "journal.jsonl"))
+        after = InputLog(read_journal(path / "journal.jsonl"))
         problems = [*check_result(result, change_made=done), *find_handled_twice(after.events)]
         difference = replay_and_compare(subject.loaded, after, seed).difference
         if difference:

@@ -100,7 +100,7 @@ def test_the_first_other_decision_of_an_edited_mission_is_reported(missions: Pat
 def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
     file, skills = missions / "sort_overhead.yaml", load_skills()
     four_times = [during("*/Grasp", seal_fails(), activations=(1, 2, 3, 4))]
-    log = InputLog.from_events(run_mission(file, seed=3, faults=four_times).events)
+    log = InputLog(run_mission(file, seed=3, faults=four_times).events)
     assert replay_and_compare(load_mission(file, skills), log, 3).is_equal
     done = replay_and_compare(load_mission(file, skills, {"attempts": "2"}), log, 3, edited=True)
     assert done.replayed.event.node == "RejectTarget"
@@ -130,6 +130,6 @@ def test_a_decision_too_many_is_a_difference_in_a_run_that_was_cut_off_too(missi
     decided = NodeStarted | NodeEnded | BranchChosen | TargetSelected | ItemChanged | ToolCommanded
     without = [one for n, one in enumerate(cut) if n < missing or not isinstance(one.event, decided)]
     loaded = load_mission(file, skills)
-    assert replay_and_compare(loaded, InputLog.from_events(cut), 3).is_equal
-    done = replay_and_compare(loaded, InputLog.from_events(without), 3)
+    assert replay_and_compare(loaded, InputLog(cut), 3).is_equal
+    done = replay_and_compare(loaded, InputLog(without), 3)
     assert (done.recorded, done.replayed and type(done.replayed.event)) == (None, ToolCommanded)

@@ -25,9 +25,7 @@ def values(log: InputLog) -> list[object]:
 
 
 def test_answers_are_in_order_by_the_name_of_the_input() -> None:
-    log = InputLog.from_events(
-        [START, sense(0, False), sense(0, "arm", name="arm.met"), sense(7, True, nth=2)]
-    )
+    log = InputLog([START, sense(0, False), sense(0, "arm", name="arm.met"), sense(7, True, nth=2)])
     assert [(one.tick, one.reading.read_number, one.reading.value) for one in log.inputs["tool.holding"]] == [
         (0, 1, False),
         (7, 2, True),
@@ -37,8 +35,8 @@ def test_answers_are_in_order_by_the_name_of_the_input() -> None:
 
 def test_an_incomplete_control_step_is_void_once_the_run_was_resumed() -> None:
     killed = [START, sense(4, True), sense(5, False), at(5, ToolCommanded("open"))]
-    assert InputLog.from_events(killed).last_action == "open"
-    resumed = InputLog.from_events([*killed, resume(5, 5, "open"), sense(5, True, nth=3)])
+    assert InputLog(killed).last_action == "open"
+    resumed = InputLog([*killed, resume(5, 5, "open"), sense(5, True, nth=3)])
     assert values(resumed) == [True, True]
     assert (resumed.last_action, resumed.interruptions[5].last_action) == ("", "open")
 
@@ -47,17 +45,17 @@ def test_a_second_resumption_voids_only_the_end_of_the_first() -> None:
     entries = [
         START, sense(2, 1), sense(3, 2), resume(3, 3), sense(4, 3), sense(6, 4), resume(9, 6), sense(9, 5),
     ]  # fmt: skip
-    log = InputLog.from_events(entries)
+    log = InputLog(entries)
     assert values(log) == [1, 3, 5]
     assert {one.kept_step_count: one.resume_tick for one in log.interruptions.values()} == {3: 3, 6: 9}
 
 
 def test_the_steps_after_a_halt_do_not_count() -> None:
     halted = [START, sense(8, 1), at(9, RunHalted(True)), sense(30, 2), at(30, run_ended())]
-    log = InputLog.from_events(halted)
+    log = InputLog(halted)
     assert (log.make_final_interruption(30).kept_step_count, values(log.select_before(9))) == (9, [1])
     # Once the run was resumed, the halt is void.
-    assert InputLog.from_events([*halted, resume(30, 9)]).halt is None
+    assert InputLog([*halted, resume(30, 9)]).halt is None
 
 
 @pytest.mark.parametrize(("steps", "complete"), [(0, 0), (7, 7), (8, 8), (9, 9), (500, 9)])
@@ -65,9 +63,7 @@ def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
     steps: int, complete: int
 ) -> None:
     # Step 8 is the last one in the journal: whether it is complete is known from the steps of the world.
-    assert (
-        InputLog.from_events([START, sense(8, 1)]).make_final_interruption(steps).kept_step_count == complete
-    )
+    assert InputLog([START, sense(8, 1)]).make_final_interruption(steps).kept_step_count == complete
 
 
 @pytest.mark.parametrize(
@@ -84,25 +80,25 @@ def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
 def test_a_world_that_did_more_than_the_journal_knows(
     last_command: int, is_complete: bool, complete: int, action: str
 ) -> None:
-    log = InputLog.from_events([START, at(8, ToolCommanded("open"))])
+    log = InputLog([START, at(8, ToolCommanded("open"))])
     interruption = log.make_final_interruption(20, last_command, is_complete=is_complete)
     assert (interruption.kept_step_count, interruption.last_action) == (complete, action)
 
 
 def test_a_command_without_an_event_before_it_is_missing_in_the_journal() -> None:
-    log = InputLog.from_events([START, at(5, ToolCommanded("open")), sense(8, 1)])
+    log = InputLog([START, at(5, ToolCommanded("open")), sense(8, 1)])
     assert log.make_final_interruption(9, 8).last_action == "unknown"
     assert log.make_final_interruption(9, 7).last_action == "open"
 
 
 def test_actions_stay_unknown_if_the_resumption_was_interrupted_at_once() -> None:
-    log = InputLog.from_events([START, sense(5, 1), resume(9, 6, "unknown"), sense(9, 2)])
+    log = InputLog([START, sense(5, 1), resume(9, 6, "unknown"), sense(9, 2)])
     interruption = log.make_final_interruption(9, 8)
     assert (interruption.kept_step_count, interruption.last_action) == (6, "unknown")
 
 
 def test_a_kill_within_a_control_step_loses_no_action() -> None:
-    interruption = InputLog.from_events([START, at(8, ToolCommanded("open"))]).make_final_interruption(
+    interruption = InputLog([START, at(8, ToolCommanded("open"))]).make_final_interruption(
         8, 8, is_complete=False
     )
     assert (interruption.kept_step_count, interruption.last_action) == (8, "open")
@@ -112,18 +108,18 @@ def test_a_kill_within_a_control_step_loses_no_action() -> None:
 def test_a_resumption_that_was_interrupted_at_once_is_repeated_from_its_beginning(
     steps: int, complete: int
 ) -> None:
-    log = InputLog.from_events([START, sense(5, 1), resume(9, 6, "close"), sense(9, 2)])
+    log = InputLog([START, sense(5, 1), resume(9, 6, "close"), sense(9, 2)])
     interruption = log.make_final_interruption(steps)
     assert (interruption.kept_step_count, interruption.resume_tick) == (complete, steps)
 
 
 def test_a_run_that_ended_as_incomplete_is_reopened() -> None:
-    log = InputLog.from_events([START, sense(8, 1), at(9, run_ended("INCOMPLETE"))])
+    log = InputLog([START, sense(8, 1), at(9, run_ended("INCOMPLETE"))])
     assert log.make_final_interruption(9) == Interruption(10, "", True, 10)
-    log = InputLog.from_events([*log.events, resume(10, 10), sense(11, 2)])
+    log = InputLog([*log.events, resume(10, 10), sense(11, 2)])
     assert log.interruptions[10].restarts_tree
 
 
 def test_the_start() -> None:
-    assert InputLog.from_events([]).start_event is None
-    assert InputLog.from_events([START]).control_period == 1 / 240
+    assert InputLog([]).start_event is None
+    assert InputLog([START]).control_period == 1 / 240

@@ -33,7 +33,7 @@ class Recording:
         self.recorder.begin_step()
 
     def replayer(self) -> InputReplayer:
-        return InputReplayer(InputLog.from_events(self.events))
+        return InputReplayer(InputLog(self.events))
 
 
 def raising(error: Exception) -> Callable[[], Any]:

@@ -20,7 +20,7 @@ START = [at(0, run_started()), sense(0, "clock", 0.0)]
 
 
 def log(*events: TimedEvent) -> InputLog:
-    return InputLog.from_events([*START, *events])
+    return InputLog([*START, *events])
 
 
 def test_questions_are_answered_from_the_log_and_commands_are_not_executed() -> None:

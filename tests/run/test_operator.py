@@ -139,7 +139,7 @@ def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions
     assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
     ends = {one.event.status for one in events if isinstance(one.event, NodeEnded)}
     assert ends == {"INVALID"}, "nothing failed, and nobody quit"
-    again = replay_and_compare(loaded, InputLog.from_events(events), 1)
+    again = replay_and_compare(loaded, InputLog(events), 1)
     assert again.difference == ""
     assert again.decisions == sum(isinstance(one.event, NodeStarted | NodeEnded) for one in events) > 0
 

@@ -100,10 +100,8 @@ def _connect(address: str) -> Client:
     try:
         from distributed import Client
     except ImportError:
-        raise InputError(
-            '--cluster needs the packages of the extra "cluster"; install them with '
-            '`uv sync --extra cluster` or `pip install "executive[cluster]"`'
-        ) from None
+        advice = 'install them with `uv sync --extra cluster` or `pip install "executive[cluster]"`'
+        raise InputError(f'--cluster needs the packages of the extra "cluster"; {advice}') from None
     try:
         return Client(address, timeout=CONNECTION_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:

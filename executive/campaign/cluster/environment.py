@@ -51,10 +51,8 @@ def check_environment(client_versions: Mapping[str, str], dask_worker: Worker) -
         InputError: The software differs.
     """
     if differences := describe_differences(client_versions, describe_environment()):
-        worker = f"the worker {dask_worker.address}"
-        raise InputError(
-            f"the software of {worker} differs from this computer: {differences}; {INSTALLATION_ADVICE}"
-        )
+        subject = f"the software of the worker {dask_worker.address}"
+        raise InputError(f"{subject} differs from this computer: {differences}; {INSTALLATION_ADVICE}")
 
 
 def _hash_files() -> str:

@@ -98,12 +98,9 @@ def _execute_job(job: SweepJob, root: Path, working_directory: Path) -> Returned
         sys.path.insert(0, packages)
         search_path = filter(None, (packages, os.environ.get("PYTHONPATH")))
         os.environ["PYTHONPATH"] = os.pathsep.join(search_path)
-    settings = job.settings
-    settings = replace(
-        settings,
-        mission=str(_make_worker_path(root, Path(settings.mission))),
-        scene=settings.scene and _make_worker_path(root, settings.scene),
-    )
+    mission = str(_make_worker_path(root, Path(job.settings.mission)))
+    scene = job.settings.scene and _make_worker_path(root, job.settings.scene)
+    settings = replace(job.settings, mission=mission, scene=scene)
     job = replace(job, settings=settings, runs_folder=_make_worker_path(root, job.runs_folder))
     try:
         return pack_run(run_job(job), root)

@@ -65,10 +65,8 @@ class Campaign:
         """
         for number in numbers:
             if not 1 <= number <= len(self.faults):
-                raise InputError(
-                    f"{self.mission.name} has no fault {number}; the numbers are 1 to {len(self.faults)}, "
-                    "and --list shows them"
-                )
+                advice = f"the numbers are 1 to {len(self.faults)}, and --list shows them"
+                raise InputError(f"{self.mission.name} has no fault {number}; {advice}")
         return {number: self.faults[number - 1] for number in numbers}
 
     def run_single_faults(self) -> FaultCampaignResults:
@@ -140,16 +138,13 @@ class Campaign:
         Return the complete trials, and True if all trials are complete.
         """
 
-        def report_progress(ended_count: int, total: int) -> None:
+        def report(ended_count: int, total: int) -> None:
             self._progress(offset + ended_count, offset + total)
 
+        jobs = list(map(self.select_faults, combinations))
+        run_job = partial(run_trial, self.mission, self.nominal_run)
         trials = run_jobs(
-            list(map(self.select_faults, combinations)),
-            partial(run_trial, self.mission, self.nominal_run),
-            _make_aborted_trial,
-            workers=self._workers,
-            progress=report_progress,
-            on_halt=self._on_halt,
+            jobs, run_job, _make_aborted_trial, workers=self._workers, progress=report, on_halt=self._on_halt
         )
         complete_trials = [trial for trial in trials if trial is not None and not trial.is_halted_by_user]
         return complete_trials, len(complete_trials) == len(combinations)

@@ -54,7 +54,7 @@ class Cause:
 
 def list_causes(table: TableConfig) -> Mapping[str, Cause]:
     """Return the known causes of failures in the cell, by reason."""
-    bumped = effects.object_bumped(table.x, table.y)
+    bumped, rescan = effects.object_bumped(table.x, table.y), effects.operator_asks_rescan()
     return {
         "missed": Cause(effects.seal_fails(), "the suction cup cannot seal", "tool"),
         "dropped": Cause(effects.seal_breaks(), "the seal breaks half-way", "moves"),
@@ -68,9 +68,7 @@ def list_causes(table: TableConfig) -> Mapping[str, Cause]:
         "stale": Cause(effects.table_bumped(), "the table is bumped", "", REPEATED_ACTIVATIONS),
         "no_depth": Cause(effects.no_depth(), "no detection can be localized"),
         "quit": Cause(effects.operator_quits(), "the operator quits", "senses"),
-        "rescan": Cause(
-            effects.operator_asks_rescan(), "the operator asks for a scan", "senses", REPEATED_ACTIVATIONS
-        ),
+        "rescan": Cause(rescan, "the operator asks for a scan", "senses", REPEATED_ACTIVATIONS),
     }
 
 

@@ -57,15 +57,12 @@ def execute_nominal_run(mission: MissionUnderTest) -> NominalRun:
         items, audit = run.count_items(), run.count_ground_truth()
     description = f"without a fault, {mission.name} with seed {mission.seed}"
     if end.status != "SUCCESS":
-        raise InputError(
-            f"{description} ends as {end.status} {end.reason}: {end.message}; "
-            "a campaign needs a run that succeeds: choose another seed"
-        )
+        advice = "a campaign needs a run that succeeds: choose another seed"
+        raise InputError(f"{description} ends as {end.status} {end.reason}: {end.message}; {advice}")
     if audit is not None and (audit["unseen"] or not is_confirmed_by_audit(items, audit, end.is_table_empty)):
-        raise InputError(
-            f"{description} ends with a wrong ledger: the ledger says {format_counts(items)}; the audit "
-            f"{format_counts(audit)}; choose another seed, or a mission that observes the whole table"
-        )
+        problem = f"the ledger says {format_counts(items)}; the audit {format_counts(audit)}"
+        advice = "choose another seed, or a mission that observes the whole table"
+        raise InputError(f"{description} ends with a wrong ledger: {problem}; {advice}")
     steps_by_path = {
         path: tuple(each.end_tick - each.start_tick for each in activations)
         for path, activations in group_by_node(timeline.activations).items()

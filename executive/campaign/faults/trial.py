@@ -67,12 +67,9 @@ class _TrialRun:
         self._is_stopped = False
         cell_faults = [fault for fault in injected_faults if isinstance(fault, ScheduledFault)]
         skills_by_path = {node.path: mission.loaded.skills[node.skill] for node in list_skill_nodes(mission)}
-        self.options = RunOptions(
-            mission.seed,
-            mission.requests,
-            make_cell=with_faults(mission.make_cell, cell_faults, timeout=nominal_run.timeout),
-            substitutes=make_substitutes(self._skill_faults, skills_by_path),
-        )
+        make_cell = with_faults(mission.make_cell, cell_faults, timeout=nominal_run.timeout)
+        skills = make_substitutes(self._skill_faults, skills_by_path)
+        self.options = RunOptions(mission.seed, mission.requests, make_cell=make_cell, substitutes=skills)
         self.run = assemble(mission.loaded, self.options, [self._store_event, self.timeline])
         assert isinstance(self.run.workcell, FaultyCell)
         self._workcell = self.run.workcell

@@ -52,10 +52,8 @@ class ResultsDatabase:
                 self._create_tables(settings)
             (version,) = self._connection.execute("PRAGMA user_version").fetchone()
         if version != SCHEMA_VERSION:
-            advice = f"this program reads version {SCHEMA_VERSION}; start a new sweep"
-            raise InputError(
-                f'"{path}" is no database of a sweep, or has the schema version {version}; {advice}'
-            )
+            problem = f'"{path}" is no database of a sweep, or has the schema version {version}'
+            raise InputError(f"{problem}; this program reads version {SCHEMA_VERSION}; start a new sweep")
         (self.settings,) = self.read(SETTINGS)
 
     def lock(self) -> None:
@@ -108,9 +106,8 @@ class ResultsDatabase:
             yield
         except sqlite3.Error as error:
             problem = f'the results "{self.path}" cannot be read or written: {error}'
-            raise InputError(
-                f"{problem}; runs that were stored before this error may still be in the file"
-            ) from error
+            advice = "runs that were stored before this error may still be in the file"
+            raise InputError(f"{problem}; {advice}") from error
 
 
 def get_database_path(path: Path) -> Path:

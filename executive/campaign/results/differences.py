@@ -63,16 +63,13 @@ def compute_differences(pairs: Sequence[RunPair]) -> list[Difference]:
     succeed.
     """
     both_succeeded = [pair for pair in pairs if pair.a.is_success and pair.b.is_success]
+    successes = [(pair.a.is_success, 1, pair.b.is_success, 1) for pair in pairs]
+    throughputs = [(*_get_throughput_terms(pair.a), *_get_throughput_terms(pair.b)) for pair in pairs]
+    times = [(pair.a.robot_time_s, 1, pair.b.robot_time_s, 1) for pair in both_succeeded]
     return [
-        _estimate_difference("success", [(pair.a.is_success, 1, pair.b.is_success, 1) for pair in pairs]),
-        _estimate_difference(
-            "objects per hour",
-            [(*_get_throughput_terms(pair.a), *_get_throughput_terms(pair.b)) for pair in pairs],
-        ),
-        _estimate_difference(
-            "robot time if both runs succeed [s]",
-            [(pair.a.robot_time_s, 1, pair.b.robot_time_s, 1) for pair in both_succeeded],
-        ),
+        _estimate_difference("success", successes),
+        _estimate_difference("objects per hour", throughputs),
+        _estimate_difference("robot time if both runs succeed [s]", times),
     ]
 
 

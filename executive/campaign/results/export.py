@@ -19,10 +19,8 @@ def check_exporter() -> None:
     try:
         import pyarrow  # noqa: F401
     except ImportError as error:
-        raise InputError(
-            "--export needs pyarrow; install the extra: uv sync --extra export, "
-            'or pip install "executive[export]"'
-        ) from error
+        advice = 'install the extra: uv sync --extra export, or pip install "executive[export]"'
+        raise InputError(f"--export needs pyarrow; {advice}") from error
 
 
 def export_tables(database: ResultsDatabase, folder: Path) -> None:

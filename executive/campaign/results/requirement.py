@@ -97,16 +97,13 @@ def _parse_condition(text: str) -> Condition:
     """Return a condition from its text."""
     match = _CONDITION.fullmatch(text)
     if match is None:
-        raise InputError(
-            f'"{text.strip()}" is no comparison of a metric with a number; write for example '
-            "success>=0.99 and p95(robot_time_s)<20"
-        )
+        advice = "write for example success>=0.99 and p95(robot_time_s)<20"
+        raise InputError(f'"{text.strip()}" is no comparison of a metric with a number; {advice}')
     metric, column = match[1], match[2] or ""
     if metric not in (STATISTICS if column else METRICS):
         statistics = ", ".join(f"{name}(COLUMN)" for name in STATISTICS)
         raise InputError(f'there is no metric "{metric}"; the metrics are {", ".join(METRICS)}, {statistics}')
     if column and column not in _COLUMN_INDICES:
-        raise InputError(
-            f'runs have no column "{column}" with numbers; they have {", ".join(_COLUMN_INDICES)}'
-        )
+        columns = ", ".join(_COLUMN_INDICES)
+        raise InputError(f'runs have no column "{column}" with numbers; they have {columns}')
     return Condition(metric, column, match[3], float(match[4]))

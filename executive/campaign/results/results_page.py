@@ -111,17 +111,14 @@ def _make_histograms(values_by_label: Mapping[str, Sequence[float]]) -> list[His
     """Return one histogram for each group with values, all with the same bins."""
     all_values = [value for values in values_by_label.values() for value in values]
     edges = np.histogram_bin_edges(all_values, BIN_COUNT) if all_values else np.zeros(2)
-    return [
-        Histogram(
-            f"{label}: {len(values)} values from {min(values):.2f} to {max(values):.2f}, "
-            f"median {median(values):.2f}",
-            np.histogram(values, edges)[0].tolist(),
-            float(edges[0]),
-            float(edges[-1]),
-        )
-        for label, values in values_by_label.items()
-        if values
-    ]
+    histograms = []
+    for label, values in values_by_label.items():
+        if values:
+            value_range = f"{min(values):.2f} to {max(values):.2f}, median {median(values):.2f}"
+            description = f"{label}: {len(values)} values from {value_range}"
+            counts = np.histogram(values, edges)[0].tolist()
+            histograms.append(Histogram(description, counts, float(edges[0]), float(edges[-1])))
+    return histograms
 
 
 def _make_link(run_directory: str, folder: Path) -> str:

@@ -31,9 +31,8 @@ def create_sweep(settings: SweepSettings, runs_folder: Path) -> ResultsDatabase:
     Raises:
         InputError: The folder cannot be made.
     """
-    return create_database(
-        make_dated_folder(runs_folder, f"sweep_{settings.mission_name}", datetime.now()), settings
-    )
+    folder = make_dated_folder(runs_folder, f"sweep_{settings.mission_name}", datetime.now())
+    return create_database(folder, settings)
 
 
 def create_database(folder: Path, settings: SweepSettings) -> ResultsDatabase:

@@ -29,9 +29,8 @@ class SummaryStatistics:
     @staticmethod
     def from_values(values: Sequence[float]) -> SummaryStatistics:
         """Return the statistics of the values, of which there must be at least one."""
-        return SummaryStatistics(
-            min(values), statistics.median(values), statistics.fmean(values), max(values)
-        )
+        median, mean = statistics.median(values), statistics.fmean(values)
+        return SummaryStatistics(min(values), median, mean, max(values))
 
 
 @dataclass(frozen=True)

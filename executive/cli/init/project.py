@@ -87,10 +87,8 @@ def check_package_name(name: str, source: str) -> str:
         InputError: The name is invalid or in use.
     """
     if _NAME_PATTERN.fullmatch(name) is None:
-        raise InputError(
-            f"{source} is not a valid package name: a package name starts with a letter, continues with "
-            f'letters, digits and "_", and does not end with "_"; {_NAME_ADVICE}'
-        )
+        rule = 'starts with a letter, continues with letters, digits and "_", and does not end with "_"'
+        raise InputError(f"{source} is not a valid package name: a package name {rule}; {_NAME_ADVICE}")
     if conflict := _find_conflict(name):
         raise InputError(f'a package cannot be called "{name}": {conflict}; {_NAME_ADVICE}')
     return name

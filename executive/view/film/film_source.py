@@ -30,21 +30,20 @@ class FilmSource:
     """
 
     def __init__(self, directory: RunDirectory) -> None:
+        problem = f'the run in "{directory.path}" cannot be filmed'
         if not directory.world_log.exists():
+            advice = "Run the mission again with `executive run` and the same seed, and film that run"
             raise InputError(
-                f'the run in "{directory.path}" cannot be filmed: it has no world.log, from which its world '
-                "is simulated again; sweeps do not keep this file. Run the mission again with "
-                "`executive run` and the same seed, and film that run"
+                f"{problem}: it has no world.log, from which its world is simulated again; sweeps do not "
+                f"keep this file. {advice}"
             )
         if not is_command_log(directory.world_log):
-            raise InputError(
-                f'the run in "{directory.path}" cannot be filmed: its cell has no simulated world; '
-                "film a run on a cell of `kind: sim`"
-            )
+            advice = "film a run on a cell of `kind: sim`"
+            raise InputError(f"{problem}: its cell has no simulated world; {advice}")
         events = read_journal(directory.journal)
         self.directory = directory
         self.start = find_run_start(events, directory.path, "there is nothing to film")
-        self.events = InputLog.from_events(events).events
+        self.events = InputLog(events).events
         self.nodes = read_tree(directory.tree)
         self.config = read_cell(directory.path)
         self.bin_colours = {

@@ -14,16 +14,6 @@ from executive.geometry import Pose
 
 
 @dataclass(frozen=True)
-class RunOutcome:
-    """Outcome of a run: status, message, run directory, and file of the report or ""."""
-
-    status: str
-    message: str
-    run: str
-    report: str
-
-
-@dataclass(frozen=True)
 class PageChange:
     """Change of the page that no event of the run describes; None for unchanged values.
 
@@ -32,14 +22,14 @@ class PageChange:
         tree: Drawing of the tree as an SVG document.
         is_paused: True if the run is paused.
         note: Message about the record of the run.
-        result: Outcome of the run.
+        result: Outcome of the run: `status`, `message`, `run` directory, and file of the `report` or "".
     """
 
     clock: float | None = None
     tree: str | None = None
     is_paused: bool | None = None
     note: str | None = None
-    result: RunOutcome | None = None
+    result: Mapping[str, str] | None = None
 
 
 @dataclass(frozen=True)

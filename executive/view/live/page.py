@@ -58,10 +58,8 @@ class LivePage:
 
     def __init__(self) -> None:
         if missing := [name for name in REQUIRED_PACKAGES if find_spec(name) is None]:
-            raise InputError(
-                f"--view needs {', '.join(missing)}; install the extra: uv sync --extra view, "
-                'or pip install "executive[view]"'
-            )
+            advice = 'install the extra: uv sync --extra view, or pip install "executive[view]"'
+            raise InputError(f"--view needs {', '.join(missing)}; {advice}")
         token = secrets.token_urlsafe(24)
         self._error_file = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the page)
         with socket.create_server((LOOPBACK, 0)) as listener:
@@ -135,8 +133,8 @@ class LivePage:
         if not self._threads:
             return
         if result is not None:
-            outcome = messages.RunOutcome(result.status, result.verdict, result.run, report_path)
-            self._enqueue(messages.PageChange(result=outcome))
+            outcome = {"status": result.status, "message": result.verdict, "run": result.run}
+            self._enqueue(messages.PageChange(result={**outcome, "report": report_path}))
         self._queue.put(None)
         try:
             if self._server.wait(SHUTDOWN_TIMEOUT) != 0:

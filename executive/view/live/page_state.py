@@ -44,9 +44,8 @@ class PageState:
             case CameraImage():
                 self._set_values(look=_encode_camera_image(message))
             case PageChange():
-                self._set_values(
-                    **{key: value for key, value in asdict(message).items() if value is not None}
-                )
+                changes = asdict(message).items()
+                self._set_values(**{key: value for key, value in changes if value is not None})
 
     def take_changes(self) -> JsonObject:
         """Return the values that changed since the last call, by key."""
