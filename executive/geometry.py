@@ -39,14 +39,10 @@ class Pose:
     def of(position: ArrayLike, quaternion: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Pose:
         """Return the pose with a position `(3,)` [m] and a quaternion `(x, y, z, w)` of any norm."""
         x, y, z, w = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
-        rotation = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ]
-        )
-        return Pose(rotation, np.asarray(position, dtype=float))
+        x_row = [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)]
+        y_row = [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)]
+        z_row = [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]
+        return Pose(np.array([x_row, y_row, z_row]), np.asarray(position, dtype=float))
 
     def __matmul__(self, other: Pose) -> Pose:
         return Pose(self.rotation @ other.rotation, self.rotation @ other.position + self.position)

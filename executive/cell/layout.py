@@ -40,15 +40,14 @@ def build_object_class(label: str, config: ObjectConfig) -> ObjectClass:
 
 def compute_travel_height(config: CellConfig) -> float:
     """Return the tool height [m] at which a held object of any class clears all bin walls and piles."""
-    max_height = max(section.height for section in config.objects.values())
     wall_top = max(bin.position[2] + bin.size[2] for bin in config.bins.values())
-    return max(wall_top, compute_max_pile_height(config)) + max_height + config.motion.clearance
+    max_obstacle_top = max(wall_top, compute_max_pile_height(config))
+    return max_obstacle_top + config.max_object_height + config.motion.clearance
 
 
 def compute_max_pile_height(config: CellConfig) -> float:
     """Return the maximum height of a pile on the table [m]: two objects if `stacked` is above 0, else one."""
-    max_height = max(section.height for section in config.objects.values())
-    return 2 * max_height if config.table.stacked else max_height
+    return (2 if config.table.stacked else 1) * config.max_object_height
 
 
 def list_bin_boxes(size: Vector3) -> Sequence[tuple[Vector3, Vector3]]:

@@ -151,18 +151,13 @@ def compute_projection_matrix(matrix: Array, region: Box) -> tuple[float, ...]:
     # Sides of the region in the near plane [m], in OpenGL's camera frame.
     left, right = ((x - matrix[0, 2]) / matrix[0, 0] * near for x in region[::2])
     top, bottom = ((matrix[1, 2] - y) / matrix[1, 1] * near for y in region[1::2])
-    projection = np.array(
-        [
-            [2 * near / (right - left), 0.0, (right + left) / (right - left), 0.0],
-            [0.0, 2 * near / (top - bottom), (top + bottom) / (top - bottom), 0.0],
-            [0.0, 0.0, -(far + near) / (far - near), -2 * far * near / (far - near)],
-            [0.0, 0.0, -1.0, 0.0],
-        ]
-    )
-    return tuple(projection.T.ravel().tolist())
+    x_row = [2 * near / (right - left), 0.0, (right + left) / (right - left), 0.0]
+    y_row = [0.0, 2 * near / (top - bottom), (top + bottom) / (top - bottom), 0.0]
+    depth_row = [0.0, 0.0, -(far + near) / (far - near), -2 * far * near / (far - near)]
+    return tuple(np.array([x_row, y_row, depth_row, [0.0, 0.0, -1.0, 0.0]]).T.ravel().tolist())
 
 
-def compute_distances(depth_buffer: NDArray[np.float32]) -> Array:
+def compute_depths(depth_buffer: NDArray[np.float32]) -> Array:
     """Return the distances along the optical axis [m] for a depth buffer of OpenGL, whose values are 0 to 1.
 
     The function inverts `compute_projection_matrix`; the buffer has the value 1 at the far plane and beyond.

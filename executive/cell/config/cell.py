@@ -117,6 +117,11 @@ class CellConfig(Section):
     safe_place: Vector
     """Position on the table at which `PutDown` puts down an object: x, y, z [m]."""
 
+    @property
+    def max_object_height(self) -> float:
+        """Height of the highest class of objects [m]."""
+        return max(section.height for section in self.objects.values())
+
     @field_validator("detectors")
     @classmethod
     def _put_default_first(

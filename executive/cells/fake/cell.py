@@ -168,9 +168,8 @@ class FakeCell(CellWithoutHardware):
         for each in (*self.world.objects, *removed):
             bin, positions, is_removed = self.world.find_bin(each), each.rest_positions, each in removed
             name = bin.name if bin else ""
-            final_objects.append(
-                FinalObject(each.label, name, positions, each.is_dropped, each is held, is_removed)
-            )
+            entry = FinalObject(each.label, name, positions, each.is_dropped, each is held, is_removed)
+            final_objects.append(entry)
         max_distance = self.config.ledger.gate
         return count_outcomes(final_objects, self.ledger.records, self.cell.bins, self.routes, max_distance)
 
@@ -185,11 +184,11 @@ class FakeMinTimes(CellMinTimes):
 
     def _compute_min_transport_time(self, bin: str) -> float:
         """Return the time [s] to lift the tallest object to travel height and to move to the nearest slot."""
-        max_height = max(object_class.height for object_class in self._config.objects.values())
         slots = build_bin(bin, self._config.bins[bin]).slots
         low, high = np.array([self._config.table.x, self._config.table.y]).T
         distance = float(np.linalg.norm(slots - np.clip(slots, low, high), axis=1).min())
-        return (compute_travel_height(self._config) - max_height + distance) / MAX_TOOL_SPEED
+        min_lift = compute_travel_height(self._config) - self._config.max_object_height
+        return (min_lift + distance) / MAX_TOOL_SPEED
 
 
 @functools.cache

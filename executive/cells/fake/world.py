@@ -124,10 +124,8 @@ class FakeWorld:
             object_class = self.classes[fake_object.label]
             distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))
             seal_offset = abs(distance - object_class.contact_radius)
-            top_height = float(fake_object.position[2]) + object_class.height / 2
-            is_touched = (
-                seal_offset <= MAX_SEAL_OFFSET and abs(top_height - tip_position[2]) <= TOUCH_DISTANCE
-            )
+            gap = abs(float(fake_object.position[2]) + object_class.height / 2 - tip_position[2])
+            is_touched = seal_offset <= MAX_SEAL_OFFSET and gap <= TOUCH_DISTANCE
             if is_touched and fake_object is not self.held_object:
                 return fake_object
         return None

@@ -38,19 +38,14 @@ class ArmOcclusion:
     """
 
     def __init__(
-        self,
-        world: World,
-        kinematics: Kinematics,
-        config: CellConfig,
-        is_loaded: Callable[[], bool] = lambda: False,
+        self, world: World, kinematics: Kinematics, config: CellConfig, is_loaded: Callable[[], bool]
     ) -> None:
         self._world = world
         self._kinematics = kinematics
         self._is_loaded = is_loaded
         self._X_TF = Pose.of([0.0, 0.0, -config.tool.length])
-        models = config.objects.values()
-        self._load_radius = max(model.radius for model in models) + MAX_LOAD_OFFSET
-        self._load_height = max(model.height for model in models)
+        self._load_radius = max(model.radius for model in config.objects.values()) + MAX_LOAD_OFFSET
+        self._load_height = config.max_object_height
         heights = (0.0, compute_max_pile_height(config))
         self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
 

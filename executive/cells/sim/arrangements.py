@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -146,7 +146,7 @@ def draw_arrangement(
         margin = rng.uniform(0.0, 0.02 + 0.006 * count)
         low = np.maximum(low, np.array([config.table.x[0], config.table.y[0]]) - margin)
         high = np.minimum(high, np.array([config.table.x[1], config.table.y[1]]) + margin)
-    all_bins = build_bins(config).values()
+    all_bins = list(build_bins(config).values())
     bins = [bin for bin in all_bins if _overlaps_rectangle(bin, low, high)]
     random_number = rng.random()
     if random_number < 0.15:
@@ -250,12 +250,7 @@ def _stack_randomly(objects: list[SceneObject], rng: Generator) -> None:
 
 
 def _place_side_by_side(
-    objects: Sequence[SceneObject],
-    low: Array,
-    high: Array,
-    bins: list[Bin],
-    all_bins: Collection[Bin],
-    rng: Generator,
+    objects: list[SceneObject], low: Array, high: Array, bins: list[Bin], all_bins: list[Bin], rng: Generator
 ) -> list[SceneObject]:
     """Return objects at random free positions on the table or in `bins`; objects without room are omitted."""
     gap = rng.uniform(0.0, 0.02)

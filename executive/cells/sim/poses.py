@@ -34,10 +34,10 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
     height in one inverse kinematics branch. Each named pose must be within the joint limits.
     """
     planner = build_planner(config)
-    max_height = max(model.height for model in config.objects.values())
 
     def require_reachable(position: Array, floor_height: float) -> None:
-        planner.require_reachable(Goal((float(position[0]), float(position[1]), floor_height + max_height)))
+        height = floor_height + config.max_object_height
+        planner.require_reachable(Goal((float(position[0]), float(position[1]), height)))
 
     ranges = config.arm.limits.position_ranges_deg
     for name, pose in config.arm.poses_deg.items():
@@ -67,7 +67,7 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message for each scan pose or bin that hides a part of the workspace from a camera."""
-    occlusion = ArmOcclusion(world, build_kinematics(config), config)
+    occlusion = ArmOcclusion(world, build_kinematics(config), config, lambda: False)
     for name, camera_config in config.cameras.items():
         camera = SimCamera(world, name, camera_config, StepClock(lambda: 0.0), 0, occlusion=occlusion)
         if camera_config.partial_views:

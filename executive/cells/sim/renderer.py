@@ -14,11 +14,7 @@ from pydantic import Field
 from executive.cell.config import Colour, Section
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
-from executive.perception.camera_model import (
-    compute_distances,
-    compute_projection_matrix,
-    compute_view_matrix,
-)
+from executive.perception.camera_model import compute_depths, compute_projection_matrix, compute_view_matrix
 
 Image = NDArray[np.uint8]
 """Colour image `(H, W, 3)`, RGB."""
@@ -74,7 +70,7 @@ class RenderedImage:
     @property
     def depth(self) -> Array:
         """Distances along the optical axis `(H, W)` [m], inf at pixels without a body."""
-        return np.where(self.depth_buffer < 1.0, compute_distances(self.depth_buffer), np.inf)
+        return np.where(self.depth_buffer < 1.0, compute_depths(self.depth_buffer), np.inf)
 
 
 def render(world: World, matrix: Array, X_WC: Pose, region: Region, light: Light) -> RenderedImage:

@@ -39,10 +39,9 @@ def draw_light(rng: np.random.Generator) -> Light:
     x, y = math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth)
     red, green, blue = rng.uniform(0.72, 1.0, 3)
     random_number = rng.random()
-    if random_number < 0.5:
-        brightness = 1.0
-    else:
-        brightness = math.exp(rng.uniform(math.log(0.12), 0.0)) if random_number < 0.8 else 1.5
+    brightness = 1.0 if random_number < 0.5 else 1.5
+    if 0.5 <= random_number < 0.8:
+        brightness = math.exp(rng.uniform(math.log(0.12), 0.0))
     return Light(
         direction=(x, y, math.sin(elevation)),
         colour=(red, green, blue),

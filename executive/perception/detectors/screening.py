@@ -60,10 +60,8 @@ def screen_answer(answer: Answer, frame: Frame, view: str, label_map: Mapping[st
         if frame.compute_visible_fraction(detection.box) < MIN_VISIBLE_FRACTION:
             continue
         if detection.label in label_map:
-            is_confident = _is_confident(detection, threshold)
-            (confident if is_confident else doubtful).append(
-                replace(detection, label=label_map[detection.label])
-            )
+            detections = confident if _is_confident(detection, threshold) else doubtful
+            detections.append(replace(detection, label=label_map[detection.label]))
         elif detection.confidence >= threshold:
             unknown.append(detection)
     return replace(answer, confident=tuple(confident), doubtful=tuple(doubtful), unknown=tuple(unknown))

@@ -86,7 +86,7 @@ def test_a_seed_repeats_the_noise_of_images_and_depth_and_a_depth_sensor_changes
     cube = world.add_object("cube", Pose.of([0.5, 0.0, 0.025]), (1, 0, 0))
     plain = overhead.cameras[name]
     deep = plain.model_copy(update={"depth": DepthConfig()})
-    occlusion = ArmOcclusion(world, build_kinematics(overhead), overhead)
+    occlusion = ArmOcclusion(world, build_kinematics(overhead), overhead, lambda: False)
     without, one, same, other = (
         SimCamera(world, name, config, StoppedClock(), seed, occlusion=occlusion)
         for config, seed in ((plain, 7), (deep, 7), (deep, 7), (deep, 8))
@@ -129,7 +129,7 @@ def test_a_frame_carries_what_is_needed_to_use_it_later(build: Build, overhead: 
     assert (frame.visible.sum(), frame.visible.shape) == (240 * 640, (480, 640))
     assert frame.X_WC.position == pytest.approx(config.position)
     assert not camera.sees_table()
-    occlusion = ArmOcclusion(world, build_kinematics(overhead), overhead)
+    occlusion = ArmOcclusion(world, build_kinematics(overhead), overhead, lambda: False)
     assert SimCamera(world, name, config, StoppedClock(), 1, occlusion=occlusion).sees_table()
 
 

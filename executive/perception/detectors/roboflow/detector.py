@@ -33,14 +33,12 @@ class RoboflowDetector(ThreadedDetector):
         key: API key of the user.
     """
 
-    def __init__(
-        self, config: DetectorConfig, options: RoboflowOptions, context: DetectorContext, key: ApiKey
-    ) -> None:
+    def __init__(self, config: DetectorConfig, options: RoboflowOptions, context: DetectorContext) -> None:
         super().__init__(config, context, options.deadline)
         self._options = options
         self._read_answer = read_output if options.api == "workflow" else read_answer
         server = options.model_dump(include={"url", "model_id", "api", *WORKFLOW_OPTIONS})
-        self._process = InferenceProcess({**server, "confidence": config.floor}, key)
+        self._process = InferenceProcess({**server, "confidence": config.floor}, ApiKey())
 
     @classmethod
     def from_config(cls, config: DetectorConfig, context: DetectorContext) -> RoboflowDetector:
@@ -49,7 +47,7 @@ class RoboflowDetector(ThreadedDetector):
         Raises:
             InputError: An option is missing, unknown or invalid.
         """
-        return cls(config, RoboflowOptions.read(config), context, ApiKey())
+        return cls(config, RoboflowOptions.read(config), context)
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
