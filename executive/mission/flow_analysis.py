@@ -10,14 +10,7 @@ from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNod
 from executive.mission.model.wiring import find_wires
 from executive.plugins import Skills
 from executive.skill import HOLDING, Direction, Skill
-from executive.tree.flow import (
-    INITIAL_STATE,
-    UNKNOWN_STATE,
-    Flow,
-    FlowState,
-    PossibleFailure,
-    join_states,
-)
+from executive.tree.flow import INITIAL_STATE, UNKNOWN_STATE, Flow, FlowState, PossibleFailure, join_states
 from executive.tree.keys import Child
 from executive.tree.node import ControlNode
 

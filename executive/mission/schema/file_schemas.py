@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import yaml
 
 from executive.mission.model import grammar
 from executive.mission.model.grammar import AllowedKeys, GrammarKey, GrammarKeys
@@ -12,7 +15,6 @@ from executive.mission.parse.params import PARAM_TYPES
 from executive.mission.schema.types import (
     DIALECT,
     NO_ITEM_SUGGESTION,
-    REFERENCE,
     Schema,
     make_name_schemas,
     make_settings_schema,
@@ -25,6 +27,11 @@ from executive.tree.node_registry import ControlNodes
 
 _NAME = NAME_PATTERN.pattern
 """Regular expression of a name, for use in longer expressions."""
+_KINDS_FILE = Path(__file__).parent / "kinds.yaml"
+_SCHEMAS_BY_KIND: Mapping[str, Schema] = yaml.safe_load(_KINDS_FILE.read_text(encoding="utf-8"))
+"""Schema of the value of a key, by `GrammarKey.kind`."""
+_REASON: Schema = {"$ref": "#/definitions/reason"}
+"""Schema of the name of a failure."""
 
 
 def make_mission_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
@@ -78,7 +85,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     siblings: dict[str, Schema] = {grammar.USE_KEYWORD: _make_properties(grammar.USE_SIBLINGS)}
     requirements: dict[str, Schema] = {}
     for word, node_class in node_classes.items():
-        keys = {name: key for name, key in node_class.keys.items() if key.sibling}
+        keys = grammar.find_sibling_keys(node_class)
         siblings[word] = _make_properties(keys)
         requirements[word] = _require_any_of(node_class.any_of) if set(node_class.any_of) & set(keys) else {}
     return {
@@ -156,10 +163,8 @@ def _make_value_schema(key: Key | GrammarKey) -> Schema:
             section = _make_mapping_schema(key.section.keys)
             return {**section, "type": ["array", "object"], "items": section}
         case KeyKind.SECTION:
-            section, shorthand = (
-                _make_mapping_schema(key.section.keys),
-                grammar.find_shorthand_key(key.section),
-            )
+            section = _make_mapping_schema(key.section.keys)
+            shorthand = grammar.find_shorthand_key(key.section)
             if shorthand is None:
                 return section
             value = shorthand.make_validator().json_schema()
@@ -212,48 +217,3 @@ def _make_properties(keys: AllowedKeys) -> Schema:
 def _make_reference(name: str) -> Schema:
     """Return the schema that refers to the definition with a name."""
     return {"$ref": f"#/definitions/{name}"}
-
-
-def _map_names(value_schema: Schema) -> Schema:
-    """Return the schema of a mapping from names to values."""
-    return {
-        "type": ["object", "null"],
-        "patternProperties": {f"^{_NAME}$": value_schema},
-        "additionalProperties": False,
-    }
-
-
-def _allow_list(text_schema: Schema) -> Schema:
-    """Return the schema of a text or of a list of texts; `text_schema` applies to each text."""
-    items = {"type": "string", **text_schema}
-    return {**text_schema, "type": ["string", "array"], "items": items, "minItems": 1}
-
-
-_ANY_NAME: Schema = {"pattern": "^[A-Za-z_][A-Za-z0-9_-]*$"}
-"""Schema of a name that may contain hyphens."""
-
-_REASON = _make_reference("reason")
-
-_QUOTA: Schema = make_value_or_reference_schema({"type": "integer", "minimum": 1})
-_QUOTAS_BY_CLASS: Schema = {"type": "object", "additionalProperties": _QUOTA, "minProperties": 1}
-_BIN_QUOTA: Schema = {"anyOf": [*_QUOTA["anyOf"], _QUOTAS_BY_CLASS]}
-
-_SCHEMAS_BY_KIND: Mapping[str, Schema] = {
-    "node": _make_reference("node"),
-    "nodes": {"type": "array", "items": _make_reference("node"), "minItems": 1},
-    "number": {"type": "number"},
-    "text": {"type": ["string", "number", "boolean"]},
-    "name": {"type": "string", **_ANY_NAME},
-    "names": {**_allow_list({"pattern": rf"^\$?{_NAME}$"}), "minItems": 0},
-    "list": make_value_or_reference_schema({"type": "array"}),
-    "value": {},
-    "values": _map_names({}),
-    "variables": _map_names(REFERENCE),
-    "paths": _allow_list({}),
-    "params": _map_names(_make_reference("param")),
-    "routes": {"type": ["object", "null"], "additionalProperties": _allow_list({})},
-    "quotas": {"type": ["object", "null"], "additionalProperties": _BIN_QUOTA},
-    "trees": _map_names(_make_reference("tree")),
-    "args": {**_map_names({}), "type": ["object", "array", "null"], "items": {"type": "string", **_ANY_NAME}},
-}
-"""Schema of the value of a key, by `GrammarKey.kind`."""
