@@ -10,6 +10,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from dataclasses import dataclass
 from typing import TypeVar
 
 from executive.processes import WorkerPool, kill_workers
@@ -24,15 +25,27 @@ MAX_CRASHES = 2
 """Number of worker processes that have died during a job when the job counts as failed."""
 
 
+@dataclass(frozen=True)
+class JobOptions:
+    """Options of the execution of many jobs.
+
+    Attributes:
+        workers: Number of worker processes on this computer.
+        progress: Function that is called with the number of finished jobs and the number of all jobs.
+        on_halt: Function that is called after the first signal (Ctrl-C, SIGTERM).
+    """
+
+    workers: int = 2
+    progress: Callable[[int, int], None] = lambda *_: None
+    on_halt: Callable[[], None] = lambda: None
+
+
 def run_jobs(
     jobs: Sequence[Job],
     run_job: Callable[[Job], JobResult],
     make_failure: Callable[[Job, BaseException], JobResult],
-    *,
-    workers: int,
-    progress: Callable[[int, int], None] = lambda *_: None,
+    options: JobOptions = JobOptions(),
     on_result: Callable[[int, JobResult, int], None] = lambda *_: None,
-    on_halt: Callable[[], None] = lambda: None,
 ) -> list[JobResult | None]:
     """Execute all jobs in worker processes and return the results in the order of the jobs.
 
@@ -44,11 +57,9 @@ def run_jobs(
         jobs: The jobs.
         run_job: Function that executes a job and returns its result.
         make_failure: Function that returns the result after an exception or the death of the processes.
-        workers: Number of processes.
-        progress: Function that is called with the number of finished jobs and the number of all jobs.
+        options: Number of processes, and functions that are called during the execution.
         on_result: Function that is called with the index and the result of each job as soon as it ends, and
             with the number of processes that died during the job.
-        on_halt: Function that is called after the first signal.
 
     Raises:
         KeyboardInterrupt: A second signal arrived before the running jobs had halted.
@@ -58,7 +69,7 @@ def run_jobs(
     crash_counts: Counter[int] = Counter()
     running_jobs: dict[Future[JobResult], tuple[int, WorkerPool]] = {}
     # Each pool has one process, because the death of a process breaks all jobs of its pool.
-    idle_pools = [WorkerPool(1) for _ in range(min(workers, len(jobs)))]
+    idle_pools = [WorkerPool(1) for _ in range(min(options.workers, len(jobs)))]
     is_halted, signal_event = False, threading.Event()
     try:
         with handle_signals(HALT_SIGNALS, lambda *_: signal_event.set()):
@@ -79,7 +90,7 @@ def run_jobs(
                         kill_workers()
                         raise KeyboardInterrupt
                     is_halted = True
-                    on_halt()
+                    options.on_halt()
                 if is_halted:
                     _halt_runs()
                 for future in ended_jobs:
@@ -97,7 +108,7 @@ def run_jobs(
                             continue
                     results[index] = future.result() if error is None else make_failure(jobs[index], error)
                     on_result(index, results[index], crash_counts[index])
-                    progress(len(results), len(jobs))
+                    options.progress(len(results), len(jobs))
     finally:
         for pool in (*idle_pools, *(pool for _, pool in running_jobs.values())):
             pool.shutdown()

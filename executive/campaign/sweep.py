@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
-from executive.campaign.pool import run_jobs
+from executive.campaign.pool import JobOptions, run_jobs
 from executive.campaign.results.database import ResultsDatabase
 from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings, make_record
 from executive.errors import ExecutiveError
@@ -56,19 +56,12 @@ def make_repeat_command(settings: SweepSettings, run: RunRow) -> str:
 
 
 def run_sweep(
-    jobs: Sequence[SweepJob],
-    database: ResultsDatabase,
-    *,
-    workers: int = 2,
-    cluster: str | None = None,
-    progress: Callable[[int, int], None] = lambda *_: None,
-    on_halt: Callable[[], None] = lambda: None,
+    jobs: Sequence[SweepJob], database: ResultsDatabase, options: JobOptions, cluster: str | None = None
 ) -> None:
     """Execute all jobs, and store the record of each run as soon as the run ends.
 
     A run whose process dies twice has the status `FAULT`. After Ctrl-C or SIGTERM no further run starts, and
-    current runs are halted; halted runs are not stored. `workers`, `progress` and `on_halt` have the same
-    meaning as in `executive.campaign.pool.run_jobs`. `cluster` is the address of a dask scheduler, whose
+    current runs are halted; halted runs are not stored. `cluster` is the address of a dask scheduler, whose
     workers execute the jobs, or None.
     """
 
@@ -77,12 +70,11 @@ def run_sweep(
             database.append(replace(record, run=replace(record.run, crashes=crash_count)))
 
     if cluster is None:
-        execute_jobs = functools.partial(run_jobs, jobs, run_job, make_fault_record, workers=workers)
-        execute_jobs(progress=progress, on_result=store, on_halt=on_halt)
+        run_jobs(jobs, run_job, make_fault_record, options, store)
     else:
         from executive.campaign.cluster.cluster import run_jobs_on_cluster
 
-        run_jobs_on_cluster(jobs, address=cluster, progress=progress, on_result=store, on_halt=on_halt)
+        run_jobs_on_cluster(jobs, cluster, options, store)
 
 
 def run_job(job: SweepJob) -> RunRecord:

@@ -53,11 +53,12 @@ def command(
         from executive.campaign.faults.campaign import Campaign
         from executive.campaign.faults.trial import record_trial
         from executive.campaign.mission_under_test import load_mission_under_test
+        from executive.campaign.pool import JobOptions
         from executive.cli.progress import print_halt, show_progress
 
         mission_under_test = load_mission_under_test(mission, overrides, oracle, seed)
         with show_progress("faults", quiet=as_json or list_only or fault_numbers is not None) as progress:
-            campaign = Campaign(mission_under_test, workers=workers, progress=progress, on_halt=print_halt)
+            campaign = Campaign(mission_under_test, JobOptions(workers, progress, print_halt))
             output: Any
             if list_only:
                 descriptions = dict(enumerate(map(str, campaign.faults), start=1))

@@ -105,6 +105,7 @@ def execute_missing_runs(
         cluster: Address of a dask scheduler, whose workers execute the runs, or None.
         is_halted: True after a halt of the comparison; no run is executed.
     """
+    from executive.campaign.pool import JobOptions
     from executive.campaign.results.sweep_summary import SweepResults, summarize_runs
     from executive.campaign.results.tables import ITEMS, PHASES, RUNS
     from executive.campaign.sweep import list_jobs, make_repeat_command, run_sweep
@@ -117,10 +118,8 @@ def execute_missing_runs(
     if not is_halted:
         title = f"{name}: {settings.mission}" if name else settings.mission
         with show_progress(title, print_lines=True) as progress:
-            run_sweep(
-                missing, database, workers=workers, cluster=cluster, progress=progress,
-                on_halt=print_halt if cluster is None else print_cancellation,
-            )  # fmt: skip
+            on_halt = print_halt if cluster is None else print_cancellation
+            run_sweep(missing, database, JobOptions(workers, progress, on_halt), cluster)
     runs, make_command = database.read(RUNS), functools.partial(make_repeat_command, settings)
     summaries = summarize_runs(runs, database.read(PHASES), make_command)
     return SweepResults(name, settings, runs, database.read(ITEMS), summaries, len(jobs))

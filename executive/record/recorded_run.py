@@ -63,10 +63,7 @@ class RecordOptions:
 
 
 def record_run(
-    loaded: LoadedMission,
-    options: RunOptions,
-    runs_folder: Path,
-    record: RecordOptions = RecordOptions(),
+    loaded: LoadedMission, options: RunOptions, runs_folder: Path, record: RecordOptions = RecordOptions()
 ) -> Result:
     """Run a mission, record the run in a new directory below `runs_folder`, and return the result.
 

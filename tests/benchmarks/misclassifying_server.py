@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from executive.campaign.pool import run_jobs
+from executive.campaign.pool import JobOptions, run_jobs
 from executive.cell.config import CellConfig
 from executive.cell.detection import Answer
 from executive.cell.frame import Frame
@@ -136,9 +136,7 @@ def measure(
         Job(mission, seed, misnaming, runs, wall_time_limit) for seed in range(first_seed, first_seed + seeds)
     ]
     with show_progress("misclassifying server") as progress:
-        results = run_jobs(
-            jobs, run_job, _describe_broken, workers=workers, progress=progress, on_halt=print_halt
-        )
+        results = run_jobs(jobs, run_job, _describe_broken, JobOptions(workers, progress, print_halt))
     done = [run for run in results if run is not None and run.status != "HALTED"]
     figures = {
         "mission": mission,

@@ -13,7 +13,7 @@ from pathlib import Path
 import click
 import yaml
 
-from executive.campaign.pool import run_jobs
+from executive.campaign.pool import JobOptions, run_jobs
 from executive.cell.config import CellConfig
 from executive.cells.sim.scene_file import load_scene
 from executive.cli.options import runs_option, workers_option
@@ -95,9 +95,7 @@ def measure(
             count = declared_runs if case.group == DECLARED else runs_per_scene
             jobs += [Job(case, seed, scene, runs, wall_time_limit) for seed in range(first, first + count)]
         with show_progress("outside the envelope") as progress:
-            results = run_jobs(
-                jobs, run_job, _describe_broken, workers=workers, progress=progress, on_halt=print_halt
-            )
+            results = run_jobs(jobs, run_job, _describe_broken, JobOptions(workers, progress, print_halt))
     done = [result for result in results if result is not None and result.run.status != HALTED]
     figures = {"asked": len(jobs), "runs": len(done), "first_seed": first_seed, **summarize(done)}
     listed = [{**asdict(one), **_derived(one)} for one in done]

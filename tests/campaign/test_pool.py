@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from executive.campaign.pool import run_jobs
+from executive.campaign.pool import JobOptions, run_jobs
 from executive.run.run_control import RunControl
 from executive.run.signals import HALT_SIGNALS, halt_on_signals
 
@@ -30,12 +30,12 @@ def test_every_job_is_done_and_the_results_are_in_their_order() -> None:
     calls: list[tuple[int, int]] = []
     stored: list[tuple[int, float | str, int]] = []
     results = run_jobs(
-        [4, 3, 2, 2], half, why, workers=2, progress=lambda done, all: calls.append((done, all)),
-        on_result=lambda *result: stored.append(result),
+        [4, 3, 2, 2], half, why, JobOptions(progress=lambda done, all: calls.append((done, all))),
+        lambda *result: stored.append(result),
     )  # fmt: skip
     assert (results, calls) == ([2.0, "3: 3 is odd", 1.0, 1.0], [(1, 4), (2, 4), (3, 4), (4, 4)])
     assert sorted(stored) == [(index, result, 0) for index, result in enumerate(results)]
-    assert run_jobs([], half, why, workers=2) == []
+    assert run_jobs([], half, why) == []
 
 
 def halt(how: signal.Signals) -> str:
@@ -62,7 +62,7 @@ def heard() -> Iterator[None]:
 @pytest.mark.parametrize("how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_who_halts_this_process_alone_halts_the_runs_under_way(how: signal.Signals) -> None:
     calls: list[str] = []
-    results = run_jobs([how] * 3, halt, why, workers=1, on_halt=lambda: calls.append("halting"))
+    results = run_jobs([how] * 3, halt, why, JobOptions(1, on_halt=lambda: calls.append("halting")))
     assert (results, calls) == (["halted in good order", None, None], ["halting"])
 
 
@@ -77,7 +77,7 @@ def deaf(how: signal.Signals) -> str:
 @pytest.mark.parametrize("how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_a_second_wish_ends_the_jobs_under_way_at_once(how: signal.Signals) -> None:
     with pytest.raises(KeyboardInterrupt):
-        run_jobs([how] * 3, deaf, why, workers=1, on_halt=lambda: os.kill(os.getpid(), how))
+        run_jobs([how] * 3, deaf, why, JobOptions(1, on_halt=lambda: os.kill(os.getpid(), how)))
     assert multiprocessing.active_children() == []
 
 
@@ -90,4 +90,4 @@ def die_with_it(how: signal.Signals) -> str:
 
 @pytest.mark.usefixtures("heard")
 def test_a_job_whose_process_was_ended_with_this_one_has_no_result() -> None:
-    assert run_jobs([signal.SIGTERM] * 2, die_with_it, why, workers=1) == [None, None]
+    assert run_jobs([signal.SIGTERM] * 2, die_with_it, why, JobOptions(1)) == [None, None]

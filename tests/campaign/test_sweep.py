@@ -16,7 +16,7 @@ from unittest.mock import patch
 
 import pytest
 
-from executive.campaign.pool import run_jobs
+from executive.campaign.pool import JobOptions, run_jobs
 from executive.campaign.results.database import ResultsDatabase
 from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings, make_record
 from executive.campaign.results.tables import RUNS
@@ -54,7 +54,7 @@ def swept(folder: Path, work: Callable[[SweepJob], RunRecord], count: int = 4, *
         patch("executive.campaign.sweep.run_job", work),
         closing(ResultsDatabase(folder / "a", SETTINGS)) as database,
     ):
-        run_sweep(jobs, database, **options)
+        run_sweep(jobs, database, JobOptions(**options))
         return database.read(RUNS)
 
 
@@ -200,7 +200,7 @@ def test_simulated_runs_of_a_worker_are_equal_to_single_runs(tmp_path: Path) -> 
     overrides = {"cell.table.objects": "[1, 1]"}
     settings = replace(SETTINGS, mission="sort_overhead", overrides=overrides, first_seed=5, last_seed=7)
     # The worker has one thread and reuses the model; this process has two threads and loads it once more.
-    found = run_jobs(list_jobs(settings, tmp_path), run_job, make_fault_record, workers=1)[-1]
+    found = run_jobs(list_jobs(settings, tmp_path), run_job, make_fault_record, JobOptions(1))[-1]
     assert found is not None
     loaded = load_mission("sort_overhead", load_skills(), overrides)
     history = Timeline()

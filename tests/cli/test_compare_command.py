@@ -23,7 +23,7 @@ from executive.cli.main import main
 def compare(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Result]:
     """Function that compares; runs of a mission with `cell.table.objects=[1, 1]` fail for even seeds."""
 
-    def run_sweep(jobs: list[SweepJob], database: ResultsDatabase, **_: object) -> None:
+    def run_sweep(jobs: list[SweepJob], database: ResultsDatabase, *_: object) -> None:
         for job in jobs:
             has_loss = job.settings.overrides.get("cell.table.objects") == "[1, 1]" and job.seed % 2 == 0
             record = make_record(job, "FAILURE" if has_loss else "SUCCESS")

@@ -35,7 +35,7 @@ def sweep(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Resu
     """Function that sweeps; the run of each job has the next of the statuses, and no run follows the last."""
 
     def invoke(statuses: str, *words: str) -> Result:
-        def run_sweep(jobs: list[SweepJob], database: ResultsDatabase, **_: object) -> None:
+        def run_sweep(jobs: list[SweepJob], database: ResultsDatabase, *_: object) -> None:
             for job, status in zip(jobs, statuses.split(), strict=False):
                 database.append(make_record(job, status))
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from executive.campaign.cluster import environment
 from executive.campaign.cluster.bundle import make_bundle
 from executive.campaign.cluster.returned_run import unpack_run
-from executive.campaign.pool import MAX_CRASHES
+from executive.campaign.pool import MAX_CRASHES, JobOptions
 from executive.campaign.results.rows import RunRecord
 from executive.campaign.sweep import SweepJob, make_fault_record
 from executive.errors import InputError
@@ -29,11 +29,9 @@ POLLING_PERIOD = 0.1
 
 def run_jobs_on_cluster(
     jobs: Sequence[SweepJob],
-    *,
     address: str,
-    progress: Callable[[int, int], None] = lambda *_: None,
-    on_result: Callable[[int, RunRecord, int], None] = lambda *_: None,
-    on_halt: Callable[[], None] = lambda: None,
+    options: JobOptions,
+    on_result: Callable[[int, RunRecord, int], None],
 ) -> None:
     """Execute all jobs on the workers of the scheduler at `address`.
 
@@ -81,10 +79,10 @@ def run_jobs_on_cluster(
                                 continue
                         record = make_fault_record(jobs[index], error)
                     on_result(index, record, crash_counts[index])
-                    progress(len(jobs) - len(unfinished_jobs), len(jobs))
+                    options.progress(len(jobs) - len(unfinished_jobs), len(jobs))
                 signal_event.wait(POLLING_PERIOD)
             if signal_event.is_set():
-                on_halt()
+                options.on_halt()
         finally:
             with contextlib.suppress(OSError):
                 client.cancel(list(unfinished_jobs))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import random
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 
 from executive.campaign.faults.fault_list import list_faults
@@ -14,7 +15,7 @@ from executive.campaign.faults.planned_fault import PlannedFault
 from executive.campaign.faults.results import Branch, FaultCampaignResults, Trial
 from executive.campaign.faults.trial import FaultsByNumber, run_trial
 from executive.campaign.mission_under_test import MissionUnderTest
-from executive.campaign.pool import run_jobs
+from executive.campaign.pool import JobOptions, run_jobs
 from executive.errors import InputError
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SubtreeNode
@@ -31,9 +32,7 @@ class Campaign:
 
     Args:
         mission: The mission and its cell.
-        workers: Number of processes; each executes one run at a time.
-        progress: Function that is called with the number of finished runs and the number of all runs.
-        on_halt: Function that is called when the first signal (Ctrl-C, SIGTERM) halts the campaign.
+        options: Number of processes, and functions that are called during the campaign.
 
     Attributes:
         nominal_run: Results of the run without a fault.
@@ -44,18 +43,11 @@ class Campaign:
         KeyboardInterrupt: The user halted the nominal run.
     """
 
-    def __init__(
-        self,
-        mission: MissionUnderTest,
-        *,
-        workers: int = 2,
-        progress: Callable[[int, int], None] = lambda *_: None,
-        on_halt: Callable[[], None] = lambda: None,
-    ) -> None:
+    def __init__(self, mission: MissionUnderTest, options: JobOptions = JobOptions()) -> None:
         self.mission = mission
         self.nominal_run = execute_nominal_run(mission)
         self.faults: Sequence[PlannedFault] = list_faults(mission, self.nominal_run)
-        self._workers, self._progress, self._on_halt = workers, progress, on_halt
+        self._options = options
 
     def select_faults(self, numbers: FaultNumbers) -> dict[int, PlannedFault]:
         """Return the faults with these numbers, by number.
@@ -139,13 +131,11 @@ class Campaign:
         """
 
         def report(ended_count: int, total: int) -> None:
-            self._progress(offset + ended_count, offset + total)
+            self._options.progress(offset + ended_count, offset + total)
 
         jobs = list(map(self.select_faults, combinations))
         run_job = partial(run_trial, self.mission, self.nominal_run)
-        trials = run_jobs(
-            jobs, run_job, _make_aborted_trial, workers=self._workers, progress=report, on_halt=self._on_halt
-        )
+        trials = run_jobs(jobs, run_job, _make_aborted_trial, replace(self._options, progress=report))
         complete_trials = [trial for trial in trials if trial is not None and not trial.is_halted_by_user]
         return complete_trials, len(complete_trials) == len(combinations)
 

@@ -39,11 +39,7 @@ _CAUSE_SEPARATOR = "\nThe above exception was the direct cause"
 
 
 def diagnose(
-    timeline: Timeline,
-    end: RunEnded,
-    loaded: LoadedMission,
-    run_folder: Path,
-    is_at_rest: Callable[[], bool],
+    timeline: Timeline, end: RunEnded, loaded: LoadedMission, run_folder: Path, is_at_rest: Callable[[], bool]
 ) -> Diagnosis | None:
     """Return the diagnosis of a run; None if its tree succeeded and no item was lost.
 

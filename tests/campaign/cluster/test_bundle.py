@@ -17,6 +17,7 @@ from executive.campaign.cluster.bundle import PACKAGES_FOLDER, make_bundle
 from executive.campaign.cluster.cluster import run_jobs_on_cluster
 from executive.campaign.cluster.environment import FILES_KEY, describe_differences, describe_environment
 from executive.campaign.cluster.returned_run import unpack_run
+from executive.campaign.pool import JobOptions
 from executive.campaign.results.sweep_folder import create_sweep, make_settings
 from executive.campaign.sweep import SweepJob, list_jobs, run_job
 from executive.errors import InputError
@@ -123,6 +124,6 @@ def test_a_worker_with_other_software_is_described() -> None:
 
 def test_without_the_extra_the_error_names_it() -> None:
     with patch.dict(sys.modules, {"distributed": None}), pytest.raises(InputError) as caught:
-        run_jobs_on_cluster([], address="tcp://127.0.0.1:1")
+        run_jobs_on_cluster([], "tcp://127.0.0.1:1", JobOptions(), lambda *_: None)
     assert '--cluster needs the packages of the extra "cluster"' in str(caught.value)
     assert "uv sync --extra cluster" in str(caught.value)

@@ -11,10 +11,11 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import pytest
 
+from executive.campaign.pool import JobOptions
 from executive.campaign.results.rows import RunRow
 from executive.campaign.results.sweep_folder import create_sweep, make_settings
 from executive.campaign.results.tables import ITEMS, RUNS
@@ -61,9 +62,10 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]
             process.communicate()
 
 
-def sweep(folder: Path, **options: object) -> list[RunRow]:
+def sweep(folder: Path, cluster: str | None = None, **options: Any) -> list[RunRow]:
     with closing(create_sweep(make_settings("sort_fruit", SEEDS, FAKE, {}, None, False), folder)) as database:
-        run_sweep(list_jobs(database.settings, database.path.parent), database, **options)  # type: ignore[arg-type]
+        jobs = list_jobs(database.settings, database.path.parent)
+        run_sweep(jobs, database, JobOptions(**options), cluster)
         assert [row.job for row in database.read(ITEMS) if row.state != "placed"] == []
         return database.read(RUNS)
 

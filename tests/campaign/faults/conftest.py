@@ -6,6 +6,7 @@ import pytest
 
 from executive.campaign.faults.campaign import Campaign
 from executive.campaign.mission_under_test import MissionUnderTest
+from executive.campaign.pool import JobOptions
 from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
@@ -17,4 +18,4 @@ def subject_of(mission: str, seed: int = 0, **overrides: str) -> MissionUnderTes
 
 @pytest.fixture(scope="session")
 def campaign() -> Campaign:
-    return Campaign(subject_of("sort_overhead"), workers=1)
+    return Campaign(subject_of("sort_overhead"), JobOptions(workers=1))

@@ -15,6 +15,7 @@ import pytest
 from executive.campaign.faults.campaign import Campaign, find_branches
 from executive.campaign.faults.results import FaultCampaignResults, Trial
 from executive.campaign.mission_under_test import MissionUnderTest
+from executive.campaign.pool import JobOptions
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.load import load_mission
@@ -111,7 +112,7 @@ def test_a_recovery_without_a_run_is_listed_with_its_position(
 def test_pairs_are_drawn_by_the_seed_and_come_in_the_same_order_from_any_number_of_workers(
     small: MissionUnderTest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    two = Campaign(small, workers=2).run_fault_pairs(3)
+    two = Campaign(small).run_fault_pairs(3)
     monkeypatch.setattr("executive.campaign.faults.campaign.run_jobs", one_after_the_other)
     one, other = Campaign(small).run_fault_pairs(3), Campaign(replace(small, seed=3)).run_fault_pairs(3)
     assert (one, [len(trial.fault_numbers) for trial in one.trials]) == (two, [2] * 3)
@@ -134,7 +135,7 @@ def interrupt(*progress: int) -> None:
 @pytest.mark.usefixtures("sigint")
 def test_after_ctrl_c_the_finished_trials_are_reported(small: MissionUnderTest) -> None:
     messages: list[str] = []
-    campaign = Campaign(small, workers=1, progress=interrupt, on_halt=lambda: messages.append("halting"))
+    campaign = Campaign(small, JobOptions(1, interrupt, lambda: messages.append("halting")))
     figures = campaign.run_single_faults()
     assert (len(figures.trials), figures.is_complete, messages) == (1, False, ["halting"])
 
