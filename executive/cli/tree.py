@@ -55,25 +55,22 @@ def command(
         from executive.plugins import load_skills
         from executive.record.recorded_mission import format_tree
         from executive.tree.blackboard import Blackboard
-        from executive.view.tree.btcpp import format_btcpp
-        from executive.view.tree.dot import format_dot
-        from executive.view.tree.svg import make_svg
-        from executive.view.tree.tree_text import draw_text, fold_subtrees
+        from executive.view.tree import btcpp, dot, svg, tree_text
 
         loaded = load_mission(mission, load_skills(), overrides)
         # No node of the tree is executed, so that none needs a clock or a ledger.
         placeholder_cell = cast("Cell", SimpleNamespace(clock=None, ledger=None))
         nodes = make_outline(build_tree(loaded, loaded.skills, placeholder_cell, Blackboard(), discard_event))
-        nodes = fold_subtrees(nodes) if fold else nodes
+        nodes = tree_text.fold_subtrees(nodes) if fold else nodes
         match "".join(formats).removeprefix("--format ").removeprefix("--"):
             case "svg":
-                output = make_svg(nodes, loaded.mission.name)
+                output = svg.make_svg(nodes, loaded.mission.name)
             case "dot":
-                output = format_dot(nodes, loaded.mission.name)
+                output = dot.format_dot(nodes, loaded.mission.name)
             case "json":
                 output, as_json = json.loads(format_tree(nodes)), True
             case "btcpp":
-                output = format_btcpp(loaded.mission, loaded.skills)
+                output = btcpp.format_btcpp(loaded.mission, loaded.skills)
             case _:
-                output = draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
+                output = tree_text.draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
     print_json(output) if as_json else click.echo(output)

@@ -122,7 +122,10 @@ def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
             if control_period and abs(timed.clock - step_time) > CLOCK_TOLERANCE:
                 raise ValueError(f'"tick" {timed.tick} and "clock" {timed.clock} contradict each other')
             if isinstance(event, InputRead) and event.name == "clock" and not event.exception:
-                clock_offset = _check_clock_offset(event.value)
+                if not isinstance(event.value, int | float):
+                    problem = f'"value" of the input "clock" is {event.value!r}'
+                    raise ValueError(f"{problem}, not a time in seconds")
+                clock_offset = event.value
             elif isinstance(event, InputRead) and not event.exception:
                 check_input(event.name, event.value)
         except ValueError as error:
@@ -131,17 +134,6 @@ def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
             raise InputError(f"{problem}; {cause}; restore a copy of the file") from error
         events.append(timed)
     return events
-
-
-def _check_clock_offset(value: JsonValue) -> float:
-    """Return the recorded difference between the cell's clock and the time of all control steps [s].
-
-    Raises:
-        ValueError: The value is not a number.
-    """
-    if not isinstance(value, int | float):
-        raise ValueError(f'"value" of the input "clock" is {value!r}, not a time in seconds')
-    return value
 
 
 def _describe_old_format(line: bytes) -> str:

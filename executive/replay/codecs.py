@@ -149,15 +149,11 @@ def _decode_mask(text: str, height: int, width: int) -> NDArray[np.bool_]:
     return np.unpackbits(packed_bits, count=height * width).reshape(height, width).astype(np.bool_)
 
 
-def _return_unchanged(value: Any) -> Any:
-    return value
-
-
-IDENTITY = Codec(_return_unchanged, _return_unchanged)
+IDENTITY = Codec(lambda value: value, lambda value: value)
 """Codec of numbers, truth values, strings and None."""
 NONE = Codec(lambda _: None, lambda _: None)
 """Codec of the results of commands, which a replay does not need."""
-STRINGS = Codec(list, _return_unchanged)
+STRINGS = Codec(list, lambda value: value)
 BOX = Codec(list, tuple)
 ARRAY = Codec(np.ndarray.tolist, decode_array)
 POSE = Codec(encode_pose, decode_pose)

@@ -31,8 +31,8 @@ def campaigns(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     fake = SimpleNamespace(asked=[], problems=(), complete=True)
 
     class Campaign:
-        def __init__(self, subject, *, workers, progress, on_halt):
-            fake.asked.append((subject.name, subject.cell_description, subject.seed, workers))
+        def __init__(self, subject, options):
+            fake.asked.append((subject.name, subject.cell_description, subject.seed, options.workers))
             self._name = subject.name
 
         def run_single_faults(self):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, is_dataclass, replace
-from typing import Generic, TypeAlias, TypeVar, get_args, get_type_hints
+from typing import Any, Generic, TypeAlias, TypeVar, get_args, get_type_hints
 
 from pydantic import TypeAdapter
 
@@ -82,14 +82,12 @@ class Table(Generic[RowT]):
 
     def decode(self, values: Sequence[SqlValue]) -> RowT:
         """Return the row with these values of the columns."""
-        nested: dict[str, object] = {}
+        nested: dict[str, Any] = {}
         for column, value in zip(self.columns, values, strict=True):
             outer_name, *inner_names = column.path
             decoded = json.loads(str(value)) if column.is_json else value
             if inner_names and value is not None:
-                inner_values = nested.setdefault(outer_name, {})
-                assert isinstance(inner_values, dict)
-                inner_values[inner_names[0]] = decoded
+                nested.setdefault(outer_name, {})[inner_names[0]] = decoded
             else:
                 nested[outer_name] = decoded
         return self._adapter.validate_python(nested)

@@ -91,7 +91,9 @@ def _draw_boxes(image: NDArray[np.uint8], content: PictureContent, scale: float)
     for index, colour, line_width in layers:
         left, top, right, bottom = boxes[index]
         cv2.rectangle(image, (left, top), (right, bottom), colour, line_width)
-    draw_captions(image, [(left, top) for left, top, _, _ in boxes], make_captions(content), colours)
+    placed: list[Rectangle] = []
+    for (left, top, _, _), caption, colour in zip(boxes, make_captions(content), colours, strict=True):
+        placed.append(_draw_caption(image, (left, top), caption, colour, placed))
     return image
 
 
@@ -103,32 +105,21 @@ def make_captions(content: PictureContent) -> list[str]:
     return [f"{name} {each.confidence:.2f}" for name, each in zip(names, content.detections, strict=True)]
 
 
-def draw_captions(
-    image: NDArray[np.uint8],
-    corners: Sequence[tuple[int, int]],
-    captions: Sequence[str],
-    colours: Sequence[Colour],
-) -> None:
-    """Draw each caption above the upper left corner of its box, in black on the colour of its class.
+def _draw_caption(
+    image: NDArray[np.uint8], corner: tuple[int, int], text: str, colour: Colour, others: Sequence[Rectangle]
+) -> Rectangle:
+    """Draw the caption of a box, and return its rectangle; the caption is black on the colour of the class.
 
+    `corner` is the upper left corner of the box [pixel]; `others` are the rectangles of the other captions.
     `supervision` draws captions, too, but its import takes 0.8 to 2 s.
-
-    Args:
-        image: The picture `(H, W, 3)` BGR, which is changed.
-        corners: Upper left corner of each box [pixel].
-        captions: Text of each caption.
-        colours: Background of each caption.
     """
-    height, width = image.shape[:2]
-    placed: list[Rectangle] = []
-    for corner, caption, colour in zip(corners, captions, colours, strict=True):
-        (text_width, text_height), _ = cv2.getTextSize(caption, FONT, TEXT_SCALE, 1)
-        size = text_width + 2 * PADDING, text_height + 2 * PADDING
-        left, top, right, bottom = place_caption(corner, size, (width, height), placed)
-        placed.append((left, top, right, bottom))
-        cv2.rectangle(image, (left, top), (right, bottom), colour, cv2.FILLED)
-        origin = left + PADDING, top + PADDING + text_height
-        cv2.putText(image, caption, origin, FONT, TEXT_SCALE, BLACK, 1, cv2.LINE_AA)
+    (text_width, text_height), _ = cv2.getTextSize(text, FONT, TEXT_SCALE, 1)
+    size = text_width + 2 * PADDING, text_height + 2 * PADDING
+    left, top, right, bottom = place_caption(corner, size, (image.shape[1], image.shape[0]), others)
+    cv2.rectangle(image, (left, top), (right, bottom), colour, cv2.FILLED)
+    origin = left + PADDING, top + PADDING + text_height
+    cv2.putText(image, text, origin, FONT, TEXT_SCALE, BLACK, 1, cv2.LINE_AA)
+    return left, top, right, bottom
 
 
 def place_caption(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -34,53 +33,43 @@ _BASELINE_OFFSET = 5
 """Distance from the baseline of a text to the lower edge of its line [pixel]."""
 
 
-@dataclass(frozen=True)
-class StatusBarText:
-    """Text of a status bar.
+def make_status_bar_text(content: PictureContent) -> tuple[str, list[str], list[str]]:
+    """Return the title, the lines and the notes on the left side of the status bar of a picture.
 
-    Attributes:
-        title: Failure with its item; without a failure, the selected item with its bin.
-        lines: One line with running skills and attempts, and one line with the message of the failure.
-        notes: One line with mission, time and meaning of the shading, and one line about the image.
+    The title is the failure with its item; without a failure, the selected item with its bin. The lines are
+    running skills and attempts, and the message of the failure. The notes are mission, time and meaning of
+    the shading, and a line about the image.
     """
-
-    title: str
-    lines: tuple[str, ...]
-    notes: tuple[str, ...]
-
-
-def make_status_bar_text(content: PictureContent) -> StatusBarText:
-    """Return the text on the left side of the status bar of a picture."""
     item, count = content.item, content.failed_attempts
     selection = f"{item} to {content.bin}" if content.bin else item
     title = ": ".join(filter(None, (content.failure, item))) if content.failure else selection
     skills = f"phase: {' + '.join(content.running_skills)}" if content.running_skills else ""
     attempts = f"{count} failed attempt{'s' if count > 1 else ''}" if count else ""
-    lines = tuple(filter(None, (", ".join(filter(None, (skills, attempts))), content.message)))
+    lines = filter(None, (", ".join(filter(None, (skills, attempts))), content.message))
     source = " by ".join(filter(None, (content.camera, content.detector)))
     image = f"{source}, {content.age:.2f} s old" if source else ""
     has_occlusion = content.visible is not None and not content.visible.all()
     shading = "shaded: occluded by the arm" if has_occlusion else ""
     notes = ("   ".join(filter(None, (content.mission, f"{content.clock:.2f} s", shading))), image)
-    return StatusBarText(title, lines, tuple(filter(None, notes)))
+    return title, list(lines), list(filter(None, notes))
 
 
 def draw_status_bar(content: PictureContent, width: int, text_start: int = 0) -> NDArray[np.uint8]:
     """Return the status bar `(STATUS_BAR_HEIGHT, width, 3)`, BGR, empty left of column `text_start`."""
     bar = np.full((STATUS_BAR_HEIGHT, width, 3), to_bgr(BACKGROUND), np.uint8)
-    text, x = make_status_bar_text(content), text_start + MARGIN
+    (title, long_lines, notes), x = make_status_bar_text(content), text_start + MARGIN
     outcome_x = text_start + round(_OUTCOME_START_FRACTION * (width - text_start))
     text_width = outcome_x - text_start - 2 * MARGIN
     is_fitting = _make_width_check(text_width)
-    title = truncate(text.title, _make_width_check(text_width, _TITLE_SCALE))
+    title = truncate(title, _make_width_check(text_width, _TITLE_SCALE))
     _write(bar, title, x, 0, FAILURE_TEXT if content.failure else TEXT, _TITLE_SCALE)
-    lines = [line for long_line in text.lines for line in wrap_text(long_line, is_fitting)]
-    max_lines = ROW_COUNT - 1 - len(text.notes)
+    lines = [line for long_line in long_lines for line in wrap_text(long_line, is_fitting)]
+    max_lines = ROW_COUNT - 1 - len(notes)
     if len(lines) > max_lines:
         lines[max_lines - 1] = truncate(" ".join(lines[max_lines - 1 :]), is_fitting)
     for row, line in enumerate(lines[:max_lines], start=1):
         _write(bar, line, x, row, TEXT)
-    for row, note in enumerate(text.notes, start=ROW_COUNT - len(text.notes)):
+    for row, note in enumerate(notes, start=ROW_COUNT - len(notes)):
         _write(bar, truncate(note, is_fitting), x, row, SECONDARY_TEXT)
     if not content.outcomes:
         _write(bar, "no item sorted", outcome_x, 0, SECONDARY_TEXT)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
+from pathlib import Path
 from typing import cast
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -24,15 +25,8 @@ from executive.tree.keys import Key, KeyKind
 from executive.tree.node_registry import load_control_nodes
 from executive.view.text import replace_invalid_xml_characters
 
-_REGISTERED_NAMES = frozenset((
-    "Action", "AlwaysFailure", "AlwaysSuccess", "AsyncFallback", "AsyncSequence", "BehaviorTree", "Condition",
-    "Control", "Decorator", "Delay", "Fallback", "ForceFailure", "ForceSuccess", "IfThenElse", "Inverter",
-    "KeepRunningUntilFailure", "LoopBool", "LoopDouble", "LoopInt", "LoopString", "Parallel", "ParallelAll",
-    "Precondition", "ReactiveFallback", "ReactiveSequence", "Repeat", "RetryUntilSuccessful", "Root",
-    "RunOnce", "Script", "ScriptCondition", "Sequence", "SequenceStar", "SequenceWithMemory", "SetBlackboard",
-    "SkipUnlessUpdated", "Sleep", "SubTree", "Switch2", "Switch3", "Switch4", "Switch5", "Switch6", "Timeout",
-    "root", "TryCatch", "Undefined", "UnsetBlackboard", "WaitValueUpdate", "WasEntryUpdated", "WhileDoElse",
-))  # fmt: skip
+_NAMES_FILE = Path(__file__).with_name("btcpp_names.txt")
+_REGISTERED_NAMES = frozenset(_NAMES_FILE.read_text(encoding="utf-8").split())
 """Names that BehaviorTree.CPP 4.10 registers or reserves."""
 _TYPE_NAMES: Mapping[object, str] = {bool: "bool", int: "int", float: "double", str: "std::string"}
 """Names of types in C++."""

@@ -63,9 +63,7 @@ def figures(small: MissionUnderTest) -> FaultCampaignResults:
         return Campaign(small).run_single_faults()
 
 
-def one_after_the_other(
-    jobs: list[Any], work: Callable[[Any], Trial], broken: object, **options: object
-) -> list[Trial]:
+def one_after_the_other(jobs: list[Any], work: Callable[[Any], Trial], *_: object) -> list[Trial]:
     """Stand for the processes that would do the jobs."""
     return [work(job) for job in jobs]
 
@@ -112,7 +110,7 @@ def test_a_recovery_without_a_run_is_listed_with_its_position(
 def test_pairs_are_drawn_by_the_seed_and_come_in_the_same_order_from_any_number_of_workers(
     small: MissionUnderTest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    two = Campaign(small).run_fault_pairs(3)
+    two = Campaign(small, JobOptions(workers=2)).run_fault_pairs(3)
     monkeypatch.setattr("executive.campaign.faults.campaign.run_jobs", one_after_the_other)
     one, other = Campaign(small).run_fault_pairs(3), Campaign(replace(small, seed=3)).run_fault_pairs(3)
     assert (one, [len(trial.fault_numbers) for trial in one.trials]) == (two, [2] * 3)
