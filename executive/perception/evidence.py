@@ -97,12 +97,9 @@ def describe_weight(weight: float, label: str, classes: Mapping[str, ObjectClass
 
 def find_classes_distinct_by_touch(classes: Mapping[str, ObjectClass]) -> frozenset[str]:
     """Return the classes whose height differs by more than `MAX_TOUCH_HEIGHT_ERROR` from all others."""
-    heights = {label: object_class.height for label, object_class in classes.items()}
-    return frozenset(
-        label
-        for label, height in heights.items()
-        if sum(abs(height - h) <= MAX_TOUCH_HEIGHT_ERROR for h in heights.values()) == 1
-    )
+    heights = np.array([object_class.height for object_class in classes.values()])
+    counts = (np.abs(heights[:, None] - heights) <= MAX_TOUCH_HEIGHT_ERROR).sum(axis=1)
+    return frozenset(label for label, count in zip(classes, counts, strict=True) if count == 1)
 
 
 def may_have_missed_top(label: str, height: float, classes: Mapping[str, ObjectClass]) -> bool:

@@ -64,7 +64,7 @@ def _compute_edge_mask(depth: Array, config: DepthConfig) -> Mask:
     """Return the mask `(H, W)` of the pixels near a discontinuity of the depth."""
     distances = np.where(np.isfinite(depth), depth, FAR_PLANE).astype(np.float32)
     kernel = np.ones((3, 3), np.uint8)
-    edge_mask = (cv2.dilate(distances, kernel) - cv2.erode(distances, kernel) > config.edge).astype(np.uint8)
+    edge_mask = (cv2.morphologyEx(distances, cv2.MORPH_GRADIENT, kernel) > config.edge).astype(np.uint8)
     width = 2 * config.edge_width + 1
     return cv2.dilate(edge_mask, np.ones((width, width), np.uint8)).astype(bool)
 

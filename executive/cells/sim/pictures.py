@@ -115,6 +115,5 @@ def _compose_picture(rendered: RenderedImage) -> Image:
     is_empty = rendered.segmentation == -1
     image = np.where(is_empty[..., None], np.rint(background).astype(np.uint8), rendered.image)
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
-    kernel = np.ones((3, 3), np.uint8)
-    is_edge = cv2.dilate(grey, kernel).astype(np.int16) - cv2.erode(grey, kernel) > MIN_EDGE_CONTRAST
+    is_edge = cv2.morphologyEx(grey, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)) > MIN_EDGE_CONTRAST
     return np.asarray(np.where(is_edge[..., None], cv2.GaussianBlur(image, (3, 3), 0), image))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 import pybullet
@@ -43,6 +43,8 @@ class Light(Section):
     """Factor on `ambient`, `diffuse` and `specular`."""
 
 
+_VisualShape = tuple[int, int, int, Sequence[float]]
+"""A visual shape: body, link, index among the shapes of the link, and colour."""
 CELL_LIGHT = Light()
 """Default light of simulated cells: white, from above, slightly from the front left, without shadows."""
 
@@ -99,15 +101,6 @@ def render(world: World, matrix: Array, X_WC: Pose, region: Region, light: Light
     return RenderedImage(image, segmentation, depth_buffer, matrix, X_WC, region)
 
 
-class _VisualShape(NamedTuple):
-    """A visual shape of the world: its body, its link, its index in the link, and its colour (RGBA)."""
-
-    body: int
-    link: int
-    shape_index: int
-    colour: Sequence[float]
-
-
 class FixedViewRenderer:
     """Renderer of a fixed camera, which renders the static bodies only once.
 
@@ -154,9 +147,7 @@ class FixedViewRenderer:
             depth_buffer=np.where(is_in_front, foreground.depth_buffer, background.depth_buffer),
         )
 
-    def _render_without(
-        self, hidden_shapes: Sequence[_VisualShape], matrix: Array, X_WC: Pose
-    ) -> RenderedImage:
+    def _render_without(self, hidden_shapes: list[_VisualShape], matrix: Array, X_WC: Pose) -> RenderedImage:
         """Render an image in which some shapes are invisible."""
         try:
             for body, link, index, _ in hidden_shapes:
@@ -171,6 +162,6 @@ class FixedViewRenderer:
         """Return all visual shapes of a body."""
         shapes: list[_VisualShape] = []
         for _, link, *_, colour in (data[:8] for data in self._client.getVisualShapeData(body)):
-            index = sum(shape.link == link for shape in shapes)
-            shapes.append(_VisualShape(body, link, index, colour))
+            index = sum(other_link == link for _, other_link, *_ in shapes)
+            shapes.append((body, link, index, colour))
         return shapes

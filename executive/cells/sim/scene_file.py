@@ -158,13 +158,11 @@ def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
         )
     source = read_source(path)
     root, findings = parse_yaml(source)
-    if root is None:
-        raise MissionError(sort_findings(findings, source.path))
-    scene, validation_errors = validate(root, SceneConfig)
-    cell_findings = () if scene is None else _find_cell_findings(scene, root, config)
-    all_findings = (*findings, *validation_errors, *cell_findings)
-    if scene is None or all_findings:
-        raise MissionError(sort_findings(all_findings, source.path))
+    scene, errors = (None, ()) if root is None else validate(root, SceneConfig)
+    if root is not None and scene is not None:
+        errors = (*errors, *_find_cell_findings(scene, root, config))
+    if scene is None or findings or errors:
+        raise MissionError(sort_findings((*findings, *errors), source.path))
     return scene
 
 

@@ -76,7 +76,7 @@ def spawn_objects(world: World, seed: int, unknown: UnknownConfig | None = None)
         X_WO = Pose(rotate_about_z(rng.uniform(0, math.tau)), np.array([*position, height]))
         colour = model.colours[int(rng.integers(len(model.colours)))]
         bodies.append(world.add_object(label, X_WO, colour, model))
-    _step_until_rest(world, bodies)
+    _step_until_rest(world, bodies, lambda: False)
     if table.stacked:
         _stack_objects(world, bodies[:count], table.stacked, rng)
     return tuple(bodies)
@@ -133,9 +133,7 @@ def _has_moved(world: World, goals: Mapping[int, Pose]) -> bool:
     )
 
 
-def _step_until_rest(
-    world: World, bodies: Sequence[int], must_end: Callable[[], bool] = lambda: False
-) -> None:
+def _step_until_rest(world: World, bodies: Sequence[int], must_end: Callable[[], bool]) -> None:
     """Step until all bodies are at rest or `must_end` returns True, at most `MAX_SETTLING_STEPS` times."""
     for step in range(MAX_SETTLING_STEPS):
         world.step()

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from executive.cell.config import CameraConfig, Colour, NoiseConfig
+from executive.cell.config.section import Range
 from executive.cells.sim.renderer import Light
 from executive.cells.sim.table_top import PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE
 from executive.geometry import Array, Pose, rotate_about_z
@@ -66,7 +67,7 @@ def draw_table_appearance(rng: np.random.Generator) -> tuple[Colour, str]:
     texture = WOOD_TEXTURE if random_number < 0.6 else PLAIN_TEXTURE
     if random_number >= 0.75:
         texture = str(rng.choice(TEXTURES))
-    return draw_hsv_colour(rng, 0.0, 0.8, 0.10, 1.0), texture
+    return draw_hsv_colour(rng, (0.0, 0.8), (0.10, 1.0)), texture
 
 
 def draw_object_colour(palette: Sequence[Colour], table_colour: Colour, rng: np.random.Generator) -> Colour:
@@ -81,23 +82,19 @@ def draw_object_colour(palette: Sequence[Colour], table_colour: Colour, rng: np.
     if random_number < 0.35:
         return palette[int(rng.integers(len(palette)))]
     if random_number < 0.65:
-        return draw_hsv_colour(rng, 0.3, 1.0, 0.25, 1.0)
+        return draw_hsv_colour(rng, (0.3, 1.0), (0.25, 1.0))
     if random_number < 0.78:
         grey = rng.uniform(0.05, 1.0)
         return grey, grey, grey
     if random_number < 0.93:
-        return draw_hsv_colour(rng, 0.0, 0.6, 0.02, 0.16)
+        return draw_hsv_colour(rng, (0.0, 0.6), (0.02, 0.16))
     red, green, blue = np.clip(table_colour + rng.normal(0, 0.12, 3), 0.02, 1.0)
     return float(red), float(green), float(blue)
 
 
-def draw_hsv_colour(
-    rng: np.random.Generator, min_saturation: float, max_saturation: float, min_value: float, max_value: float
-) -> Colour:
+def draw_hsv_colour(rng: np.random.Generator, saturations: Range, values: Range) -> Colour:
     """Return a colour with random hue, and with saturation and value in the given ranges, each 0 to 1."""
-    return colorsys.hsv_to_rgb(
-        rng.random(), rng.uniform(min_saturation, max_saturation), rng.uniform(min_value, max_value)
-    )
+    return colorsys.hsv_to_rgb(rng.random(), rng.uniform(*saturations), rng.uniform(*values))
 
 
 def draw_camera(
