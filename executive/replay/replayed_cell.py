@@ -9,10 +9,9 @@ from dataclasses import replace
 from typing import Any
 
 from executive import errors
-from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.clock import StepClock
 from executive.cell.proxy import Access, intercept
-from executive.cell.workcell import Workcell
+from executive.cell.workcell import CellWrapper, Workcell
 from executive.events import InputRead
 from executive.replay.codecs import IDENTITY, Codec
 from executive.replay.input_log import Halt, InputLog, Interruption

@@ -15,9 +15,9 @@ from typing import Any
 import click
 import numpy as np
 
-from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.clock import STEP
 from executive.cell.protocols import Cell
+from executive.cell.workcell import CellWrapper
 from executive.events import NodeEnded, TimedEvent
 from executive.geometry import Array
 from executive.mission.load import load_mission

@@ -22,9 +22,8 @@ from py_trees.common import Status
 
 from executive.campaign.faults.trial_checks import check_arm_at_rest, check_held_item, check_journal
 from executive.campaign.mission_under_test import MissionUnderTest
-from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.clock import STEP
-from executive.cell.workcell import Workcell
+from executive.cell.workcell import CellWrapper, Workcell
 from executive.cells.sim.arm import SimArm
 from executive.errors import ExecutiveError
 from executive.events import RunEnded

@@ -6,8 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from executive.training.evaluation.measured_rates import CountedRate, MeasuredErrorRates
-from executive.training.evaluation.metrics import ClassMetrics, Distribution, Evaluation
+from executive.training.evaluation.metrics import (
+    ClassMetrics,
+    CountedRate,
+    Distribution,
+    Evaluation,
+    MeasuredErrorRates,
+)
 from executive.view.detector_results import print_metrics
 
 MEASURED = Evaluation(

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 
@@ -16,13 +18,15 @@ from executive.cell.layout import compute_travel_height, find_unreachable_places
 from executive.cell.protocols import Clock
 from executive.cell.workcell import KeyPath
 from executive.cells.fake.fake_obstacles import Collision, FakeObstacles
-from executive.cells.fake.immediate_executor import ImmediateExecutor
 from executive.cells.fake.world import FakeWorld
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit
 from executive.geometry import GRAVITY, Array, Pose, make_tool_down_pose
 from executive.motion.arms import build_kinematics
 from executive.motion.plans import Plan, PlanFactory
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 MAX_REACH = 0.85
 """Maximum distance of the tool of the fake arm from the base [m]."""
@@ -44,6 +48,19 @@ class FakeMotion:
     def duration(self) -> float:
         """Duration of the motion [s]."""
         return len(self.path) * STEP
+
+
+class ImmediateExecutor(Executor):
+    """Executor that calls each submitted function at once, in the thread of the caller."""
+
+    def submit(self, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Call a function, and return its result or exception."""
+        future: Future[T] = Future()
+        try:
+            future.set_result(function(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
 
 
 class FakeArm:

@@ -8,9 +8,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.proxy import Access, intercept
-from executive.cell.workcell import Workcell
+from executive.cell.workcell import CellWrapper, Workcell
 from executive.errors import Fault, InputError
 from executive.events import Emit, NodeEnded, NodeStarted, TimedEvent, discard_event
 from executive.testing.faults.effect import TIME_TOLERANCE, FaultContext, Occurrence

@@ -8,8 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from executive.cell.cell_wrapper import find_innermost_cell
-from executive.cell.workcell import Workcell
+from executive.cell.workcell import Workcell, find_innermost_cell
 from executive.cells.fake.cell import FakeCell
 from executive.cells.fake.world import FakeObject
 from executive.errors import InputError

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from executive.cells.sim.pictures import PictureSource, count_steps, render_pictures
-from executive.cells.sim.viewpoint import compute_viewpoint
+from executive.cells.sim.pictures import PictureSource, compute_viewpoint, count_steps, render_pictures
 from executive.view.film.film_source import FilmSource
 from executive.view.film.formats import FilmFormat
 from executive.view.film.page import SCENE_SIZE, add_result, draw_frame

@@ -17,12 +17,12 @@ from executive.cells.sim.pictures import (
     BOTTOM_COLOUR,
     TOP_COLOUR,
     PictureSource,
+    compute_viewpoint,
     count_steps,
     render_pictures,
     render_pictures_in_process,
 )
 from executive.cells.sim.renderer import Image
-from executive.cells.sim.viewpoint import compute_viewpoint
 from executive.errors import InputError
 
 SIZE = (96, 84)

@@ -11,8 +11,7 @@ from typing import Any
 
 import pytest
 
-from executive.cell.cell_wrapper import CellWrapper
-from executive.cell.workcell import CellOptions
+from executive.cell.workcell import CellOptions, CellWrapper
 from executive.cells.fake.cell import FakeCell, SilentOperator, load_empty_cell
 from executive.errors import InputError
 from executive.events import FaultInjected, FrameSearched, NodeEnded, ToolCommanded, discard_event

@@ -10,8 +10,13 @@ import pytest
 from executive.errors import NoDepth
 from executive.perception.envelope.measurement import StoredErrorRates
 from executive.training.evaluation.evaluate import evaluate
-from executive.training.evaluation.measured_rates import CountedRate, MeasuredErrorRates, round_up
-from executive.training.evaluation.metrics import ClassMetrics, Distribution
+from executive.training.evaluation.metrics import (
+    ClassMetrics,
+    CountedRate,
+    Distribution,
+    MeasuredErrorRates,
+    round_up,
+)
 from executive.training.evaluation.worst_mistakes import WorstMistakes
 
 
