@@ -10,8 +10,8 @@ from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions, KeyPath, Workcell
 from executive.cells.sim.min_times import SimMinTimes
 from executive.cells.sim.models import find_model_errors
+from executive.cells.sim.object_positions import find_object_count_errors
 from executive.cells.sim.poses import find_places_out_of_reach, find_pose_errors
-from executive.cells.sim.spawn import find_object_count_errors
 from executive.events import Emit
 from executive.motion.arms import find_arm_errors
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors

@@ -1,4 +1,4 @@
-"""Pictures of the world of a recorded run: their viewpoint, and rendering by processes with rebuilt worlds."""
+"""Pictures of the world of a recorded run: their viewpoint, and rendering in several processes."""
 
 from __future__ import annotations
 
