@@ -24,7 +24,6 @@ from executive.mission.model.nodes import InvalidNode, Node
 from executive.mission.model.values import Literal
 from executive.mission.parse.cell_file import CellFile
 from executive.mission.parse.read_mission import read_mission
-from executive.mission.parse.validate import find_span
 from executive.mission.text.file_search import find_mission, get_shipped_folder
 from executive.perception.envelope.rated_detectors import find_unmeasured_detectors
 from executive.skill import Skill
@@ -154,5 +153,4 @@ def _warn_about_unmeasured_detectors(cell: CellFile) -> Iterator[Finding]:
     assert cell.config is not None
     folders = (cell.path.parent, get_shipped_folder() / "cells")
     for keys, message in find_unmeasured_detectors(cell.config, cell.path.parent, folders):
-        span = find_span(cell.root, keys, at_key=True) if cell.root else cell.source.make_span()
-        yield make_warning(span, "not-measured", message)
+        yield make_warning(cell.find_span(keys, at_key=True), "not-measured", message)

@@ -103,23 +103,14 @@ def run_mission(
     """
     loaded = load_mission(mission, load_skills(), set)
     events: list[TimedEvent] = []
-
-    def make_arranged_cell(*args: Any, **options: Any) -> Workcell:
-        workcell = make_cell(*args, **options)
-        try:
-            if arrange is not None:
-                arrange(workcell)
-        except BaseException:
-            workcell.close()
-            raise
-        return workcell
-
-    make_faulty_cell = with_faults(make_arranged_cell, faults, timeout=timeout)
+    make_faulty_cell = with_faults(make_cell, faults, timeout=timeout)
     options = RunOptions(seed, requests, make_cell=make_faulty_cell, substitutes=substitutes or {})
     run = assemble(loaded, options, [events.append, *observers])
     workcell = run.workcell
     assert isinstance(workcell, FaultyCell)
     try:
+        if arrange is not None:
+            arrange(workcell.inner)
         workcell.check_patterns([getattr(node, "path", node.name) for node in run.root.iterate()])
         _check_substitutes(run, loaded.skills)
         run.add_observer(workcell.on_event)

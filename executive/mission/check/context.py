@@ -114,17 +114,10 @@ class CheckContext:
     def library_uses_by_path(self) -> Mapping[str, SubtreeNode]:
         """By path of each node of a library: the `use` node of the mission file that includes the library."""
         uses: dict[str, SubtreeNode] = {}
-
-        def add_uses_below(node: Node, use: SubtreeNode | None) -> None:
-            if node.span.source is mission_source:
-                use = node if isinstance(node, SubtreeNode) else None
-            elif use is not None:
-                uses[node.path] = use
-            for child in node.children:
-                add_uses_below(child, use)
-
         mission_source = self.tree.span.source
-        add_uses_below(self.tree, None)
+        for use in self.tree.walk():
+            if isinstance(use, SubtreeNode) and use.span.source is mission_source:
+                uses |= {node.path: use for node in use.walk() if node.span.source is not mission_source}
         return uses
 
     def locate_skill(self, node: SkillNode) -> tuple[str, Span]:

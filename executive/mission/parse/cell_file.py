@@ -14,7 +14,7 @@ from executive.mission.findings import Finding, MissionError, make_error, sort_f
 from executive.mission.parse.cell_layout import find_overlaps
 from executive.mission.parse.overrides import CELL_PREFIX, make_override_source, override_cell
 from executive.mission.parse.validate import KeyPath, find_span, validate
-from executive.mission.source import Source
+from executive.mission.source import Source, Span
 from executive.mission.text.file_search import find_file_below, read_source
 from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, parse_yaml
 
@@ -46,10 +46,13 @@ class CellFile:
     root: YamlNode | None = None
     findings: tuple[Finding, ...] = ()
 
+    def find_span(self, key_path: KeyPath, *, at_key: bool = False) -> Span:
+        """Return the position of the value at `key_path`, or of its key; the file for a recorded cell."""
+        return find_span(self.root, key_path, at_key) if self.root else self.source.make_span()
+
     def make_error(self, key_path: KeyPath, code: str, message: str) -> Finding:
         """Return an error about the value at `key_path`."""
-        span = find_span(self.root, key_path) if self.root else self.source.make_span()
-        return make_error(span, code, message)
+        return make_error(self.find_span(key_path), code, message)
 
 
 def load_cell(path: Path, overrides: Mapping[str, str] | None = None) -> CellConfig:
@@ -226,12 +229,11 @@ def _resolve_model_files(
 
     A path is relative to the folder of the cell file or base that contains the path.
     """
-    assert file.root is not None
     objects, errors = dict(config.objects), []
     for label, model in config.objects.items():
         for key, path in (("urdf", model.urdf), ("mesh", model.mesh)):
             key_path = ("objects", label, key)
-            folder = folders.get(find_span(file.root, key_path).source, folders[file.source])
+            folder = folders.get(file.find_span(key_path).source, folders[file.source])
             if path and is_outside_path(path):
                 message = f'"{path}" must be a relative path without ".."'
                 errors.append(file.make_error(key_path, "outside", message))
