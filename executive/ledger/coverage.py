@@ -94,8 +94,7 @@ class Coverage:
             self._full_look_count += 1
             # Points at the border of the image do not count as visible, because no later look may show them.
             in_area_mask = look.frame.compute_area_mask(self._points, look.area, BORDER_WIDTH)
-            shown_mask = visible_mask & in_area_mask
-            self._last_full_look_numbers[shown_mask] = self._full_look_count
+            self._last_full_look_numbers[visible_mask & in_area_mask] = self._full_look_count
 
     def reset_near(self, centre: Array, radius: float, change_number: int) -> None:
         """Reset the points within `radius` [m] of `centre` `(3,)` [m] after a change of the table."""

@@ -116,9 +116,8 @@ def run_mission(
         run.add_observer(workcell.on_event)
         for visitor in visitors:
             run.behaviour_tree.add_visitor(visitor)
-        run_ended = run.execute()
         return MissionResult(
-            **asdict(run_ended),
+            **asdict(run.execute()),
             events=events,
             items=run.count_items(),
             accounts=workcell.accounts,

@@ -53,10 +53,9 @@ def make_instance(node: InnerNode, context: NodeContext, build_child: BuildChild
 
 def has_valid_constants(node: InnerNode) -> bool:
     """Return True if the mission gives valid values for all constants of a node."""
-    keys = [key for key in node.declaring_class.keys.values() if key.kind is KeyKind.CONSTANT]
     try:
-        for key in keys:
-            if key.is_required or key.name in node.values:
+        for key in node.declaring_class.keys.values():
+            if key.kind is KeyKind.CONSTANT and (key.is_required or key.name in node.values):
                 _convert_constant(node, key, node.values.get(key.name))
     except ValueProblem:
         return False

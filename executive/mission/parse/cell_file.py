@@ -81,8 +81,8 @@ def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
         return CellFile(path, None, source, findings=tuple(reader.findings))
     root, override_findings = override_cell(root, overrides)
     config, validation_errors = validate(root, CellConfig)
-    base_errors = _find_overridden_base(overrides)
-    findings = (*reader.findings, *override_findings, *base_errors, *validation_errors)
+    override_findings += _find_overridden_base(overrides)
+    findings = (*reader.findings, *override_findings, *validation_errors)
     file = CellFile(path, config, source, root, findings)
     if config is None:
         return file

@@ -138,8 +138,7 @@ def _read_arguments(reader: MappingReader) -> dict[str, Argument]:
             first_line = arguments[name].span.line
             message = f'the argument "{name}" occurs twice; the first is in line {first_line}'
             reader.add_error(span, "duplicate-key", message)
-        default = None if is_empty(value) else read_value(value, reader.findings)
-        arguments[name] = Argument(span, default)
+        arguments[name] = Argument(span, None if is_empty(value) else read_value(value, reader.findings))
     return arguments
 
 

@@ -147,18 +147,13 @@ def _make_value_schema(key: Key | GrammarKey) -> Schema:
             node = _make_reference("node")
             may_be_empty = key.shorthand and not key.is_required
             return {"allOf": [{"anyOf": [node, {"type": "null"}]}]} if may_be_empty else node
-        case KeyKind.NODES:
-            return _SCHEMAS_BY_KIND["nodes"]
-        case KeyKind.REASONS:
-            return _make_reference("reasons")
+        case KeyKind.NODES | KeyKind.REASONS | KeyKind.VARIABLE:
+            return _SCHEMAS_BY_KIND[key.kind.name.lower()]
         case KeyKind.REASONS_OR_SECTIONS:
             section = {**_make_mapping_schema(key.section.keys), **_require_any_of(key.section.any_of)}
             return {"anyOf": [_make_reference("reasons"), section, _make_list_schema(_REASON, section)]}
-        case KeyKind.VARIABLE:
-            return _SCHEMAS_BY_KIND["name"]
         case KeyKind.ELEMENTS:
-            list_names = {"enum": list(PREDEFINED_LISTS)}
-            return make_value_or_reference_schema({"type": "array"}, list_names)
+            return make_value_or_reference_schema({"type": "array"}, {"enum": list(PREDEFINED_LISTS)})
         case KeyKind.SECTIONS:
             section = _make_mapping_schema(key.section.keys)
             return {**section, "type": ["array", "object"], "items": section}

@@ -6,12 +6,11 @@ Each public function is a rule: its docstring states the rule, and the function 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
 from typing import Any, get_args
 
 from executive.mission.check.conditions import list_condition_violations
 from executive.mission.model.port_types import describe_type, find_element_type, is_assignable, is_union
-from executive.skill import ANY, EMPTY, HOLDING, Skill, ToolState
+from executive.skill import ANY, EMPTY, HOLDING, ToolState
 from executive.testing.conformance.declaration_checks import HALT
 from executive.testing.conformance.situations import ArrangementFailed
 from executive.testing.conformance.skill_runs import SkillRuns, TickNotReturned
@@ -113,7 +112,7 @@ def uses_only_declared_parts(runs: SkillRuns) -> Iterator[str]:
 
 def leaves_tool_as_declared(runs: SkillRuns) -> Iterator[str]:
     """After success, each failure and a halt at any tick, the tool is in the declared state."""
-    yield from _list_first_problems(runs.ended_runs, partial(_describe_tool_problem, runs.skill))
+    yield from _list_first_problems(runs.ended_runs, _describe_tool_problem)
 
 
 def leaves_arm_at_rest(runs: SkillRuns) -> Iterator[str]:
@@ -193,14 +192,13 @@ def _describe_halt_fault(test_run: SkillTestRun) -> str:
 
 def _describe_arm_problem(test_run: SkillTestRun) -> str:
     advice = "Call cell.arm.stop() in finally, or use follow of executive.manipulation.motions."
-    has_started_arm = any(call.name == "arm.start" for call in test_run.cell_calls)
-    is_moving = has_started_arm and not test_run.is_at_rest
+    is_moving = not test_run.is_at_rest and any(call.name == "arm.start" for call in test_run.cell_calls)
     return f"{test_run.result_description}, and the arm still moves. {advice}" if is_moving else ""
 
 
-def _describe_tool_problem(skill: type[Skill], test_run: SkillTestRun) -> str:
+def _describe_tool_problem(test_run: SkillTestRun) -> str:
     """Return the violation of the declared tool state at the end of a run, or ""."""
-    required, requirement = _find_required_tool_state(skill, test_run)
+    required, requirement = _find_required_tool_state(test_run)
     if required is not ANY and (required is HOLDING) != test_run.holds_object_at_end:
         actual = "holds something" if test_run.holds_object_at_end else "is empty"
         expected = "hold something" if required is HOLDING else "be empty"
@@ -216,9 +214,9 @@ def _describe_tool_problem(skill: type[Skill], test_run: SkillTestRun) -> str:
     return ""
 
 
-def _find_required_tool_state(skill: type[Skill], test_run: SkillTestRun) -> tuple[ToolState, str]:
+def _find_required_tool_state(test_run: SkillTestRun) -> tuple[ToolState, str]:
     """Return the required state of the tool at the end of a run, and the declaration that requires it."""
-    initial_state = HOLDING if test_run.holds_object_at_start else EMPTY
+    skill, initial_state = test_run.skill, HOLDING if test_run.holds_object_at_start else EMPTY
     if test_run.status == "SUCCESS":
         state_after = skill.tool_state[1]
         return (initial_state, "as before") if state_after is ANY else (state_after, "by tool_state")

@@ -81,6 +81,7 @@ class SkillTestRun:
         halt_at: Control step before which the skill is halted; None: no halt.
 
     Attributes:
+        skill: The tested skill.
         situation: Situation in which the run began.
         description: Situation and fault, as the beginning of a sentence.
         status: `SUCCESS`; `FAILURE`; `HALTED`; `RUNNING`: no end within `MAX_RUN_TIME`; `STUCK`: a tick did
@@ -109,7 +110,7 @@ class SkillTestRun:
         scene, values = prepare_scene(skill, situation, arrange)
         fake = scene.cell
         originals = values if halt_at else copy.deepcopy(values, {id(fake): fake})
-        self.situation, self._skill, self._fault, self._halt_at = situation, skill, fault, halt_at
+        self.situation, self.skill, self._fault, self._halt_at = situation, skill, fault, halt_at
         self.description = f"{situation.name} {fault.name}" if fault else situation.name
         self.reason = self.message = ""
         self.ticks = 0
@@ -145,8 +146,8 @@ class SkillTestRun:
         cell = FaultyCell(fake, [during("*", fault.effect)] if fault else [])
         try:
             recorded_cell = intercept(cell.cell, self._record_call, _OBSERVED_ROLES)
-            with interrupt_stuck_ticks(self._skill, lambda: self.ticks):
-                run = SkillRun(self._skill(**values), recorded_cell)
+            with interrupt_stuck_ticks(self.skill, lambda: self.ticks):
+                run = SkillRun(self.skill(**values), recorded_cell)
                 while self.ticks < MAX_RUN_TIME / STEP:
                     if self.ticks == self._halt_at:
                         run.halt()
@@ -169,7 +170,7 @@ class SkillTestRun:
             return "FAILURE"
         except Exception as error:
             frames = reversed(extract_tb(error.__traceback__))
-            place = find_skill_line(self._skill, ((frame.filename, frame.lineno or 0) for frame in frames))
+            place = find_skill_line(self.skill, ((frame.filename, frame.lineno or 0) for frame in frames))
             kind = "" if isinstance(error, Fault) else f"{type(error).__name__}: "
             self.message = f"{kind}{error}" + (f" ({place})" if place else "")
             return "FAULT"
