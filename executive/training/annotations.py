@@ -192,9 +192,8 @@ def _read_labels(file: Path, class_names: Mapping[int, str]) -> ImageAnnotation:
         except KeyError:
             raise InputError(f"{place}: {class_number} is not one of {len(class_names)} classes") from None
         except ValueError:
-            raise InputError(
-                f'{place}: must be a class number and normalized coordinates, not "{line}"'
-            ) from None
+            problem = f'must be a class number and normalized coordinates, not "{line}"'
+            raise InputError(f"{place}: {problem}") from None
         is_polygon = len(values) > YOLO_BOX_VALUE_COUNT and len(values) % 2 == 0
         if len(values) != YOLO_BOX_VALUE_COUNT and not is_polygon:
             raise InputError(

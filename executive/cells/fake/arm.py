@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import ParamSpec, TypeVar
 
 import numpy as np
@@ -219,12 +219,9 @@ class FakeArm:
             rotation = make_tool_down_pose(end_position, goal.yaw or 0.0).rotation
             speed = min(goal.guarded_speed, MAX_TOOL_SPEED)
         position_over_goal = np.array([*end_position[:2], max(guarded_start[2], self._travel_height)])
-        fast_part = [
-            pose
-            for line_start, line_end in pairwise([start, raised_position, position_over_goal, guarded_start])
-            for pose in _make_straight_path(line_start, line_end, rotation, MAX_TOOL_SPEED)
-        ]
-        yield [*fast_part, *_make_straight_path(guarded_start, end_position, rotation, speed)]
+        fast_lines = pairwise([start, raised_position, position_over_goal, guarded_start])
+        fast_parts = [_make_straight_path(*line, rotation, MAX_TOOL_SPEED) for line in fast_lines]
+        yield [*chain(*fast_parts), *_make_straight_path(guarded_start, end_position, rotation, speed)]
 
 
 class FakeTool:

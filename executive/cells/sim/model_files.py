@@ -97,9 +97,8 @@ def _count_triangles(path: Path) -> int:
 def _check_triangle_count(path: Path, count: int) -> None:
     """Raise `InputError` if the number of triangles of a file exceeds `MAX_TRIANGLE_COUNT`."""
     if count > MAX_TRIANGLE_COUNT:
-        raise InputError(
-            f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles; simplify the mesh"
-        )
+        problem = f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles"
+        raise InputError(f"{problem}; simplify the mesh")
 
 
 def read_wavefront(path: Path) -> tuple[Array, NDArray[np.intp]]:

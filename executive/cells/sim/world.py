@@ -9,6 +9,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from string import Template
 
 import numpy as np
 import pybullet
@@ -225,30 +226,19 @@ def add_bin(client: BulletClient, bin: BinConfig) -> int:
 def _make_tool_urdf(length: float, cup_radius: float, robot: RobotModel) -> str:
     """Return the URDF text of the tool, from the flange to the lip, with the closing tag of the robot.
 
+    The template of the text is `tool.urdf`.
+
     Args:
         length: Distance from the flange to the lip [m].
         cup_radius: Radius of the cup and of the neck behind the cup [m].
         robot: Model of the arm.
     """
-    shaft_length = length - NECK_LENGTH
-    shaft = shaft_length, TOOL_RADIUS, shaft_length / 2
-    neck = NECK_LENGTH, cup_radius, length - NECK_LENGTH / 2
-    shapes = "".join(
-        f'<{tag}><origin xyz="0 0 {z}"/><geometry>'
-        f'<cylinder length="{cylinder_length - 2 * margin}" radius="{radius - margin}"/></geometry>'
-        + ('<material name="Grey"/>' if tag == "visual" else "")
-        + f"</{tag}>"
-        for cylinder_length, radius, z in (shaft, neck)
-        for tag, margin in (("visual", 0.0), ("collision", CYLINDER_MARGIN))
-    )
-    return f"""
-  <link name="tool">
-    <inertial><origin xyz="0 0 {length / 2}"/><mass value="{TOOL_MASS}"/>
-      <inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-5"/></inertial>
-    {shapes}
-  </link>
-  <joint name="tool_joint" type="fixed">
-    <parent link="{robot.flange_link}"/><child link="tool"/><origin xyz="0 0 {robot.flange_offset}"/>
-  </joint>
-</robot>
-"""
+    shaft_length, values = length - NECK_LENGTH, {"centre": length / 2, "mass": TOOL_MASS}
+    shaft = "shaft", shaft_length, TOOL_RADIUS, shaft_length / 2
+    neck = "neck", NECK_LENGTH, cup_radius, length - NECK_LENGTH / 2
+    for name, cylinder_length, radius, centre in (shaft, neck):
+        values |= {f"{name}_length": cylinder_length, f"{name}_radius": radius, f"{name}_centre": centre}
+        values[f"{name}_collision_length"] = cylinder_length - 2 * CYLINDER_MARGIN
+        values[f"{name}_collision_radius"] = radius - CYLINDER_MARGIN
+    template = Template(Path(__file__).with_name("tool.urdf").read_text())
+    return template.substitute(values, flange_link=robot.flange_link, flange_offset=robot.flange_offset)
