@@ -34,25 +34,33 @@ OpenProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], No
 """Function that opens a progress bar with a name; the context manager yields `update(done, total)`."""
 
 
+Images = Samples | list[LabelledImage]
+"""Labelled images of a dataset, or of rendered scenes."""
+
+
 @dataclass(frozen=True)
-class SceneSettings:
-    """Settings for rendered scenes.
+class ImageSettings:
+    """Settings for the images on which detectors are measured, and for the detections.
 
     Attributes:
-        image_count: Number of images per cell.
+        dataset: Folder of a dataset; None: rendered scenes of the cell.
+        image_count: Number of rendered images per cell.
         seed: Random seed.
         is_randomized: True for scenes with domain randomization; False for the initial scenes of runs.
         view: Region of interest in images of initial scenes of runs: `table`, or `full` for the whole image.
         workers: Number of rendering processes.
         scene: Scene file that changes the initial scenes of runs; None: no change.
+        threshold: Minimum confidence of a detection; None: the threshold of the detector.
     """
 
+    dataset: Path | None
     image_count: int
     seed: int
     is_randomized: bool
     view: str
     workers: int
     scene: Path | None = None
+    threshold: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,91 +115,79 @@ def list_detectors(
         yield DetectorUnderTest(cell, configs, name or next(iter(configs)), cell_file.parent)
 
 
-def check_detector(detector: DetectorUnderTest, *, renders_scenes: bool, scene: Path | None = None) -> None:
-    """Check that scenes of the cell can be rendered and that the detector can be built.
+def check_detector(detector: DetectorUnderTest, settings: ImageSettings) -> None:
+    """Check that necessary scenes of the cell can be rendered and that the detector can be built.
 
     Raises:
         InputError: The cell is not simulated, the scene file has errors, or a detector cannot be built.
     """
     cell = detector.cell
-    if renders_scenes and cell:
+    if settings.dataset is None and cell:
         if cell.kind != "sim":
-            kind = (
-                f"{cell.cell} is of kind {cell.kind}; measure its detector on your own images with --dataset"
-            )
-            raise InputError(f"scenes can be rendered only of cells of kind sim, but {kind}")
-        load_scene(scene, cell)
+            problem = f"but {cell.cell} is of kind {cell.kind}"
+            advice = "measure its detector on your own images with --dataset"
+            raise InputError(f"scenes can be rendered only of cells of kind sim, {problem}; {advice}")
+        load_scene(settings.scene, cell)
     for key_path, problem in find_detector_errors(detector.configs, detector.base_folder):
         raise InputError(f"detector {key_path[1]}: {problem}")
 
 
 def measure_detector(
-    detector: DetectorUnderTest,
-    dataset: Path | None,
-    scenes: SceneSettings,
-    *,
-    threshold: float | None,
-    worst_mistakes: WorstMistakes,
-    progress: OpenProgressBar,
+    detector: DetectorUnderTest, settings: ImageSettings, mistakes: WorstMistakes, progress: OpenProgressBar
 ) -> Evaluation:
-    """Evaluate a detector on a dataset, or on rendered scenes of its cell.
-
-    `threshold` is the minimum confidence; None: the threshold of the detector. `worst_mistakes` is updated.
-    """
+    """Evaluate a detector on a dataset, or on rendered scenes of its cell; update the worst mistakes."""
     # Images of a dataset and of randomized scenes do not use the camera, table and localizer of the cell.
-    cell_of_images = None if dataset is not None or scenes.is_randomized else detector.cell
+    cell_of_images = None if settings.dataset is not None or settings.is_randomized else detector.cell
     camera = next(iter(cell_of_images.cameras.values())) if cell_of_images else None
     classes = tuple(detector.cell.objects) if detector.cell else None
-    with _open_images(detector.cell, dataset, scenes, progress) as samples:
+    with _open_images(detector.cell, settings, progress) as samples:
         configs, name, folder = detector.configs, detector.name, detector.base_folder
         cell_detector = CellDetector(
-            configs, name, base=folder, camera=camera, view=scenes.view, classes=classes
+            configs, name, base=folder, camera=camera, view=settings.view, classes=classes
         )
         with contextlib.closing(cell_detector), progress(f"running {detector.name}") as update:
             return evaluate.evaluate(
-                cell_detector, _iterate_with_progress(samples, update), mistakes=worst_mistakes,
+                cell_detector, _iterate_with_progress(samples, update), mistakes=mistakes,
                 localizer=_build_localizer(cell_of_images) if cell_of_images else None,
-                table=cell_of_images.table if cell_of_images else None, threshold=threshold,
+                table=cell_of_images.table if cell_of_images else None, threshold=settings.threshold,
                 is_partial=camera is not None and camera.partial_views,
             )  # fmt: skip
 
 
 @contextlib.contextmanager
 def _open_images(
-    cell: CellConfig | None, dataset: Path | None, scenes: SceneSettings, progress: OpenProgressBar
-) -> Iterator[Samples | list[LabelledImage]]:
+    cell: CellConfig | None, settings: ImageSettings, progress: OpenProgressBar
+) -> Iterator[Images]:
     """Open the images of the dataset, or render scenes of the cell; a context manager."""
-    if dataset is not None:
-        yield Samples(dataset)
+    if settings.dataset is not None:
+        yield Samples(settings.dataset)
         return
     assert cell is not None
     with tempfile.TemporaryDirectory() as folder:
-        images: Samples | list[LabelledImage]
+        images: Images
         with progress(f"rendering {cell.cell}") as update:
-            if scenes.is_randomized:
+            if settings.is_randomized:
                 generate_dataset(
-                    {cell.cell: cell}, Path(folder), image_count=scenes.image_count, seed=scenes.seed,
-                    layout="coco", worker_count=scenes.workers, valid_fraction=1.0, progress=update,
+                    {cell.cell: cell}, Path(folder), image_count=settings.image_count, seed=settings.seed,
+                    layout="coco", worker_count=settings.workers, valid_fraction=1.0, progress=update,
                 )  # fmt: skip
                 images = Samples(Path(folder))
             else:
                 object_counts = (0, find_max_object_count(cell, MAX_OBJECT_COUNT))
                 table = cell.table.model_copy(update={"objects": object_counts})
                 images = render_run_frames(
-                    cell.model_copy(update={"table": table}), image_count=scenes.image_count,
-                    seed=scenes.seed, worker_count=scenes.workers, progress=update,
-                    scene=load_scene(scenes.scene, cell),
+                    cell.model_copy(update={"table": table}), image_count=settings.image_count,
+                    seed=settings.seed, worker_count=settings.workers, progress=update,
+                    scene=load_scene(settings.scene, cell),
                 )  # fmt: skip
         yield images
 
 
-def _iterate_with_progress(
-    images: Samples | list[LabelledImage], update_progress: Callable[[int, int], None]
-) -> Iterator[LabelledImage]:
+def _iterate_with_progress(images: Images, update: Callable[[int, int], None]) -> Iterator[LabelledImage]:
     """Yield the images; update the progress bar after each image."""
     for image_count, image in enumerate(images, 1):
         yield image
-        update_progress(image_count, len(images))
+        update(image_count, len(images))
 
 
 def _build_localizer(cell: CellConfig) -> Localizer | None:

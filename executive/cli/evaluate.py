@@ -95,7 +95,7 @@ def command(
         from executive.view.detector_results import print_metrics
 
         worst_mistakes = WorstMistakes()
-        scene_settings = evaluation.SceneSettings(images, seed, varied, view, workers, scene)
+        settings = evaluation.ImageSettings(dataset, images, seed, varied, view, workers, scene, threshold)
         cell_names = cells or (() if dataset else ("overhead",))
         configs = load_cells(cell_names, overrides)
         configs_by_file = dict(zip(map(find_cell, cell_names), configs.values(), strict=True))
@@ -103,13 +103,10 @@ def command(
         if dataset is not None:
             report_polygons(dataset)
         for detector in detectors:
-            evaluation.check_detector(detector, renders_scenes=dataset is None, scene=scene)
+            evaluation.check_detector(detector, settings)
         for detector in detectors:
             name, start_time = detector.make_measurement_name(dataset), time.monotonic()
-            result = evaluation.measure_detector(
-                detector, dataset, scene_settings, threshold=threshold, worst_mistakes=worst_mistakes,
-                progress=show_progress,
-            )  # fmt: skip
+            result = evaluation.measure_detector(detector, settings, worst_mistakes, show_progress)
             print_metrics(name, detector.name, result)
             kind = detector.configs[detector.name].kind
             results[name] = {"detector": detector.name, "kind": kind, **result.to_dict()}

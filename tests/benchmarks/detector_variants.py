@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 import yaml
 
-from executive.campaign.evaluation import SceneSettings, check_detector, list_detectors, measure_detector
+from executive.campaign.evaluation import ImageSettings, check_detector, list_detectors, measure_detector
 from executive.cell.config import CellConfig
 from executive.cli.cells import find_cell, load_cells
 from executive.cli.options import seed_option, workers_option
@@ -109,11 +109,9 @@ def evaluate_scene(
 ) -> Evaluation:
     """Return the figures of the first detector of a cell in a scene, as `executive evaluate` does."""
     (detector,) = list_detectors({file: cell}, None, None, None)
-    check_detector(detector, renders_scenes=True, scene=scene)
-    scenes = SceneSettings(images, seed, is_randomized=False, view="table", workers=workers, scene=scene)
-    return measure_detector(
-        detector, None, scenes, threshold=THRESHOLD, worst_mistakes=WorstMistakes(), progress=show_progress
-    )
+    settings = ImageSettings(None, images, seed, False, "table", workers, scene, THRESHOLD)
+    check_detector(detector, settings)
+    return measure_detector(detector, settings, WorstMistakes(), show_progress)
 
 
 def describe_evaluation(name: str, evaluation: Evaluation) -> Figures:
