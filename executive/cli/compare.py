@@ -47,7 +47,8 @@ def command(
         from executive.campaign.results.sweep_folder import create_comparison, make_settings, open_comparison
         from executive.campaign.results.sweep_summary import SweepResults
         from executive.cell.json_values import to_json
-        from executive.cli.sweep_tables import print_differences
+        from executive.cli.progress import print_report
+        from executive.cli.sweep_tables import list_differences
 
         if resume is not None:
             databases = open_comparison(resume)
@@ -67,7 +68,7 @@ def command(
         differences, changed = compute_differences(pairs), [pair for pair in pairs if pair.is_changed]
         write_missing_reports(changed)
         page = write_page(databases[0].path.parents[1], sweeps, differences, changed)
-        print_differences(differences, changed, len(pairs))
+        print_report(list_differences(differences, changed, len(pairs)))
         click.echo(f"page: {page}", err=True)
     if as_json:
         print_json(to_json({

@@ -90,9 +90,9 @@ def command(
     with keep_stdout_clean():
         from executive.campaign import evaluation
         from executive.cli.cells import find_cell, load_cells
-        from executive.cli.progress import report_polygons, show_progress
+        from executive.cli.progress import print_report, report_polygons, show_progress
         from executive.training.evaluation.worst_mistakes import WorstMistakes
-        from executive.view.detector_results import print_metrics
+        from executive.view.detector_results import list_metrics
 
         worst_mistakes = WorstMistakes()
         settings = evaluation.ImageSettings(dataset, images, seed, varied, view, workers, scene, threshold)
@@ -107,7 +107,7 @@ def command(
         for detector in detectors:
             name, start_time = detector.make_measurement_name(dataset), time.monotonic()
             result = evaluation.measure_detector(detector, settings, worst_mistakes, show_progress)
-            print_metrics(name, detector.name, result)
+            print_report(list_metrics(name, detector.name, result))
             kind = detector.configs[detector.name].kind
             results[name] = {"detector": detector.name, "kind": kind, **result.to_dict()}
             if is_stored and detector.cell is not None:

@@ -50,9 +50,7 @@ def command(
                 seconds = source.events[-1].clock / speed + RESULT_DISPLAY_TIME
                 click.echo(f"making a film of about {seconds:.0f} s", err=True)
             with show_progress("frames", quiet=quiet, print_lines=True) as progress:
-                frame_count = write_film(
-                    source, partial_file, film_format, speed=speed, workers=workers, progress=progress
-                )
+                frame_count = write_film(source, partial_file, film_format, speed, workers, progress)
         seconds, size = frame_count / film_format.frame_rate, film_file.stat().st_size
         click.echo(f"{film_file}: {seconds:.1f} s, {size / 1e6:.1f} MB", err=True)
     if as_json:

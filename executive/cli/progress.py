@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import click
 from rich import progress
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.text import Text
 
 from executive.cli.streams import open_unescaped_stderr
@@ -69,6 +69,13 @@ def _make_line_printer(description: str) -> Callable[[int, int], None]:
             click.echo(f"{description}: {completed} of {total}, {estimates}", err=True)
 
     return update
+
+
+def print_report(lines_and_tables: Iterable[RenderableType]) -> None:
+    """Print lines of text, which are not wrapped, and tables to stderr."""
+    console = Console(stderr=True, highlight=False, markup=False, force_terminal=False)
+    for line_or_table in lines_and_tables:
+        console.print(line_or_table, soft_wrap=isinstance(line_or_table, str))
 
 
 def report_polygons(folder: Path) -> None:

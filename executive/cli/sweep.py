@@ -60,7 +60,8 @@ def command(
         from executive.campaign.results.sweep_folder import create_sweep, make_settings, open_sweep
         from executive.campaign.sweep import make_repeat_command
         from executive.cell.json_values import to_json
-        from executive.cli.sweep_tables import print_summary
+        from executive.cli.progress import print_report
+        from executive.cli.sweep_tables import list_summary
 
         conditions = parse_requirement(require) if require else ()
         if export is not None:
@@ -73,7 +74,7 @@ def command(
         with closing(database):
             click.echo(f"results: {database.path}", err=True)
             results = execute_missing_runs(database, "", workers, cluster)
-            print_summary(results.summaries, results.planned_run_count)
+            print_report(list_summary(results.summaries, results.planned_run_count))
             page = write_page(database.path.parent, [results])
             click.echo(f"page: {page}", err=True)
             if junit is not None:

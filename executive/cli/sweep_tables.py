@@ -1,11 +1,11 @@
-"""Summary of a sweep, and differences of a comparison, as text and tables on stderr."""
+"""Summary of a sweep, and differences of a comparison, as lines of text and tables."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console, RenderableType
+from rich.console import RenderableType
 from rich.table import Table
 
 from executive.campaign.results.differences import Difference, RunPair
@@ -20,17 +20,8 @@ MAX_CHANGED_SEEDS = 20
 """Maximum number of seeds with a changed outcome that are listed."""
 
 
-def print_summary(summaries: Sequence[VariantSummary], planned_run_count: int) -> None:
-    """Print the summary of a sweep of `planned_run_count` runs."""
-    console = Console(stderr=True, highlight=False, markup=False, force_terminal=False)
-    for line_or_table in _list_lines_and_tables(summaries, planned_run_count):
-        console.print(line_or_table, soft_wrap=isinstance(line_or_table, str))
-
-
-def _list_lines_and_tables(
-    summaries: Sequence[VariantSummary], planned_run_count: int
-) -> Iterator[RenderableType]:
-    """Yield the lines of text and the table of the summary."""
+def list_summary(summaries: Sequence[VariantSummary], planned_run_count: int) -> Iterator[RenderableType]:
+    """Yield lines and a table with the summary of a sweep of `planned_run_count` runs."""
     run_count = sum(summary.success.denominator for summary in summaries)
     success_count = sum(summary.success.numerator for summary in summaries)
     if run_count == planned_run_count:
@@ -108,23 +99,24 @@ def _format_estimate(estimate: Estimate) -> str:
     return f"{estimate.value:.0f}{interval}"
 
 
-def print_differences(differences: Sequence[Difference], changed: Sequence[RunPair], pair_count: int) -> None:
-    """Print the differences, and the seeds whose outcome changed."""
-    console = Console(stderr=True, highlight=False, markup=False, force_terminal=False)
+def list_differences(
+    differences: Sequence[Difference], changed: Sequence[RunPair], pair_count: int
+) -> Iterator[RenderableType]:
+    """Yield lines and a table with the differences, and with the seeds whose outcome changed."""
     table = Table("", "A", "B", "B minus A", "95 % interval", box=SIMPLE_HEAD, padding=(0, 1))
     for difference in differences:
         values = (difference.a, difference.b, difference.difference)
         low, high = _format_number(difference.low), _format_number(difference.high)
         interval = "unknown" if difference.low is None else f"{low} to {high}"
         table.add_row(difference.metric, *map(_format_number, values), interval)
-    console.print(f"{pair_count} pairs of runs with the same seed")
-    console.print(table)
-    console.print(f"{len(changed)} seeds with a different outcome")
+    yield f"{pair_count} pairs of runs with the same seed"
+    yield table
+    yield f"{len(changed)} seeds with a different outcome"
     for pair in changed[:MAX_CHANGED_SEEDS]:
         outcomes = [" ".join(filter(None, (run.status, run.problem, run.run))) for run in (pair.a, pair.b)]
-        console.print(f"  seed {pair.seed}: A {outcomes[0]}; B {outcomes[1]}", soft_wrap=True)
+        yield f"  seed {pair.seed}: A {outcomes[0]}; B {outcomes[1]}"
     if len(changed) > MAX_CHANGED_SEEDS:
-        console.print(f"  and {len(changed) - MAX_CHANGED_SEEDS} more; the page lists them")
+        yield f"  and {len(changed) - MAX_CHANGED_SEEDS} more; the page lists them"
 
 
 def _format_number(value: float | None) -> str:

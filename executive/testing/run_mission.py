@@ -16,7 +16,7 @@ from executive.errors import InputError
 from executive.events import FaultInjected, NodeEnded, NodeStarted, Observer, RunEnded, TimedEvent
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
-from executive.record.audit_comparison import is_confirmed_by_audit
+from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.skill import Skill

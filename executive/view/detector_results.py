@@ -5,22 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console, RenderableType
+from rich.console import RenderableType
 from rich.table import Table
 
 from executive.training.evaluation.metrics import NO_OBJECT, Evaluation
 
 
-def print_metrics(source: str, detector: str, evaluation: Evaluation) -> None:
-    """Print the accuracy of the detector with the name `detector`, measured on `source`, to stderr."""
-    console = Console(stderr=True, highlight=False, markup=False, force_terminal=False)
-    console.print(f"{source}, detector {detector}")
-    for line_or_table in _list_lines_and_tables(detector, evaluation):
-        console.print(line_or_table, soft_wrap=isinstance(line_or_table, str))
-
-
-def _list_lines_and_tables(detector: str, evaluation: Evaluation) -> Iterator[RenderableType]:
-    """Yield the lines of text and the tables with the metrics of a detector."""
+def list_metrics(source: str, detector: str, evaluation: Evaluation) -> Iterator[RenderableType]:
+    """Yield lines and tables with the accuracy of the detector `detector`, measured on `source`."""
+    yield f"{source}, detector {detector}"
     yield f"  {evaluation.objects} objects on {evaluation.images} images, threshold {evaluation.threshold:g}"
     if evaluation.unavailable:
         fraction = evaluation.unavailable / evaluation.images

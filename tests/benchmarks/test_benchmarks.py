@@ -26,8 +26,7 @@ from executive.motion.braking import plan_braking
 from executive.motion.joints import JointLimits, JointState
 from executive.motion.point_to_point import Connector
 from executive.motion.trajectory import Trajectory
-from executive.record.audit_comparison import Audit, ItemCounts
-from executive.record.result import Result
+from executive.record.result import Audit, ItemCounts, Result
 from tests.benchmarks import (
     damaged_records,
     halts,

@@ -21,8 +21,7 @@ from executive.cli.main import COMMANDS, main
 from executive.errors import Fault, InputError
 from executive.mission.findings import Finding, MissionError
 from executive.mission.flow_analysis import UnhandledFailure
-from executive.record.audit_comparison import Audit, ItemCounts
-from executive.record.result import Result
+from executive.record.result import Audit, ItemCounts, Result
 from executive.record.timeline.timeline import PlanningTotals
 from executive.run.assembly import RunOptions
 

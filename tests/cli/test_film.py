@@ -24,7 +24,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (path / "journal.jsonl").touch()
     (tmp_path / "runs" / "latest").symlink_to(path)
 
-    def write_film(source, file, format, *, speed, workers, progress):
+    def write_film(source, file, format, speed, workers, progress):
         file.write_text(f"{source.directory.path.name} {format.suffix} {speed:g} {workers}")
         progress(30, 30)
         return 30

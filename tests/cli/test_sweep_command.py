@@ -14,7 +14,7 @@ from executive.campaign.results.database import ResultsDatabase
 from executive.campaign.results.rows import PhaseRow, RunRecord, RunRow
 from executive.campaign.sweep import SweepJob
 from executive.cli.main import main
-from executive.record.audit_comparison import Audit, ItemCounts
+from executive.record.result import Audit, ItemCounts
 
 
 def make_record(job: SweepJob, status: str = "SUCCESS") -> RunRecord:

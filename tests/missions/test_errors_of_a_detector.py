@@ -13,7 +13,7 @@ from executive.cells.fake.noisy_detector import NoisyDetector
 from executive.mission.load import LoadedMission, load_mission
 from executive.perception.detectors.requests import DetectorContext
 from executive.plugins import load_cell_kind, load_skills
-from executive.record.audit_comparison import is_confirmed_by_audit
+from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 
 MISSIONS = Path(__file__).parents[2] / "missions"

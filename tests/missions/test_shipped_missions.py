@@ -14,7 +14,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.events import ItemChanged, MotionPlanned, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import load_cell_kind, load_skills
-from executive.record.audit_comparison import is_confirmed_by_audit
+from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import make_oracle_kind
 

@@ -9,8 +9,15 @@ import pytest
 
 from executive.cell.json_values import to_json
 from executive.errors import ExecutiveError
-from executive.record.audit_comparison import Audit, ItemCounts
-from executive.record.result import Result, find_exit_code, list_requests, read_result, write_result
+from executive.record.result import (
+    Audit,
+    ItemCounts,
+    Result,
+    find_exit_code,
+    list_requests,
+    read_result,
+    write_result,
+)
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import Timeline
 

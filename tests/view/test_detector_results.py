@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from executive.cli.progress import print_report
 from executive.training.evaluation.metrics import (
     ClassMetrics,
     CountedRate,
@@ -13,7 +14,7 @@ from executive.training.evaluation.metrics import (
     Evaluation,
     MeasuredErrorRates,
 )
-from executive.view.detector_results import print_metrics
+from executive.view.detector_results import list_metrics
 
 MEASURED = Evaluation(
     threshold=0.5, images=300, objects=900, precision=0.991, recall=0.98, map50=0.995, map50_95=0.8,
@@ -35,7 +36,7 @@ def printed(capsys):
     """A function that prints figures and returns the lines, their inner space collapsed."""
 
     def lines(evaluation):
-        print_metrics("overhead", "eye", evaluation)
+        print_report(list_metrics("overhead", "eye", evaluation))
         captured = capsys.readouterr()
         assert captured.out == ""
         return [" ".join(line.split()) for line in captured.err.splitlines()]

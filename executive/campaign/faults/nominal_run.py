@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from executive.campaign.faults.trial_checks import format_counts
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.errors import InputError
-from executive.record.audit_comparison import is_confirmed_by_audit
+from executive.record.result import is_confirmed_by_audit
 from executive.record.timeline.activation import group_by_node
 from executive.record.timeline.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble

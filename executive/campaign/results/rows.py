@@ -11,8 +11,7 @@ from typing import ClassVar
 from pydantic import ConfigDict, TypeAdapter
 
 from executive.cell.json_values import DECIMAL_PLACES, to_json
-from executive.record.audit_comparison import Audit, ItemCounts, describe_disagreement
-from executive.record.result import Result
+from executive.record.result import Audit, ItemCounts, Result, describe_disagreement
 from executive.record.timeline.timeline import PlanningTotals, Timeline
 
 

@@ -22,7 +22,7 @@ RESULT_DISPLAY_TIME = 2.0
 
 
 def write_film(
-    source: FilmSource, file: Path, film_format: FilmFormat, *, speed: float, workers: int,
+    source: FilmSource, file: Path, film_format: FilmFormat, speed: float, workers: int,
     progress: Callable[[int, int], None],
 ) -> int:  # fmt: skip
     """Write the film of a run, and return the number of frames.

@@ -21,11 +21,8 @@ from executive.view.tree.tree_text import draw_line_prefixes, select_active_node
 REDRAWS_PER_SECOND = 10
 """Frequency at which the view is drawn [1/s]."""
 
-_STATUS_MARKS = {
-    "RUNNING": ("▶", "bold yellow"), "SUCCESS": ("✓", "green"), "FAILURE": ("✗", "red"),
-    "INVALID": ("·", "dim"),
-}  # fmt: skip
-"""Character and style of the mark of a node, by the status of the node."""
+_STATUS_MARKS = {"RUNNING": ("▶", "bold yellow"), "SUCCESS": ("✓", "green"), "FAILURE": ("✗", "red")}
+"""Character and style of the mark of a node, by the status of the node; any other node has a dim dot."""
 _STATE_STYLES = {"placed": "green", "rejected": "red", "lost": "red", "held": "yellow", "dropped": "yellow"}
 """Style of the text of an item state; the text of any other state has no style."""
 

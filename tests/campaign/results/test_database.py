@@ -17,7 +17,7 @@ from executive.campaign.results.database import ResultsDatabase, get_database_pa
 from executive.campaign.results.rows import ItemRow, PhaseRow, RunRecord, RunRow, SweepSettings
 from executive.campaign.results.tables import ITEMS, PHASES, RUNS
 from executive.errors import InputError
-from executive.record.audit_comparison import Audit, ItemCounts
+from executive.record.result import Audit, ItemCounts
 from executive.record.timeline.timeline import PlanningTotals
 
 SETTINGS = SweepSettings(

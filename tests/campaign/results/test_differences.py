@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from executive.campaign.results.differences import compute_differences, pair_runs
 from executive.campaign.results.rows import RunRow
-from executive.record.audit_comparison import Audit, ItemCounts
+from executive.record.result import Audit, ItemCounts
 
 
 def make_run(seed: int, status: str = "SUCCESS", time: float = 10.0, placed: int = 4) -> RunRow:

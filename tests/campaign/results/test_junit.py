@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 from executive.campaign.results.junit import format_junit
 from executive.campaign.results.rows import RunRow
-from executive.record.audit_comparison import Audit
+from executive.record.result import Audit
 
 SCHEMA: Mapping[str, tuple[set[str], set[str], list[str]]] = {
     "testsuites": (set(), set(), ["testsuite"]),

@@ -8,7 +8,7 @@ from executive.campaign.results.requirement import describe_unmet_conditions, pa
 from executive.campaign.results.rows import RunRow
 from executive.campaign.results.sweep_summary import summarize_runs
 from executive.errors import InputError
-from executive.record.audit_comparison import Audit, ItemCounts
+from executive.record.result import Audit, ItemCounts
 
 
 def run(seed: int, variant: str = "", **values: object) -> RunRow:

@@ -12,7 +12,7 @@ from executive.campaign.results.sweep_summary import (
     SummaryStatistics,
     summarize_runs,
 )
-from executive.record.audit_comparison import Audit, ItemCounts
+from executive.record.result import Audit, ItemCounts
 from executive.record.timeline.timeline import PlanningTotals
 
 

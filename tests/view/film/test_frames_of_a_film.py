@@ -12,8 +12,7 @@ from PIL import Image, ImageColor
 from small_tree import NODES, ended, node, started
 
 from executive.events import RunEnded
-from executive.record.audit_comparison import ItemCounts
-from executive.record.result import Result
+from executive.record.result import ItemCounts, Result
 from executive.view.film.film import select_steps
 from executive.view.film.page import add_result, describe_result, draw_frame
 from executive.view.film.panel import (
