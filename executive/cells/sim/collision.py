@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Container, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, NamedTuple, TypeAlias
+from collections.abc import Sequence
+from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 import pybullet
@@ -17,21 +17,37 @@ import pybullet
 from executive.cell.arm import Task
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
-from executive.cell.objects import Load, ObjectClass, Obstacle
-from executive.cells.sim.world import DISTANCE, LINK_A, POSITION_B, World, name_load
+from executive.cell.objects import ObjectClass, Obstacle
+from executive.cells.sim.world import DISTANCE, JOINT_AXIS, LINK_A, POSITION_B, World, name_load
 from executive.errors import Blocked
 from executive.geometry import Array
 
 ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
-SEARCH_DISTANCE = 0.15
+SEARCH_DISTANCE = 0.1
 """Distance beyond the margin up to which the distances of bodies are computed [m]."""
 SUPPORT_TOLERANCE = 0.001
 """Maximum height [m] above the floor of a bin at which a contact of the load is a contact with the floor."""
 
 
-ClosestPoints: TypeAlias = tuple[Any, ...]
-"""Closest points of two bodies A and B from PyBullet: values with the indices `LINK_A`, `POSITION_B`, ...."""
+class BodyPair(NamedTuple):
+    """Two bodies of which at least one moves with the arm.
+
+    Attributes:
+        bodies: Indices of both bodies; for two links of the arm, followed by the indices of the links.
+        links: Links of the first body whose distances count.
+        joints: Joints that change the distance.
+        body_name: Name of the second body in messages; "" for the link that is nearest to the load.
+        load_name: Name of the load if it belongs to the pair, else "".
+        support_height: Height up to which the first body may touch the second one [m].
+    """
+
+    bodies: tuple[int, ...]
+    links: range
+    joints: range
+    body_name: str = ""
+    load_name: str = ""
+    support_height: float = -math.inf
 
 
 class ClosestApproach(NamedTuple):
@@ -66,11 +82,11 @@ class ClearanceChecker:
     under the tool, which may touch the table and the floors of bins.
 
     Two bodies whose distance is known need no further query until a part of the arm may have moved by that
-    distance. The upper bound of the movement is the sum of all joint movements, each multiplied by the length
-    of the arm beyond the joint.
+    distance. The upper bound of the movement is the sum of the joint movements, each multiplied by the
+    maximum distance of a point of the arm from the axis of the joint.
 
     Attributes:
-        world: World of the check, whose arm is at the last checked joint positions.
+        world: World of the check, whose arm is at the last joint positions that needed a query.
     """
 
     def __init__(self, config: CellConfig) -> None:
@@ -78,15 +94,9 @@ class ClearanceChecker:
         self._margin = config.motion.margin
         self._get_cylinder = functools.cache(self._add_cylinder)
         """Returns the body of the load (number 0) or of an obstacle, by radius [m], height [m] and number."""
-        self._obstacles: dict[str, tuple[int, ...]] = {}
-        """Bodies of the current obstacles, by name."""
-        # The functions are looked up once, because a look-up takes as long as a call.
+        # The function is looked up once, because a look-up takes as long as a call.
         self._get_points = self.world.client.getClosestPoints
         self._reach = self._compute_reach()
-        self._movement = 0.0
-        """Upper bound of the movement of a point of arm or load since the start of the path [m]."""
-        self._clear_until: dict[tuple[int, ...], float] = {}
-        """Movement [m] up to which two bodies are farther apart than the margin, by bodies and links."""
 
     def check(self, path: Array, task: Task = Task()) -> None:
         """Check that the joint positions along a path `(N, n)` [rad] keep the margin of the cell file.
@@ -94,36 +104,41 @@ class ClearanceChecker:
         Raises:
             Blocked: The path violates the margin; the message states bodies, distance and tool position.
         """
-        with self._place_obstacles(task.obstacles):
-            # A pair that starts closer than the margin must keep its initial distance until the pair has been
-            # apart by the margin once. Every other pair must keep the margin.
-            self._movement, self._clear_until = 0.0, {}
-            load = task.load.object_class if task.load else None
-            load_size = load.height + load.radius + load.contact_radius if load else 0.0
-            start_approaches = self._find_closest_approaches(path[0], task.load)
-            start_distances = {pair: approach.distance for pair, approach in start_approaches.items()}
-            for q, last_q in zip(path[1:], path, strict=False):
-                self._movement += float(np.abs(q - last_q) @ (self._reach + load_size))
-                approaches = self._find_closest_approaches(q, task.load)
-                for pair, approach in approaches.items():
-                    min_distance = min(approach.min_distance, start_distances.get(pair, math.inf))
-                    if approach.distance < min_distance - ROUNDING_ERROR:
-                        raise Blocked(self._describe_violation(approach))
-                start_distances = {pair: d for pair, d in start_distances.items() if pair in approaches}
-
-    def _find_closest_approaches(self, q: Array, load: Load | None) -> dict[tuple[str, str], ClosestApproach]:
-        """Return the closest approach of each pair of part and body within the margin at `q` `(n,)` [rad]."""
-        closest: dict[tuple[str, str], ClosestApproach] = {}
-        for approach in self._find_approaches(q, load):
-            pair = approach.part, approach.body
-            if pair not in closest or approach.clearance < closest[pair].clearance:
-                closest[pair] = approach
-        return closest
+        load = task.load.object_class if task.load else None
+        load_size = load.height + load.radius + load.contact_radius if load else 0.0
+        pairs = self._list_pairs(load, self._place_obstacles(task.obstacles))
+        movements = np.abs(np.diff(path, axis=0, prepend=path[:1])).cumsum(axis=0) * (self._reach + load_size)
+        # Upper bound of the movement since the start of the path [m], by pair and state.
+        pair_movements = [movements[:, pair.joints].sum(axis=1).tolist() for pair in pairs]
+        # Movement up to which the bodies of each pair are farther apart than the margin [m].
+        clear_until = [0.0] * len(pairs)
+        # A part that starts closer to a body than the margin must keep its initial distance until it has been
+        # apart by the margin once. Every other part must keep the margin.
+        start_distances: dict[tuple[str, str], float] = {}
+        for index, q in enumerate(path):
+            due = [pair for pair in range(len(pairs)) if pair_movements[pair][index] >= clear_until[pair]]
+            if due:
+                self._place_arm(q, load)
+            closest: dict[tuple[str, str], ClosestApproach] = {}
+            for pair in due:
+                distance, approaches = self._measure_distance(pairs[pair])
+                clear_until[pair] = pair_movements[pair][index] + distance - self._margin - ROUNDING_ERROR
+                for approach in approaches:
+                    key = approach.part, approach.body
+                    closest[key] = min(closest.get(key, approach), approach, key=attrgetter("clearance"))
+            if index == 0:
+                start_distances = {key: approach.distance for key, approach in closest.items()}
+            start_distances = {key: start_distances[key] for key in closest if key in start_distances}
+            for key, approach in closest.items():
+                min_distance = min(approach.min_distance, start_distances.get(key, math.inf))
+                if approach.distance < min_distance - ROUNDING_ERROR:
+                    raise Blocked(self._describe_violation(approach))
 
     def find_violation(self, q: Array) -> ClosestApproach | None:
         """Return the closest approach of the unloaded arm at `q` `(n,)` [rad], or None if it is allowed."""
-        self._movement, self._clear_until = 0.0, {}
-        closest = min(self._find_approaches(q, None), key=lambda approach: approach.distance, default=None)
+        self._place_arm(q, None)
+        approaches = [a for pair in self._list_pairs(None, []) for a in self._measure_distance(pair)[1]]
+        closest = min(approaches, key=attrgetter("distance"), default=None)
         return closest if closest and closest.distance < closest.min_distance - ROUNDING_ERROR else None
 
     def close(self) -> None:
@@ -137,82 +152,91 @@ class ClearanceChecker:
             f"the minimum clearance is {self._margin:.3f} m"
         )
 
-    def _find_approaches(self, q: Array, load: Load | None) -> Iterator[ClosestApproach]:
-        """Yield the approaches of arm, tool and load within the margin at `q` `(n,)` [rad]."""
-        world, arm = self.world, self.world.arm
-        first_link, name_link = world.robot.first_collision_link, world.name_link
-        world.client.resetJointStatesMultiDof(arm, range(len(q)), [[angle] for angle in q])
-        bodies = [("the table", world.table), *world.bin_bodies.items()]
-        bodies += [(name, body) for name, cylinders in self._obstacles.items() for body in cylinders]
-        for name, body in bodies:
-            for points in self._find_points((arm, body), range(first_link, world.tool_index + 1)):
-                yield ClosestApproach(name_link(points[LINK_A]), name, points[DISTANCE], self._margin)
-        for link_a, link_b in world.robot.self_collision_pairs:
-            for points in self._find_points((arm, arm, link_a, link_b)):
-                yield ClosestApproach(name_link(link_a), name_link(link_b), points[DISTANCE], self._margin)
-        if load is not None:
-            yield from self._find_load_approaches(load.object_class, bodies)
+    def _list_pairs(self, load: ObjectClass | None, obstacles: Sequence[tuple[str, int]]) -> list[BodyPair]:
+        """Return all pairs; `obstacles` contains name and body of each obstacle."""
+        world, robot = self.world, self.world.robot
+        bodies = [("the table", world.table), *world.bin_bodies.items(), *obstacles]
+        joints, links = range(robot.joint_count), range(robot.first_collision_link, world.tool_index + 1)
+        pairs = [BodyPair((world.arm, body), links, joints, body_name=name) for name, body in bodies]
+        for link_a, link_b in robot.self_collision_pairs:
+            moving_joints = joints[min(link_a, link_b) + 1 : max(link_a, link_b) + 1]
+            bodies_and_links = (world.arm, world.arm, link_a, link_b)
+            pairs.append(
+                BodyPair(bodies_and_links, range(link_a, link_a + 1), moving_joints, world.name_link(link_b))
+            )
+        if load is None:
+            return pairs
+        load_body, name = self._get_load_body(load), name_load(load.label)
+        for body_name, body in bodies:
+            support_height = -math.inf
+            if body == world.table or body_name in world.bin_bodies:
+                bin = world.config.bins.get(body_name)
+                support_height = (bin.position[2] if bin else 0.0) + BIN_THICKNESS + SUPPORT_TOLERANCE
+            pairs.append(BodyPair((load_body, body), range(-1, 0), joints, body_name, name, support_height))
+        lower_links = range(robot.first_collision_link, robot.wrist_link)
+        pairs.append(
+            BodyPair((world.arm, load_body), lower_links, joints[lower_links.start + 1 :], load_name=name)
+        )
+        return pairs
 
-    def _find_points(
-        self, pair: tuple[int, ...], links: Container[int] | None = None
-    ) -> Sequence[ClosestPoints]:
-        """Return the closest points within the margin of two bodies, or of one link of each body.
+    def _measure_distance(self, pair: BodyPair) -> tuple[float, list[ClosestApproach]]:
+        """Return distance [m] and approaches of a pair.
 
-        With `links`, only these links of the first body count. No query is needed while the bodies cannot
-        have moved to within the margin since the last query.
+        The distance is at most `SEARCH_DISTANCE` beyond the margin; the approaches are within the margin.
         """
-        if self._movement < self._clear_until.get(pair, -math.inf):
-            return ()
-        body_a, body_b, *link_pair = pair
+        body_a, body_b, *link_pair = pair.bodies
         max_distance = self._margin + SEARCH_DISTANCE
         all_points = self._get_points(body_a, body_b, max_distance, *link_pair)
-        all_points = [points for points in all_points if links is None or points[LINK_A] in links]
-        distance = min((points[DISTANCE] for points in all_points), default=max_distance)
-        self._clear_until[pair] = self._movement + distance - self._margin - ROUNDING_ERROR
-        return [points for points in all_points if points[DISTANCE] <= self._margin]
+        all_points = [points for points in all_points if points[LINK_A] in pair.links]
+        approaches = [
+            ClosestApproach(
+                pair.load_name or self.world.name_link(points[LINK_A]),
+                pair.body_name or self.world.name_link(points[LINK_A]),
+                points[DISTANCE],
+                0.0 if points[POSITION_B][2] <= pair.support_height else self._margin,
+            )
+            for points in all_points
+            if points[DISTANCE] <= self._margin
+        ]
+        return min((points[DISTANCE] for points in all_points), default=max_distance), approaches
 
-    def _find_load_approaches(
-        self, load: ObjectClass, bodies: Sequence[tuple[str, int]]
-    ) -> Iterator[ClosestApproach]:
-        """Yield the approaches within the margin of the load to the arm and to the named `bodies`."""
-        world, client, robot = self.world, self.world.client, self.world.robot
-        load_body = self._get_cylinder(load.radius + load.contact_radius, load.height, 0)
-        flange = client.getLinkState(world.arm, world.flange_index, computeForwardKinematics=True)[4:6]
-        offset = robot.flange_offset + world.config.tool.length + load.height / 2
-        load_pose = client.multiplyTransforms(*flange, [0, 0, offset], [0, 0, 0, 1])
-        client.resetBasePositionAndOrientation(load_body, *load_pose)
-        part = name_load(load.label)
-        for name, body in bodies:
-            bin = world.config.bins.get(name)
-            max_support_height = (bin.position[2] if bin else 0.0) + BIN_THICKNESS + SUPPORT_TOLERANCE
-            for points in self._find_points((load_body, body)):
-                is_low = points[POSITION_B][2] <= max_support_height
-                min_distance = 0.0 if is_low and name not in self._obstacles else self._margin
-                yield ClosestApproach(part, name, points[DISTANCE], min_distance)
-        links = range(robot.first_collision_link, robot.wrist_link)
-        for points in self._find_points((world.arm, load_body), links):
-            yield ClosestApproach(part, world.name_link(points[LINK_A]), points[DISTANCE], self._margin)
+    def _place_arm(self, q: Array, load: ObjectClass | None) -> None:
+        """Move the arm to joint positions `(n,)` [rad], with the load under the tool."""
+        world, client = self.world, self.world.client
+        client.resetJointStatesMultiDof(world.arm, range(len(q)), [[angle] for angle in q])
+        if load is not None:
+            flange = client.getLinkState(world.arm, world.flange_index, computeForwardKinematics=True)[4:6]
+            offset = world.robot.flange_offset + world.config.tool.length + load.height / 2
+            load_pose = client.multiplyTransforms(*flange, [0, 0, offset], [0, 0, 0, 1])
+            client.resetBasePositionAndOrientation(self._get_load_body(load), *load_pose)
+
+    def _get_load_body(self, load: ObjectClass) -> int:
+        """Return the cylinder of a load."""
+        return self._get_cylinder(load.radius + load.contact_radius, load.height, 0)
 
     def _compute_reach(self) -> Array:
         """Return the maximum distance of a point of the arm from the axis of each joint `(n,)` [m]."""
-        world = self.world
-        states = world.client.getLinkStates(world.arm, range(world.robot.joint_count))
-        origins = np.array([*(state[4] for state in states), world.get_tool_pose().position])
-        lengths = np.linalg.norm(np.diff(origins, axis=0), axis=1)
-        return np.cumsum(lengths[::-1])[::-1] + world.robot.link_radius
+        client, world, joints = self.world.client, self.world, range(self.world.robot.joint_count)
+        states = client.getLinkStates(world.arm, joints, computeForwardKinematics=True)
+        axes = [
+            client.rotateVector(state[5], client.getJointInfo(world.arm, joint)[JOINT_AXIS])
+            for joint, state in zip(joints, states, strict=True)
+        ]
+        links = np.diff([*(state[4] for state in states), world.get_tool_pose().position], axis=0)
+        lengths = np.linalg.norm(links, axis=1)
+        # The link of a joint counts only with its component perpendicular to the axis of the joint.
+        perpendicular_lengths = np.linalg.norm(np.cross(axes, links), axis=1)
+        return perpendicular_lengths + lengths[::-1].cumsum()[::-1] - lengths + world.robot.link_radius
 
-    @contextmanager
-    def _place_obstacles(self, obstacles: Sequence[Obstacle]) -> Iterator[None]:
-        """Represent the obstacles by cylinders on the table until the context ends."""
+    def _place_obstacles(self, obstacles: Sequence[Obstacle]) -> list[tuple[str, int]]:
+        """Represent the obstacles by cylinders on the table; return name and body of each obstacle."""
+        placed_obstacles = []
         for number, obstacle in enumerate(obstacles, 1):
             body = self._get_cylinder(round(obstacle.radius, 4), round(obstacle.top, 4), number)
             position = [obstacle.x, obstacle.y, obstacle.top / 2]
             self.world.client.resetBasePositionAndOrientation(body, position, [0, 0, 0, 1])
-            self._obstacles[obstacle.name] = (*self._obstacles.get(obstacle.name, ()), body)
-        try:
-            yield
-        finally:
-            self._obstacles = {}
+            placed_obstacles.append((obstacle.name, body))
+        return placed_obstacles
 
     def _add_cylinder(self, radius: float, height: float, number: int) -> int:
         """Add a cylinder and return the body; `number` distinguishes cylinders of equal size in the cache."""

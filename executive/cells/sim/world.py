@@ -38,6 +38,8 @@ MAX_RAY_LENGTH, RAY_RESTART_DISTANCE = 5.0, 1e-4
 """Maximum length of a ray, and distance behind a hit of the arm at which the ray is cast again [m]."""
 BODY_B, LINK_A, POSITION_A, POSITION_B, DISTANCE, NORMAL_FORCE = 2, 3, 5, 6, 8, 9
 """Indices of values in a contact point or closest point of PyBullet, for a query with the bodies A and B."""
+JOINT_AXIS = 13
+"""Index of the axis of the joint in the information about a joint of PyBullet."""
 
 
 class World:
