@@ -152,8 +152,8 @@ class Iiwa14:
         elbow_direction = np.outer(np.cos(angles), up) + np.outer(np.sin(angles), side)
         # Frame 3: z along the upper arm, y normal to the triangle of shoulder, elbow and wrist.
         z3 = math.cos(upper_arm_angle) * wrist_direction + math.sin(upper_arm_angle) * elbow_direction
-        y3 = np.cross(wrist_direction, elbow_direction)
-        x3 = np.asarray(np.cross(y3, z3), dtype=np.float64)
+        y3 = np.outer(np.cos(angles), side) - np.outer(np.sin(angles), up)
+        x3 = math.cos(upper_arm_angle) * elbow_direction - math.sin(upper_arm_angle) * wrist_direction
         x4 = math.cos(q4) * x3 + math.sin(q4) * z3
         z4 = -math.sin(q4) * x3 + math.cos(q4) * z3
         R_47 = np.stack([x4, y3, z4], axis=-2) @ X_WT.rotation

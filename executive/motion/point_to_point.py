@@ -6,6 +6,8 @@ between the states is not prescribed, so that the caller must check the joint po
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, RuckigError
 from ruckig import Trajectory as Profile
@@ -58,13 +60,13 @@ class Connector:
             Fault: A state lacks a finite number for a joint; ruckig would read out of bounds or crash.
         """
         joint_count = self.limits.joint_count
-        for values in (*start, *end):
-            if values.shape != (joint_count,) or not np.isfinite(values.sum()):
-                raise Fault(f"a motion needs states of {joint_count} finite numbers, not {values}")
+        vectors = [vector.tolist() for vector in (*start, *end)]
+        for vector in vectors:
+            if len(vector) != joint_count or not math.isfinite(sum(vector)):
+                raise Fault(f"a motion needs states of {joint_count} finite numbers, not {vector}")
         inputs, profile = self._inputs, Profile(joint_count)
-        inputs.current_position, inputs.target_position = start.q.tolist(), end.q.tolist()
-        inputs.current_velocity, inputs.target_velocity = start.qd.tolist(), end.qd.tolist()
-        inputs.current_acceleration, inputs.target_acceleration = start.qdd.tolist(), end.qdd.tolist()
+        inputs.current_position, inputs.current_velocity, inputs.current_acceleration = vectors[:3]
+        inputs.target_position, inputs.target_velocity, inputs.target_acceleration = vectors[3:]
         inputs.minimum_duration = min_duration
         cause: str | None = None
         try:

@@ -33,7 +33,7 @@ MAX_CANDIDATES = 4
 """Maximum number of candidates for the end of a motion."""
 COMPARED_CANDIDATES = 2
 """Number of candidates whose motions are compared; the next ones are used if all motions are blocked."""
-INITIAL_STEP_COUNT = 4
+INITIAL_STEP_COUNT = 2
 """Number of optimization steps for the detour to each candidate."""
 REFINEMENT_STEP_COUNT = 8
 """Number of further optimization steps for a detour before it is returned."""
@@ -130,31 +130,37 @@ class MotionSearch:
     def _plan_direct_motions_and_detours(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
         """Plan and yield direct motions without collision and refined detours, the fastest first."""
         motions, optimizers = self._evaluate_candidates(candidates)
-        next_costs = [*(_compute_total_cost(*pair) for pair in optimizers), math.inf][1:]
+        next_costs = [*(self._compute_total_cost(*pair) for pair in optimizers), math.inf][1:]
+        slower_detours: list[tuple[Candidate, Optimizer]] = []
         for (candidate, optimizer), next_cost in zip(optimizers, next_costs, strict=True):
             optimizer.improve(REFINEMENT_STEP_COUNT)
-            while motions and motions[0][0] <= _compute_total_cost(candidate, optimizer):
+            cost = self._compute_total_cost(candidate, optimizer)
+            while motions and motions[0][0] <= cost:
                 yield motions.pop(0)[1]
-            motions = sorted([*motions, *self._build_detours(candidate, optimizer)], key=itemgetter(0))
+            detours = list(self._build_detour(candidate, optimizer, keeps_timing=False))
+            if not detours or detours[0][0] > cost:
+                detours += self._build_detour(candidate, optimizer, keeps_timing=True)
+            else:
+                slower_detours.append((candidate, optimizer))
+            motions = sorted([*motions, *detours], key=itemgetter(0))
             # A detour may take longer than the cost of its optimizer; then the next detour is refined first.
             while motions and motions[0][0] <= MAX_DURATION_FACTOR * next_cost:
                 yield motions.pop(0)[1]
         yield from (motion for _, motion in motions)
+        for candidate, optimizer in slower_detours:
+            yield from (motion for _, motion in self._build_detour(candidate, optimizer, keeps_timing=True))
 
-    def _build_detours(
-        self, candidate: Candidate, optimizer: Optimizer
+    def _build_detour(
+        self, candidate: Candidate, optimizer: Optimizer, *, keeps_timing: bool
     ) -> Iterator[tuple[float, Trajectory]]:
-        """Yield two detours as pairs `(duration [s], motion)`.
+        """Yield a detour as a pair `(duration [s], motion)`, unless it exceeds a joint limit.
 
-        The first detour passes the states of the optimizer in minimum time, the second one with the timing of
-        the optimizer. The duration includes the slowdown for the load; the motion is not slowed down.
+        The detour passes the states of the optimizer with the timing of the optimizer or in minimum time. The
+        duration includes the slowdown for the load; the motion is not slowed down.
         """
-        for keeps_timing in (False, True):
-            with contextlib.suppress(JointLimitError):
-                free_part = optimizer.connect_states(keeps_timing=keeps_timing)
-                motion = self._build_motion(candidate, *free_part)
-                safe_motion = self._payload.make_safe_motion(motion) if self._payload else motion
-                yield safe_motion.duration, motion
+        with contextlib.suppress(JointLimitError):
+            motion = self._build_motion(candidate, *optimizer.connect_states(keeps_timing=keeps_timing))
+            yield (self._payload.make_safe_motion(motion) if self._payload else motion).duration, motion
 
     def _evaluate_candidates(
         self, candidates: Sequence[Candidate]
@@ -168,8 +174,11 @@ class MotionSearch:
         optimizers: list[tuple[Candidate, Optimizer]] = []
         for candidate in candidates:
             costs = [duration for duration, _ in direct_motions]
-            costs += [_compute_total_cost(*pair) for pair in optimizers]
-            if min(costs, default=math.inf) <= candidate.min_duration + candidate.arrival_duration:
+            costs += [self._compute_total_cost(*pair) for pair in optimizers]
+            if (
+                min(costs, default=math.inf)
+                <= self._compute_straight_duration(candidate) + candidate.min_duration
+            ):
                 break
             problem = OptimizationProblem(
                 self._start, candidate.free_part_end, self._connector, self._kinematics, self._clearance,
@@ -179,8 +188,8 @@ class MotionSearch:
                 free_part = self._connector.connect(self._start, candidate.free_part_end)
                 qs = free_part.sample(SAMPLE_FRACTIONS * free_part.duration).q
                 if problem.compute_slack(qs).min() >= 0:
-                    duration = free_part.duration + candidate.arrival_duration
-                    direct_motions.append((duration, self._build_motion(candidate, free_part)))
+                    motion = self._build_motion(candidate, free_part)
+                    direct_motions.append((motion.duration, motion))
                     continue
                 slow_part = self._connect_by_via_points(candidate, EXTRA_HEIGHTS[0], prefers_lines=False)
                 duration = sum(piece.duration for piece in slow_part)
@@ -189,8 +198,16 @@ class MotionSearch:
                 optimizer.improve(INITIAL_STEP_COUNT)
                 optimizers.append((candidate, optimizer))
         direct_motions.sort(key=itemgetter(0))
-        optimizers.sort(key=lambda pair: _compute_total_cost(*pair))
+        optimizers.sort(key=lambda pair: self._compute_total_cost(*pair))
         return direct_motions, optimizers
+
+    def _compute_total_cost(self, candidate: Candidate, optimizer: Optimizer) -> float:
+        """Return the cost of a detour plus the duration of departure and arrival [s]."""
+        return optimizer.cost + self._compute_straight_duration(candidate)
+
+    def _compute_straight_duration(self, candidate: Candidate) -> float:
+        """Return the duration of departure and arrival [s]."""
+        return (self._departure.duration if self._departure else 0.0) + candidate.arrival_duration
 
     def _build_motion(self, candidate: Candidate, *free_part: MotionPiece) -> Trajectory:
         """Return the motion that consists of departure, free part, and arrival."""
@@ -279,8 +296,3 @@ class MotionSearch:
             waypoints, length, self._limits, max_acceleration=acceleration, ends_in_motion=True
         )
         return line if self._straight_length or line.max_acceleration >= acceleration else None
-
-
-def _compute_total_cost(candidate: Candidate, optimizer: Optimizer) -> float:
-    """Return the cost of a detour plus the duration of the arrival [s]."""
-    return optimizer.cost + candidate.arrival_duration

@@ -29,7 +29,7 @@ from executive.motion.joints import JointLimits, JointState
 
 STEP_COUNT = 8
 """Number of time steps of a motion."""
-SAMPLES_PER_STEP = 16
+SAMPLES_PER_STEP = 12
 """Number of joint positions per time step at which distances are evaluated."""
 SAMPLE_FRACTIONS = np.arange(1, STEP_COUNT * SAMPLES_PER_STEP) / (STEP_COUNT * SAMPLES_PER_STEP)
 """Times of the samples as fractions of the duration `(M,)`, without start and end."""
