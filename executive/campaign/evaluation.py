@@ -148,9 +148,8 @@ def measure_detector(
         with contextlib.closing(cell_detector), progress(f"running {detector.name}") as update:
             return evaluate.evaluate(
                 cell_detector, _iterate_with_progress(samples, update), mistakes=mistakes,
-                localizer=_build_localizer(cell_of_images) if cell_of_images else None,
-                table=cell_of_images.table if cell_of_images else None, threshold=settings.threshold,
-                is_partial=camera is not None and camera.partial_views,
+                localizer=_build_localizer(cell_of_images) if cell_of_images else None, cell=cell_of_images,
+                threshold=settings.threshold,
             )  # fmt: skip
 
 

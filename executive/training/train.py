@@ -8,10 +8,9 @@ from pathlib import Path
 
 from executive.errors import InputError
 from executive.perception.detectors.onnx_model import read_labels
-from executive.training.annotations import COCO_FILE_NAME, YOLO_CLASS_FILES, read_annotations
 from executive.training.evaluation.evaluate import evaluate_folder, find_label_file
 from executive.training.model_card import read_epochs, render_card
-from executive.training.samples import list_splits
+from executive.training.samples import COCO_FILE_NAME, YOLO_CLASS_FILES, list_splits, read_annotations
 
 ReportEpoch = Callable[[int, dict[str, float]], None]
 """Called after each epoch with its number, from 1, and its metrics by name."""

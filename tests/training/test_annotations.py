@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 
 from executive.errors import InputError
-from executive.training.annotations import read_annotations
-from executive.training.samples import Samples
+from executive.training.samples import Samples, read_annotations
 
 Content = dict[str, Any]
 

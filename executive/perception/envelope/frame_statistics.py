@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import cv2
 import numpy as np
 
-from executive.cell.config import Section, TableConfig
+from executive.cell.config import CellConfig, Section
 from executive.cell.frame import Frame
 from executive.perception.camera_model import compute_hull_mask
 
@@ -62,15 +62,15 @@ class FrameRange(Section):
         return "; ".join(differences)
 
 
-def compute_frame_statistics(
-    frame: Frame, table: TableConfig, *, is_partial: bool = False
-) -> FrameStatistics | None:
+def compute_frame_statistics(frame: Frame, cell: CellConfig) -> FrameStatistics | None:
     """Return the statistics of the workspace; None if a corner is not in view or few pixels are visible.
 
-    With `is_partial`, the corners may be out of view, but a larger part of the image must show the workspace.
+    The corners may be out of the partial view of a camera, but a larger part of the image must then show the
+    workspace.
     """
+    is_partial = next(iter(cell.cameras.values())).partial_views
     height, width = frame.image.shape[:2]
-    corners = np.array([(x, y, 0.0) for x in table.x for y in table.y])
+    corners = np.array([(x, y, 0.0) for x in cell.table.x for y in cell.table.y])
     mask = compute_hull_mask(corners, frame.matrix, frame.X_WC, (width, height), may_be_cut=is_partial)
     min_pixels = MIN_FRACTION_OF_PARTIAL_VIEW * width * height if is_partial else MIN_PIXELS
     if mask is None or np.count_nonzero(mask := mask & frame.visible) < min_pixels:

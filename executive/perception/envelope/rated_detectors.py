@@ -53,9 +53,7 @@ class RatedDetector:
     def request(self, frame: Frame, view: str) -> ChangedRequest:
         """Start the detection; outside the measured conditions, the answer has assumed error rates."""
         error_rates, frame_range = self.envelope.error_rates, self.envelope.frame_range
-        is_partial = next(iter(self.config.cameras.values())).partial_views
-        table = self.config.table
-        statistics = compute_frame_statistics(frame, table, is_partial=is_partial) if frame_range else None
+        statistics = compute_frame_statistics(frame, self.config) if frame_range else None
         if frame_range and statistics and (difference := frame_range.describe_difference(statistics)):
             reason = (
                 f"the workspace differs from all images with which detector {self.name} was measured: "

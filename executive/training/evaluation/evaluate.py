@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell.config import DetectorConfig, TableConfig
+from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.detection import Answer, Detection
 from executive.cell.frame import Box
 from executive.cell.protocols import Localizer
@@ -33,8 +33,7 @@ MODEL_NAME = "model"
 
 def evaluate(
     detector: CellDetector, samples: Iterable[LabelledImage], *, threshold: float | None = None,
-    localizer: Localizer | None = None, mistakes: WorstMistakes | None = None,
-    table: TableConfig | None = None, is_partial: bool = False,
+    localizer: Localizer | None = None, mistakes: WorstMistakes | None = None, cell: CellConfig | None = None,
 ) -> Evaluation:  # fmt: skip
     """Return the accuracy of a detector on labelled images; ignored objects do not count.
 
@@ -44,8 +43,7 @@ def evaluate(
         threshold: Minimum confidence of a detection; None: the threshold of the detector.
         localizer: Computes positions, which are compared with the true positions; None: no comparison.
         mistakes: Collects the missed objects and detections with the worst errors; None: no collection.
-        table: Workspace whose brightness, contrast and colours are measured; None: no measurement.
-        is_partial: True if the images may show only a part of the workspace.
+        cell: Cell whose workspace is measured: brightness, contrast and colours; None: no measurement.
     """
     errors, repeated_errors = ErrorStatistics(localizer), RepeatedErrors(localizer)
     average_precision = AveragePrecision()
@@ -71,9 +69,7 @@ def evaluate(
                 second_answer, _ = detector.detect(replace(frame, image=sample.second_image))
                 second_matches = _match_confident(second_answer, sample, min_confidence)
                 repeated_errors.add(matches, second_matches, sample, frame)
-        if table is not None and (
-            frame_statistics := compute_frame_statistics(frame, table, is_partial=is_partial)
-        ):
+        if cell is not None and (frame_statistics := compute_frame_statistics(frame, cell)):
             statistics_of_frames.append(frame_statistics)
         if mistakes is not None:
             mistakes.add(matches, sample)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,14 +15,20 @@ from executive.perception.envelope.frame_statistics import (
     compute_frame_statistics,
 )
 
-TABLE = TableConfig()
 WOOD = (220, 200, 160)
+
+
+def cell(**table):
+    """A cell whose camera sees the whole workspace."""
+    return SimpleNamespace(
+        table=TableConfig(**table), cameras={"overhead": SimpleNamespace(partial_views=False)}
+    )
 
 
 def test_a_few_objects_change_neither_brightness_nor_colours_of_the_table():
     frame = frame_of(WOOD)
     frame.image[200:260, 280:360] = (10, 10, 10)
-    statistics = compute_frame_statistics(frame, TABLE)
+    statistics = compute_frame_statistics(frame, cell())
     assert (statistics["red"], statistics["green"], statistics["blue"]) == WOOD
     assert statistics["brightness"] == pytest.approx(sum(WOOD) / 3)
     assert statistics["contrast"] == 0
@@ -30,17 +37,17 @@ def test_a_few_objects_change_neither_brightness_nor_colours_of_the_table():
 def test_what_lies_beside_the_workspace_does_not_count():
     frame = frame_of((0, 0, 0))
     frame.image[140:310, 230:410] = WOOD
-    assert compute_frame_statistics(frame, TableConfig(x=(0.48, 0.55), y=(-0.1, 0.1)))["red"] == WOOD[0]
+    assert compute_frame_statistics(frame, cell(x=(0.48, 0.55), y=(-0.1, 0.1)))["red"] == WOOD[0]
 
 
 def test_a_frame_that_shows_the_workspace_in_part_says_nothing():
-    assert compute_frame_statistics(frame_of(WOOD), TableConfig(x=(0.4, 2.0))) is None
+    assert compute_frame_statistics(frame_of(WOOD), cell(x=(0.4, 2.0))) is None
     hidden = replace(frame_of(WOOD), visible=np.zeros((480, 640), bool))
-    assert compute_frame_statistics(hidden, TABLE) is None
+    assert compute_frame_statistics(hidden, cell()) is None
 
 
 def test_a_frame_within_the_tolerance_of_the_range_is_no_difference_and_a_darker_one_is():
-    frames = [compute_frame_statistics(frame_of(colour), TABLE) for colour in (WOOD, (200, 180, 150))]
+    frames = [compute_frame_statistics(frame_of(colour), cell()) for colour in (WOOD, (200, 180, 150))]
     measured = FrameRange.compute([frame for frame in frames if frame])
     assert measured.brightness == (176.7, 193.3)
     near = {"brightness": 170.0, "contrast": 0.0, "red": 195.0, "green": 175.0, "blue": 145.0}
