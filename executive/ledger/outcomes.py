@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 
 from executive.ledger.certainty import Certainty
 from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, State
@@ -92,15 +91,6 @@ def discard_moved_items(records: Collection[ItemRecord], dropped: Collection[Ite
             new_items.remove(new_item)
             phantoms.append(lost_item)
     return phantoms
-
-
-def count_states(records: Iterable[ItemRecord]) -> dict[str, int]:
-    """Return the number of items by final state; the key `seen` counts all items except phantoms."""
-    counts = Counter(record.state for record in records)
-    return {
-        "seen": sum(counts.values()) - counts[State.PHANTOM],
-        **{state.value: counts[state] for state in (*FINAL_STATES, State.PHANTOM)},
-    }
 
 
 def is_balanced(counts: Mapping[str, int]) -> bool:

@@ -246,7 +246,9 @@ class Tracker(LedgerQueries):
 
     def count_states(self) -> dict[str, int]:
         """Return the number of items by final state; the key `seen` counts all items except phantoms."""
-        return outcomes.count_states(self.records)
+        counts = Counter(record.state for record in self._records)
+        totals = {state.value: counts[state] for state in (*outcomes.FINAL_STATES, State.PHANTOM)}
+        return {"seen": counts.total() - counts[State.PHANTOM], **totals}
 
     def list_items(self) -> Sequence[ItemChanged]:
         """Return the current state of each item, in the order of the first detection."""
