@@ -82,9 +82,8 @@ def load_behaviour(path: str) -> type[Skill]:
         suggestion = f' (did you mean "{similar}"?)' if similar else ""
         raise InputError(f'the module "{module}" defines no class "{name}"{suggestion}')
     if not (isinstance(behaviour, type) and issubclass(behaviour, Behaviour)):
-        raise InputError(
-            f'"{path}" is not a behaviour of py_trees, a subclass of py_trees.behaviour.Behaviour'
-        )
+        problem = "is not a behaviour of py_trees, a subclass of py_trees.behaviour.Behaviour"
+        raise InputError(f'"{path}" {problem}')
     return _convert_to_skill(name, path, behaviour)
 
 
@@ -108,10 +107,8 @@ def load_cell_kind(name: str) -> CellKind:
     """
     entries = list_entries(CELL_KIND_GROUP, "kind of cell")
     if name not in entries:
-        raise InputError(
-            f'no installed package offers cells of kind "{name}"; '
-            f"installed: {', '.join(sorted(entries)) or 'none'}"
-        )
+        installed = ", ".join(sorted(entries)) or "none"
+        raise InputError(f'no installed package offers cells of kind "{name}"; installed: {installed}')
     cell_kind: CellKind = entries[name].load()
     return cell_kind
 

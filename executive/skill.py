@@ -223,10 +223,8 @@ class Skill:
         inputs = {name: port for name, port in self.ports.items() if port.direction is Direction.IN}
         settings: dict[str, Param | Port] = {**self.params, **inputs}
         if (unknown_name := next((name for name in values if name not in settings), None)) is not None:
-            raise InputError(
-                f'{type(self).__name__} has no param or input "{unknown_name}"; '
-                f"it has: {', '.join(settings) or 'none'}"
-            )
+            names = ", ".join(settings) or "none"
+            raise InputError(f'{type(self).__name__} has no param or input "{unknown_name}"; it has: {names}')
         for name, setting in settings.items():
             value = values.get(name, setting.default)
             if value is ...:
@@ -265,10 +263,9 @@ class Skill:
             Fault: The skill does not declare `reason`.
         """
         if reason not in self.reasons:
-            raise Fault(
-                f'{type(self).__name__} raised the undeclared reason "{reason}"; '
-                f"it declares: {', '.join(self.reasons) or 'none'}"
-            )
+            reasons = ", ".join(self.reasons) or "none"
+            problem = f'raised the undeclared reason "{reason}"; it declares: {reasons}'
+            raise Fault(f"{type(self).__name__} {problem}")
         return SkillFailed(reason, message)
 
 

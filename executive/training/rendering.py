@@ -51,10 +51,8 @@ def generate_dataset(
     cells = list(configs.values())
     classes = list(cells[0].objects)
     if any(list(cell.objects) != classes for cell in cells):
-        raise InputError(
-            "the cells of one dataset must have the same classes in the same order; "
-            + "; ".join(f"{name} has {', '.join(cell.objects)}" for name, cell in configs.items())
-        )
+        found = "; ".join(f"{name} has {', '.join(cell.objects)}" for name, cell in configs.items())
+        raise InputError(f"the cells of one dataset must have the same classes in the same order; {found}")
     for name, cell in configs.items():
         for key, message in find_model_errors(cell):
             raise InputError(f"{name}: {'.'.join(map(str, key))}: {message}")

@@ -56,9 +56,8 @@ class DetectorConfig(Section):
     @model_validator(mode="after")
     def _check_floor(self) -> DetectorConfig:
         if self.floor > self.threshold:
-            raise ValueError(
-                f"needs a floor of at most its threshold, {self.threshold:g}, not {self.floor:g}"
-            )
+            problem = f"needs a floor of at most its threshold, {self.threshold:g}, not {self.floor:g}"
+            raise ValueError(problem)
         return self
 
     @property

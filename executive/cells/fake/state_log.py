@@ -61,9 +61,8 @@ def restore_world(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]
         arm.set_tool_pose(Pose(rotation.reshape(3, 3), position.reshape(3)))
         return int(state["steps"]), int(state["last_command"])
     except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
-        raise InputError(
-            f'the world cannot be rebuilt from "{path}": {error}; run the mission again from its start'
-        ) from error
+        problem = f'the world cannot be rebuilt from "{path}": {error}'
+        raise InputError(f"{problem}; run the mission again from its start") from error
 
 
 def _read_object(

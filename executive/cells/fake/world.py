@@ -71,10 +71,8 @@ class FakeWorld:
             InputError: The cell has no such class.
         """
         if label not in self.classes:
-            raise InputError(
-                f'no object of the class "{label}" can be put on the fake table. '
-                f"{suggest_choice(label, self.classes, 'The cell file has the classes')}"
-            )
+            hint = suggest_choice(label, self.classes, "The cell file has the classes")
+            raise InputError(f'no object of the class "{label}" can be put on the fake table. {hint}')
         position = np.array([x, y, self.classes[label].height / 2])
         fake_object = FakeObject(label, position, [position.copy()])
         self.objects.append(fake_object)

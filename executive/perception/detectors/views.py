@@ -129,14 +129,11 @@ def _find_unique(is_duplicate: NDArray[np.bool_]) -> list[int]:
 
 def _is_truncated(located_detection: LocatedDetection, size: tuple[int, int]) -> bool:
     """Return True if a box reaches a border of its region that is not a border of the image."""
-    (left, top, right, bottom), region = located_detection[0].box, located_detection[1]
+    detection, region = located_detection
     margin = MAX_TRUNCATION_DISTANCE * (region[2] - region[0])
-    return (
-        (region[0] > 0 and left - region[0] < margin)
-        or (region[1] > 0 and top - region[1] < margin)
-        or (region[2] < size[0] and region[2] - right < margin)
-        or (region[3] < size[1] and region[3] - bottom < margin)
-    )
+    is_inside_image = np.not_equal(region, (0, 0, *size))
+    distances = np.subtract(detection.box, region) * (1, 1, -1, -1)
+    return bool((is_inside_image & (distances < margin)).any())
 
 
 def _list_tile_starts(length: int, side: int) -> list[int]:
