@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 from executive.cell.protocols import Cell
 from executive.skill import In, Skill, port
+
+Plain: TypeAlias = str | int | float | bool
+"""Type of the values that a mission file can contain, without lists."""
 
 
 class IsEqual(Skill):
@@ -12,12 +17,8 @@ class IsEqual(Skill):
     The skill fails with `different` if the values are not equal.
     """
 
-    value: In[str | int | float | bool] = port(
-        compared_with="to", doc="the value to compare, for example `$target.label`"
-    )
-    to: In[str | int | float | bool] = port(
-        compared_with="value", doc="the expected value, for example `cube`"
-    )
+    value: In[Plain] = port(compared_with="to", doc="the value to compare, for example `$target.label`")
+    to: In[Plain] = port(compared_with="value", doc="the expected value, for example `cube`")
     reasons = ("different",)
     is_condition = True
 

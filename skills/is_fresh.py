@@ -16,8 +16,7 @@ class IsFresh(Skill):
 
     def run(self, cell: Cell) -> None:
         """Ask the ledger for actions of the robot since the detection."""
-        if not cell.ledger.is_fresh(self.target):
-            item, stamp = self.target.item, self.target.stamp
-            raise self.failure(
-                "stale", f"the robot may have moved {item} since its detection at {stamp:.2f} s"
-            )
+        target = self.target
+        if not cell.ledger.is_fresh(target):
+            message = f"the robot may have moved {target.item} since its detection at {target.stamp:.2f} s"
+            raise self.failure("stale", message)

@@ -70,9 +70,8 @@ class BehaviourSkill(Skill):
         if status is Status.FAILURE:
             raise self.failure("failed", _explain_failure(behaviour))
         if status is not Status.SUCCESS:
-            raise Fault(
-                "its status is INVALID after a tick; update() must return RUNNING, SUCCESS or FAILURE"
-            )
+            advice = "update() must return RUNNING, SUCCESS or FAILURE"
+            raise Fault(f"its status is INVALID after a tick; {advice}")
         for name, port in self.ports.items():
             # A required output without a value remains unset: the caller then reports a fault of the skill.
             if port.direction is Direction.OUT and (values[name] is not None or port.default is None):

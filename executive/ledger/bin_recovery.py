@@ -75,9 +75,8 @@ class BinRecovery:
             max_unknown_count = sum(detected_counts.values()) - self._bins.count_objects_in(bin_name)
             wrong_labels = {label for label in labels if bin_name not in self._bins.routes.get(label, ())}
             for label in sorted(labels, key=lambda label: (label in wrong_labels, label)):
-                known_count = sum(
-                    (item.detected_label, item.bin) == (label, bin_name) for item in self._records
-                )
+                key = (label, bin_name)
+                known_count = sum((item.detected_label, item.bin) == key for item in self._records)
                 unknown_count = max(min(detected_counts[label] - known_count, max_unknown_count), 0)
                 max_unknown_count -= unknown_count
                 yield from [(label, bin_name)] * unknown_count

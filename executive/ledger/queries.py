@@ -134,9 +134,8 @@ class LedgerQueries:
         record = self._records.find(item)
         if self._is_class_certain_by_weight(record):
             return [record.label]
-        similar_classes = (
-            other for other in self.classes.values() if other.detected_label == record.detected_label
-        )
+        detected_label = record.detected_label
+        similar_classes = (other for other in self.classes.values() if other.detected_label == detected_label)
         return [record.label, *(other.label for other in similar_classes if other.label != record.label)]
 
     def describe(self, item: Item) -> KnownItem:

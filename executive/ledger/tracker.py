@@ -121,9 +121,8 @@ class Tracker(LedgerQueries):
         """Update the class of an item by its weight, and return "" or a contradiction."""
         record, classes = self._records.find(item), self.classes
         log_ratios = compute_weight_log_ratios(weight, std, classes)
-        record.belief.add_weighing(
-            log_ratios, {label: other.detected_label for label, other in classes.items()}
-        )
+        label_map = {label: other.detected_label for label, other in classes.items()}
+        record.belief.add_weighing(log_ratios, label_map)
         contradiction = ""
         if not self._is_class_certain_by_weight(record):
             contradiction = record.last_contradiction = describe_weight(weight, record.label, classes)

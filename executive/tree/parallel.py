@@ -161,9 +161,8 @@ class Parallel(ControlNode):
             ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
         else:
             ends = [end.tool_states for end in successes]
-            success = success.with_variables(
-                name for end in successes for name in end.written_variables or ()
-            )
+            names = (name for end in successes for name in end.written_variables or ())
+            success = success.with_variables(names)
         return success.with_tool_states(combine_tool_states(state.tool_states, ends))
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:

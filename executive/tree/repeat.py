@@ -137,9 +137,8 @@ class Repeat(Loop):
         skills = analysis.list_skills().values()
         if not any(skill is None or skill.tool_state in ((HOLDING, EMPTY), (ANY, EMPTY)) for skill in skills):
             message = "this loop never succeeds: its body releases no object, so `placed` does not increase"
-            yield NodeFinding(
-                "", "endless", message, "Add a failure reason or `elapsed` to `until`, or add `times`."
-            )
+            hint = "Add a failure reason or `elapsed` to `until`, or add `times`."
+            yield NodeFinding("", "endless", message, hint)
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return why the loop passed on a failure of its body."""

@@ -171,9 +171,8 @@ def _check_compared_constants(
     context: CheckContext, node: Node, wire: Wire, writer: Writer
 ) -> Iterator[Finding]:
     """Yield an error for each constant that is compared with `wire`, if `writer` can never write it."""
-    for name, value in (
-        find_literals(node) if isinstance(node, SkillNode) and writer.constants is None else ()
-    ):
+    literals = find_literals(node) if isinstance(node, SkillNode) and writer.constants is None else ()
+    for name, value in literals:
         port = context.skills[wire.skill].ports.get(name)
         # `check_settings` reports a constant of the wrong type.
         if port is None or port.compared_with != wire.port.name or find_problem(value.value, port):

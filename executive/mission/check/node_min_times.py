@@ -31,9 +31,8 @@ def _compute_min_time_of_skill(context: CheckContext, node: SkillNode) -> float:
         return 0.0
     declarations: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
     constants, params = dict(find_literals(node)), skill.params.values()
-    if any(
-        param.name not in constants for param in params if param.is_required or param.name in node.settings
-    ):
+    needed_params = [param for param in params if param.is_required or param.name in node.settings]
+    if any(param.name not in constants for param in needed_params):
         return 0.0  # a param has no valid value, or a variable gives the value
     values = {param.name: param.default for param in params if not param.is_required}
     try:

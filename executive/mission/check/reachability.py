@@ -27,9 +27,8 @@ def _find_unreachable_below(node: Node, flow: FlowAnalysis) -> Iterator[Finding]
         elif instance and instance.unreachable_reason:
             is_list = child.is_list and not child.label
             name = "this list" if is_list else child.path_name
-            yield make_warning(
-                child.span, "unreachable", f"{name} can never run: {instance.unreachable_reason}"
-            )
+            message = f"{name} can never run: {instance.unreachable_reason}"
+            yield make_warning(child.span, "unreachable", message)
             return
 
 
