@@ -37,8 +37,8 @@ def command(
         from executive.cli.progress import show_progress
         from executive.record.run_directory import RunDirectory, find_run
         from executive.view.film.film import RESULT_DISPLAY_TIME, write_film
-        from executive.view.film.film_source import FilmSource
         from executive.view.film.formats import choose_format, prepare_file
+        from executive.view.film.run_state import FilmSource
 
         directory = RunDirectory(find_run(run, runs))
         film_format = choose_format(output, gif)

@@ -31,8 +31,8 @@ from executive.record.run_directory import LATEST_LINK, RunDirectory, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
 from executive.view.film.film import write_film
-from executive.view.film.film_source import FilmSource
 from executive.view.film.formats import choose_format
+from executive.view.film.run_state import FilmSource
 from executive.view.report.page import write_report
 from tests.benchmarks.damage import BLOCK, copy_run, damage_run
 from tests.benchmarks.forks import ForkRunner

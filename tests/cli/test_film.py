@@ -30,7 +30,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         return 30
 
     monkeypatch.setattr(
-        "executive.view.film.film_source.FilmSource",
+        "executive.view.film.run_state.FilmSource",
         lambda directory: SimpleNamespace(directory=directory, events=[SimpleNamespace(clock=4.0)]),
     )
     monkeypatch.setattr("executive.view.film.film.write_film", write_film)

@@ -44,10 +44,8 @@ def draw_picture(content: PictureContent) -> NDArray[np.uint8]:
     size = (PICTURE_WIDTH, round(height * scale))
     shaded_image = _shade_occlusions(image_bgr, content.visible)
     image_with_boxes = _draw_boxes(cv2.resize(shaded_image, size).astype(np.uint8), content, scale)
-    if content.selected_index is None:
-        status_bar = draw_status_bar(content, PICTURE_WIDTH)
-    else:
-        status_bar = draw_status_bar(content, PICTURE_WIDTH, text_start=STATUS_BAR_HEIGHT)
+    status_bar = draw_status_bar(content, PICTURE_WIDTH)
+    if content.selected_index is not None:
         selected = content.detections[content.selected_index]
         colour = choose_class_colour(selected.label, content.classes)
         status_bar[:, :STATUS_BAR_HEIGHT] = _draw_close_up(image_bgr, selected.box, colour)

@@ -54,8 +54,9 @@ def make_status_bar_text(content: PictureContent) -> tuple[str, list[str], list[
     return title, list(lines), list(filter(None, notes))
 
 
-def draw_status_bar(content: PictureContent, width: int, text_start: int = 0) -> NDArray[np.uint8]:
-    """Return the status bar `(STATUS_BAR_HEIGHT, width, 3)`, BGR, empty left of column `text_start`."""
+def draw_status_bar(content: PictureContent, width: int) -> NDArray[np.uint8]:
+    """Return the status bar `(STATUS_BAR_HEIGHT, width, 3)`, BGR, with room for a close-up of a selection."""
+    text_start = 0 if content.selected_index is None else STATUS_BAR_HEIGHT
     bar = np.full((STATUS_BAR_HEIGHT, width, 3), to_bgr(BACKGROUND), np.uint8)
     (title, long_lines, notes), x = make_status_bar_text(content), text_start + MARGIN
     outcome_x = text_start + round(_OUTCOME_START_FRACTION * (width - text_start))

@@ -10,10 +10,9 @@ from pathlib import Path
 from PIL import Image
 
 from executive.cells.sim.pictures import PictureSource, compute_viewpoint, count_steps, render_pictures
-from executive.view.film.film_source import FilmSource
 from executive.view.film.formats import FilmFormat
 from executive.view.film.page import SCENE_SIZE, add_result, draw_frame
-from executive.view.film.run_state import FilmRunState
+from executive.view.film.run_state import FilmRunState, FilmSource
 
 CELL_BOX = (24, 76, 776, 644)
 """Region of the image that shows arm, workspace and bins: left, top, right and bottom [pixel]."""

@@ -14,8 +14,7 @@ from executive.events import RunEnded
 from executive.record.pictures.status_bar import STATUS_BAR_HEIGHT
 from executive.record.result import Result
 from executive.view.film import panel, style
-from executive.view.film.film_source import FilmSource
-from executive.view.film.run_state import FilmRunState
+from executive.view.film.run_state import FilmRunState, FilmSource
 from executive.view.film.style import BACKGROUND, FAILURE, LINE, RUNNING, SECONDARY_TEXT, SUCCESS, TEXT
 
 WIDTH, HEIGHT = 1280, 720

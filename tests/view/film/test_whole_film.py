@@ -19,9 +19,8 @@ from executive.errors import InputError
 from executive.events import NodeEnded, ToolCommanded
 from executive.record.run_directory import RunDirectory
 from executive.view.film.film import write_film
-from executive.view.film.film_source import FilmSource
 from executive.view.film.formats import MP4
-from executive.view.film.run_state import FilmRunState
+from executive.view.film.run_state import FilmRunState, FilmSource
 
 pytestmark = pytest.mark.slow
 MP4_HELD = 50

@@ -20,8 +20,8 @@ from executive.record.journal_format import encode_event
 from executive.record.recorded_run import RecordOptions
 from executive.record.resume import resume_run
 from executive.run.assembly import RunOptions
-from executive.view.report import report_data
-from executive.view.report.report_data import INTERRUPTED, Picture, ReportData, collect_pictures
+from executive.view.report import page
+from executive.view.report.page import INTERRUPTED, Picture, ReportData, collect_pictures
 
 
 def append(run: Path, tick: int, event: Event) -> None:
@@ -156,7 +156,7 @@ def test_of_several_decisions_for_an_object_the_last_is_shown_however_long_the_r
 
 
 def test_what_there_is_no_room_for_is_a_link_and_decisions_come_first(folder, monkeypatch):
-    monkeypatch.setattr(report_data, "MAX_EMBEDDED_SIZE", 1000)
+    monkeypatch.setattr(page, "MAX_EMBEDDED_SIZE", 1000)
     save(folder, "000001_cube-1_missed.jpg", "000003_duck-1.jpg", "000004_duck-1_missed.jpg", size=600)
     save(folder, "000005_unsure.jpg", size=90)
     seen = collect_pictures(folder, ["cube-1", "duck-1"])
@@ -167,7 +167,7 @@ def test_what_there_is_no_room_for_is_a_link_and_decisions_come_first(folder, mo
 
 
 def test_a_link_leads_to_its_file_whatever_it_is_called(folder, monkeypatch):
-    monkeypatch.setattr(report_data, "MAX_EMBEDDED_SIZE", 0)
+    monkeypatch.setattr(page, "MAX_EMBEDDED_SIZE", 0)
     save(folder, "000001_größe #2?_50%.jpg")
     (linked,) = collect_pictures(folder, [])
     assert linked.source == "frames/000001_gr%C3%B6%C3%9Fe%20%232%3F_50%25.jpg"

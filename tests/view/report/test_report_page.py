@@ -12,8 +12,7 @@ import pytest
 from page_reader import SECTIONS, Page
 
 from executive.record.journal import find_run_start, read_journal
-from executive.view.report.page import render_report, write_report
-from executive.view.report.report_data import ReportData
+from executive.view.report.page import ReportData, render_report, write_report
 
 NASTY = """</style></title><script>alert("x")</script><img src=x onerror='y'> & {{ 7 * 7 }} {% raw %} \x00"""
 WORDS = {"kind", "status", "state", "file", "node", "path", "item", "origin", "picture"}
