@@ -34,10 +34,8 @@ def measure_top_height(detection: Detection, frame: Frame) -> float:
         NoDepth: The frame has no depth image, or too few evaluated pixels have a depth.
     """
     if frame.depth is None:
-        raise NoDepth(
-            f"frame {frame.id} has no depth image; set `localization: plane` in the cell file, or "
-            f"`depth` of camera {frame.camera}"
-        )
+        advice = f"set `localization: plane` in the cell file, or `depth` of camera {frame.camera}"
+        raise NoDepth(f"frame {frame.id} has no depth image; {advice}")
     columns, rows = _select_pixels(detection, frame.depth.shape[::-1])
     heights = _compute_heights(frame, frame.depth, columns, rows)
     valid_count = int(np.isfinite(heights).sum())

@@ -202,10 +202,8 @@ def _read_labels(file: Path, class_names: Mapping[int, str]) -> ImageAnnotation:
             raise InputError(f"{place}: {problem}") from None
         is_polygon = len(values) > YOLO_BOX_VALUE_COUNT and len(values) % 2 == 0
         if len(values) != YOLO_BOX_VALUE_COUNT and not is_polygon:
-            raise InputError(
-                f"{place}: a box has {YOLO_BOX_VALUE_COUNT} values and a polygon an even number, at least 6; "
-                f"this line has {len(values)}"
-            )
+            rule = f"a box has {YOLO_BOX_VALUE_COUNT} values and a polygon an even number, at least 6"
+            raise InputError(f"{place}: {rule}; this line has {len(values)}")
         # NaN and infinity fail the comparison, too.
         if not all(-NORMALIZED_TOLERANCE <= value <= 1 + NORMALIZED_TOLERANCE for value in values):
             raise InputError(f'{place}: coordinates must be normalized (0 to 1), not "{line}"')

@@ -74,10 +74,8 @@ def train(
         from executive.training.compress import export_onnx
         from executive.training.model_fitting import fit_model
     except ImportError as error:
-        raise InputError(
-            f'training needs the package "{error.name}"; install the extra, about 3 GB to download on Linux: '
-            "uv sync --extra train"
-        ) from error
+        advice = "install the extra, about 3 GB to download on Linux: uv sync --extra train"
+        raise InputError(f'training needs the package "{error.name}"; {advice}') from error
     out.mkdir(parents=True, exist_ok=True)
     fit_model(dataset, out, settings, report_epoch, report_batch)
     model, labels = out / "model.onnx", out / "labels.txt"

@@ -50,16 +50,13 @@ class LimitsConfig(Section):
         for name, values in self:
             is_default = name == "min_position_deg" and not values
             if isinstance(values, tuple) and len(values) != count and not is_default:
-                raise ValueError(
-                    f"has {len(values)} values in {name} and {count} in position_deg; both need one value "
-                    "for each joint"
-                )
+                problem = f"has {len(values)} values in {name} and {count} in position_deg"
+                raise ValueError(f"{problem}; both need one value for each joint")
         for joint, (lower, upper) in enumerate(self.position_ranges_deg, start=1):
             if upper - lower < MIN_JOINT_RANGE:
-                raise ValueError(
-                    f"allows joint {joint} the positions {lower:g} to {upper:g} degrees; the range of a "
-                    f"joint must be at least {MIN_JOINT_RANGE:g} degrees"
-                )
+                problem = f"allows joint {joint} the positions {lower:g} to {upper:g} degrees"
+                limit = f"the range of a joint must be at least {MIN_JOINT_RANGE:g} degrees"
+                raise ValueError(f"{problem}; {limit}")
         return self
 
 
@@ -85,10 +82,9 @@ class ArmConfig(Section):
             raise ValueError(f'needs a pose named "home"; there are: {", ".join(self.poses_deg)}')
         for name, pose in self.poses_deg.items():
             if len(pose) != self.joint_count:
-                raise ValueError(
-                    f'has {len(pose)} angles in the pose "{name}" and limits of {self.joint_count} joints; '
-                    "each needs one value for each joint"
-                )
+                angles = f'{len(pose)} angles in the pose "{name}"'
+                limits = f"limits of {self.joint_count} joints"
+                raise ValueError(f"has {angles} and {limits}; each needs one value for each joint")
         return self
 
 

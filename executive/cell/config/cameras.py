@@ -80,10 +80,8 @@ class CalibrationConfig(Section):
     def _check_matrix_and_pose(self) -> CalibrationConfig:
         (fx, skew, _), (zero, fy, _), last_row = self.matrix
         if fx <= 0 or fy <= 0 or (skew, zero) != (0, 0) or last_row != (0, 0, 1):
-            raise ValueError(
-                "needs a matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with fx and fy above 0, "
-                f"not {[list(row) for row in self.matrix]}"
-            )
+            requirement = "a matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with fx and fy above 0"
+            raise ValueError(f"needs {requirement}, not {[list(row) for row in self.matrix]}")
         if (self.mount_to_camera is None) == (self.camera_to_mount is None):
             raise ValueError("needs exactly one of mount_to_camera and camera_to_mount, its inverse")
         return self
@@ -132,10 +130,8 @@ class CameraConfig(Section):
         left, top, right, bottom = self.table_view
         is_inside = 0 <= left < right <= self.width and 0 <= top < bottom <= self.height
         if not is_inside or right - left != bottom - top:
-            raise ValueError(
-                f"needs a table_view that is a square inside its image of {self.width} x {self.height} "
-                f"pixels, not {list(self.table_view)}"
-            )
+            requirement = f"a square inside its image of {self.width} x {self.height} pixels"
+            raise ValueError(f"needs a table_view that is {requirement}, not {list(self.table_view)}")
         present = [key for key in POSE_AND_FOV_KEYS if getattr(self, key) is not None]
         if self.calibration is not None and present:
             raise ValueError(f"must not have {', '.join(present)} besides calibration, which defines them")

@@ -95,10 +95,9 @@ def read_measurements(path: Path) -> tuple[Measurement, ...]:
             raise InputError(f"{path} is larger than {MAX_FILE_SIZE} bytes; it is not a measurement file")
         return MeasurementFile.model_validate_json(path.read_bytes()).measurements
     except (OSError, ValidationError) as error:
-        raise InputError(
-            f"the measurements in {path} cannot be read: {str(error).splitlines()[0]}; remove the file and "
-            "measure again with `executive evaluate --cell`"
-        ) from error
+        problem = f"the measurements in {path} cannot be read: {str(error).splitlines()[0]}"
+        advice = "remove the file and measure again with `executive evaluate --cell`"
+        raise InputError(f"{problem}; {advice}") from error
 
 
 def read_folders(folders: Sequence[Path]) -> tuple[list[tuple[str, Measurement]], list[str]]:
