@@ -217,7 +217,6 @@ def store_evaluation(
     if evaluation.reliability is None:
         problem = f"detector {detector.name} gave no usable answer: {evaluation.why}"
         raise InputError(f"{problem}; nothing was measured")
-    counts = sorted(evaluation.by_count.items())
     new_measurement = measurement.Measurement(
         detector=detector.name,
         fingerprint=dict(measurement.compute_fingerprint(detector.cell, detector.name, detector.base_folder)),
@@ -235,7 +234,12 @@ def store_evaluation(
             for label, row in evaluation.confusion.items()
             if label != NO_OBJECT
         },
-        counts={str(count): measurement.ErrorCounts(**errors) for count, errors in counts},
+        counts={
+            str(count): measurement.ErrorCounts(
+                **{name: errors.get(name, 0) for name in measurement.ErrorCounts.model_fields}
+            )
+            for count, errors in sorted(evaluation.by_count.items())
+        },
         frames=evaluation.frames,
     )
     advice = "name another file with --out, and copy it into the folder of your cell file"

@@ -68,7 +68,7 @@ def test_what_slips_away_over_its_bin_is_believed_there_unless_it_was_thrown(
     fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch, speed: float, state: str
 ) -> None:
     run_skill(Transit(held=held, bin="red_bin"), fake)
-    monkeypatch.setattr(type(fake.arm), "tool_velocity", np.array((0.0, speed, 0.0)))
+    monkeypatch.setattr(fake.arm, "tool_velocity", np.array((0.0, speed, 0.0)))
     fake.tool.break_seal()
     assert detect_and_record_drop(fake.cell, held)
     fake.ledger.set_final_states(completed=True)

@@ -45,10 +45,10 @@ class StoredErrorRates(Section):
 class ErrorCounts(Section):
     """Numbers of objects, missed and misclassified objects, and false detections, in a part of the scenes."""
 
-    objects: int = 0
-    missed: int = 0
-    confused: int = 0
-    false_detections: int = 0
+    objects: int
+    missed: int
+    confused: int
+    false_detections: int
 
 
 class Measurement(Section):

@@ -141,7 +141,7 @@ def test_the_time_and_the_pictures_of_what_was_no_object_are_shown_all_the_same(
         ),
     )
     found = page(run)
-    assert "sphere-1 missed at step 325" in found.texts["objects"]
+    assert "sphere-1 missed at step 324" in found.texts["objects"]
     assert "Image for the decision about sphere-1" not in found.texts["objects"]
     table, _ = found.texts["objects"].split(" look: ")
     assert "sphere-1" in table

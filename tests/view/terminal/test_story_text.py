@@ -52,13 +52,13 @@ def test_an_object_that_slips_out_of_the_cup_every_time(abroad) -> None:
     assert (
         text(run)
         == """\
-FAILURE after 1.92 s: Transit of cube-1 failed (dropped) on the last of 3 attempts: the seal on cube-1 broke
+FAILURE after 1.91 s: Transit of cube-1 failed (dropped) on the last of 3 attempts: the seal on cube-1 broke
   on the way to red_bin, near (0.50, 0.10, 0.12) m
 why no node in trial.yaml handled the failure, from the root down:
   retry              all 3 attempts failed: 1 x Grasp.missed, 2 x Transit.dropped (line 11)
   Transit of cube-1  tree/5:retry/do/Transit (line 15)
-readings    tool.holding = False (1.92 s), tool.touching = True (1.75 s), tool.bears = 7.9 (1.28 s)
-last look   cube-1 as cube 0.90 at (0.498, 0.102, 0.025) m: frame 3, camera overhead, by embedded, at 1.41 s;
+readings    tool.holding = False (1.91 s), tool.touching = True (1.74 s), tool.bears = 7.9 (1.28 s)
+last look   cube-1 as cube 0.90 at (0.498, 0.102, 0.025) m: frame 3, camera overhead, by embedded, at 1.40 s;
             3 looks, 3 failed attempts in all
 now         the arm is at rest, the tool is empty
 left to do  1: cube-1
@@ -145,7 +145,7 @@ def test_an_object_that_is_lost(at_home) -> None:
     assert (
         text(run, numbered=False)
         == """\
-FAILURE after 1.53 s: 1 object was lost: cube-1
+FAILURE after 1.52 s: 1 object was lost: cube-1
 lost        cube-1 last detected at (0.500, 0.100, 0.025) m at 0.05 s, not detected in the 3 later looks;
             Transit.dropped at 0.80 s: the seal on cube-1 broke on the way to red_bin, near (0.50, 0.10,
             0.12) m
