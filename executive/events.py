@@ -31,7 +31,7 @@ class Event:
 
     is_recorded: ClassVar[bool] = True
 
-    # Pydantic rejects a journal in which a field has another type, instead of converting the value.
+    # With `strict`, Pydantic rejects a value of the wrong type instead of converting it.
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(strict=True)
 
 
@@ -54,7 +54,7 @@ Emit = Callable[[Event], None]
 """Function that emits an event: adds the time, and passes the timed event to all observers."""
 
 Observer = Callable[[TimedEvent], None]
-"""Function that receives a timed event in the thread of the tick loop, and returns without waiting."""
+"""Function that receives a timed event in the thread of the tick loop; it must not block."""
 
 
 def discard_event(event: Event) -> None:
@@ -66,7 +66,7 @@ def discard_event(event: Event) -> None:
 
 @dataclass(frozen=True)
 class MotionPlanned(Event):
-    """The plan of a motion that a skill requested is ready.
+    """A skill requested a motion, and the plan of the motion is ready.
 
     Attributes:
         planned_ahead: True if the motion was planned before a skill requested the motion.
@@ -149,7 +149,7 @@ class DetectedObject:
 
 @dataclass(frozen=True)
 class FrameSearched(Event):
-    """A detector searched a frame for objects, and the ledger received the detections.
+    """A detector searched a frame; the ledger (known items and their states) received the detections.
 
     Attributes:
         frame: Number of the frame.
@@ -313,7 +313,8 @@ class RunEnded(Event):
         reason: Reason of the failure, for instance `Transit.dropped`; "" on success.
         message: Sentence that explains the status, with measured values, or "".
         node: Path of the node that caused the status, or "".
-        is_table_empty: True if the ledger has no object with a route, and no frame showed an unknown label.
+        is_table_empty: True if almost certainly no object that the mission still sorts is visible on the
+            table, and no frame showed an unknown label.
         held_item: Item in the tool; `something` if the item is unknown; "" for an empty tool.
         ticks: Number of control steps.
         robot_time: Time on the clock of the run [s].
@@ -353,11 +354,11 @@ class NodeEnded(Event):
         status: Final status.
         skill: Name of the skill; "" for a control node.
         item: Item on which the skill worked, or "".
-        reason: Reason of a failure (`missed` for a skill, `Grasp.missed` for a control node); `fault` after
-            a fault of a skill; "" for all other ends.
+        reason: Reason for the failure (`missed` for a skill, `Grasp.missed` for a control node); `fault` if
+            a skill raised a fault; "" for every other status.
         message: Message of the failure or fault, or "".
         origin: Path of the node that caused the failure of a control node, or "".
-        outputs: Values of the outputs of a successful skill by name; None for other nodes and ends.
+        outputs: Values of the outputs by name if a skill succeeded; otherwise None.
     """
 
     node: str

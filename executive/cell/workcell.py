@@ -1,4 +1,4 @@
-"""Protocols of work cells and kinds of work cells, as a run uses them, and a wrapper of a work cell."""
+"""Protocols that a run requires of a work cell, its ledger and its factory; wrapper of a work cell."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from executive.events import Emit, ItemChanged
 
 AUDIT_KEYS = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
 """Keys of the object counts of an audit: objects in permitted bins (`right`), in other bins, on the table
-(`left`), and elsewhere. The last two keys count subsets: fallen into a wrong bin; never detected."""
+(`left`), elsewhere; and, counted a second time, objects that fell into a wrong bin or were never detected."""
 
 
 class Accounts(Protocol):
-    """The ledger of a run, as the end and the resumption of the run use it."""
+    """Part of the ledger that a run needs at its end and at its resumption."""
 
     def set_final_states(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the tree succeeded."""
@@ -50,7 +50,7 @@ class Workcell(Protocol):
 
     @property
     def accounts(self) -> Accounts:
-        """The ledger; the run closes it at its end, so that each item has a final state."""
+        """The ledger; at the end of the run, the run calls its `set_final_states`."""
 
     @property
     def steps(self) -> int:
@@ -79,7 +79,7 @@ class Workcell(Protocol):
         """Return the shapes and poses of the bodies for displays, or None if the cell has no visuals."""
 
     def audit(self) -> Mapping[str, int] | None:
-        """Count the objects by true place, and return the counts by `AUDIT_KEYS`; None for hardware."""
+        """Return the number of objects by true place, by `AUDIT_KEYS`; None without ground truth."""
 
     def close(self) -> None:
         """Release all resources; the cell is unusable afterwards."""
@@ -156,7 +156,7 @@ class CellWrapper:
     Attributes:
         inner: The wrapped work cell.
         cell: Interface of the work cell for skills.
-        accounts: The ledger; the run closes it at its end, so that each item has a final state.
+        accounts: The ledger; at the end of the run, the run calls its `set_final_states`.
     """
 
     def __init__(self, inner: Workcell) -> None:
@@ -185,7 +185,7 @@ class CellWrapper:
         return self.inner.visuals()
 
     def audit(self) -> Mapping[str, int] | None:
-        """Return the true object counts by `AUDIT_KEYS`, or None if the counts are unknown."""
+        """Return the number of objects by true place, by `AUDIT_KEYS`; None without ground truth."""
         return self.inner.audit()
 
     def close(self) -> None:

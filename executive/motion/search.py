@@ -32,7 +32,7 @@ from executive.motion.transcription import SAMPLE_FRACTIONS
 MAX_CANDIDATES = 4
 """Maximum number of candidates for the end of a motion."""
 COMPARED_CANDIDATES = 2
-"""Number of candidates whose motions are compared; the next ones are used if all motions are blocked."""
+"""Number of candidates in a group: their motions are compared; if all are blocked, the next group follows."""
 INITIAL_STEP_COUNT = 2
 """Number of optimization steps for the detour to each candidate."""
 REFINEMENT_STEP_COUNT = 8
@@ -128,7 +128,7 @@ class MotionSearch:
         return find_candidates(self._kinematics, self._limits, self._start, self._end, arrival_length)
 
     def _plan_direct_motions_and_detours(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
-        """Plan and yield direct motions without collision and refined detours, the fastest first."""
+        """Plan and yield refined detours and collision-free direct motions, the fastest first."""
         motions, optimizers = self._evaluate_candidates(candidates)
         next_costs = [*(self._compute_total_cost(*pair) for pair in optimizers), math.inf][1:]
         slower_detours: list[tuple[Candidate, Optimizer]] = []

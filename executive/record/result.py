@@ -34,7 +34,7 @@ MISTAKE_DESCRIPTIONS = {
     "fell_in_wrong_bin": "fallen into a wrong bin",
     "unseen": "never seen",
 }
-"""Text for each audit count that must be 0, by key of the audit."""
+"""Text for each audit count that must be 0; `unseen` must be 0 only if the run reported an empty table."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,12 @@ class Audit:
 
     Attributes:
         agrees: True if the true places confirm the counts of the ledger.
-        right, wrong_bin: Number of objects in a permitted bin, and in another bin.
-        left, elsewhere: Number of objects on the table, and below the table or fallen into wrong bins.
-        fell_in_wrong_bin, unseen: Number of objects that fell into a wrong bin; number of undetected objects.
+        right: Number of objects in permitted bins.
+        wrong_bin: Number of objects in other bins.
+        left: Number of objects on the table.
+        elsewhere: Number of objects below the table, and of objects that fell into a wrong bin.
+        fell_in_wrong_bin: Number of objects that fell into a wrong bin.
+        unseen: Number of objects that were never detected.
     """
 
     agrees: bool = True
@@ -89,7 +92,7 @@ class Result:
         status, reason, message, node, is_table_empty, held_item, ticks: Fields of the event `RunEnded`.
         seed: Seed of all random numbers.
         items: Number of items by final state, from the ledger.
-        unknown_labels: Maximum number of boxes in one look for each label that is not in the cell file.
+        unknown_labels: Maximum number of boxes in one frame, by label that the cell file does not declare.
         assumption_reasons: Reasons for which error rates of detectors were assumed.
         audit: True places of the objects, compared with `items`; None in a cell without ground truth.
         planning: Number of planned motions, and time for which skills waited for plans.

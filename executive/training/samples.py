@@ -170,7 +170,7 @@ def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
         raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO dataset")
 
     def parse(text: str) -> _YoloClassFile:
-        """Return the class file; `BaseLoader` reads each name as text, for instance `no`."""
+        """Return the class file; `BaseLoader` keeps a class name `no`, which YAML would convert to False."""
         return _YoloClassFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader))
 
     names = _parse_file(class_file, MAX_CLASS_FILE_SIZE, parse).names
@@ -247,7 +247,10 @@ def _read_text(file: Path, max_size: int) -> str:
 
 
 def read_json(file: Path) -> dict[str, Any]:
-    """Return the values in a JSON file, by image file name; {} if the JSON file does not exist."""
+    """Return the content of a file such as `truth.json`: one value for each image file name.
+
+    The result is {} if the file does not exist.
+    """
     parse = TypeAdapter(dict[str, Any]).validate_json
     return _parse_file(file, MAX_COCO_FILE_SIZE, parse) if file.is_file() else {}
 

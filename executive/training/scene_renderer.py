@@ -32,12 +32,14 @@ from executive.training.labelled_image import LabelledImage
 
 IMAGE_SIZE = 256
 """Side of the image of a random scene, as a detector gets it [pixel]."""
-MIN_VISIBLE_FRACTION, MIN_LABELLED_VISIBLE_FRACTION = 0.15, 0.5
-"""Visible fractions below which an object is background, or is ignored instead of labelled."""
+MIN_VISIBLE_FRACTION = 0.15
+"""An object of which a smaller fraction is visible is treated as background."""
+MIN_LABELLED_VISIBLE_FRACTION = 0.5
+"""An object of which a smaller fraction is visible is heavily occluded: it is ignored, not labelled."""
 MAX_HEAVILY_OCCLUDED_FRACTION = 1 / 6
 """Maximum fraction of heavily occluded objects in a scene; one such object is always allowed."""
 MAX_ATTEMPTS = 50
-"""Number of random scenes for an image after which a lack of room for the objects is an error."""
+"""Number of attempts to draw a scene in which all objects fit, before an error is raised."""
 UNVARIED_SCENE_FRACTION = 0.2
 """Fraction of the random scenes with table, light, camera and noise as in the cell file."""
 MIN_CONTRAST = 5
@@ -47,12 +49,14 @@ MIN_CONTRAST = 5
 class SceneRenderer:
     """Renders labelled images of the camera of a cell.
 
-    Without `scene`, an image shows a part of a random scene that varies more than runs, for training. With
-    `scene`, it is the whole image of the initial scene of a run, of which the view `table` is labelled.
+    Without `scene`, an image shows a part of a random scene. Random scenes serve for training; they vary more
+    than the initial scenes of runs. With `scene`, an image is a complete camera image of the initial scene of
+    a run; only the objects in the view `table` (the workspace) are labelled.
 
     Args:
         config: The cell file.
-        scene: Changes to initial scenes of runs, with the arm in a scan pose; None for random scenes.
+        scene: Scene file for the initial scene of a run, in which the arm is in a random scan pose; None for
+            random scenes.
     """
 
     def __init__(self, config: CellConfig, scene: SceneConfig | None = None) -> None:
@@ -64,12 +68,12 @@ class SceneRenderer:
         self._matrix, _ = compute_calibration(self._camera)
 
     def render_image(self, seed: int, number: int) -> LabelledImage:
-        """Return the first image generated from a seed in which few objects are heavily occluded.
+        """Draw scenes from `seed` until few objects are heavily occluded, and return the labelled image.
 
         Its file name contains the name of the camera and `number`, and has no suffix. Its `truth` contains:
 
-        * `camera`, `matrix`, `X_WC`: name, matrix and pose of the camera; of an initial scene, the matrix and
-          the pose of the cell file
+        * `camera`, `matrix`, `X_WC`: name, matrix and pose of the camera; for an initial scene, matrix and
+          pose as declared in the cell file, without calibration errors
         * `part`: the region of the camera image that the image shows [pixel]
         * `labels`, `visible_fraction`: class and visible fraction (0 to 1) of each labelled object
         * `centres`: centres of the bounding boxes of the labelled objects in the world `(N, 3)` [m]

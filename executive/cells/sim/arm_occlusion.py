@@ -43,6 +43,7 @@ class ArmOcclusion:
         self._world = world
         self._kinematics = kinematics
         self._is_loaded = is_loaded
+        # T is the frame of the tool, F the frame of the flange.
         self._X_TF = Pose.of([0.0, 0.0, -config.tool.length])
         self._load_radius = max(model.radius for model in config.objects.values()) + MAX_LOAD_OFFSET
         self._load_height = config.max_object_height

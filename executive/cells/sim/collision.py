@@ -25,9 +25,9 @@ from executive.geometry import Array
 ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
 SEARCH_DISTANCE = 0.1
-"""Distance beyond the margin up to which the distances of bodies are computed [m]."""
+"""Distances that exceed the margin by more than this value are not computed [m]."""
 SUPPORT_TOLERANCE = 0.001
-"""Maximum height [m] above the floor of a bin at which a contact of the load is a contact with the floor."""
+"""A contact this close to a bin's floor supports the load; on the table, as in a bin at z = 0 [m]."""
 
 
 class BodyPair(NamedTuple):
@@ -37,7 +37,8 @@ class BodyPair(NamedTuple):
         bodies: Indices of both bodies; for two links of the arm, followed by the indices of the links.
         links: Links of the first body whose distances count.
         joints: Joints that change the distance.
-        body_name: Name of the second body in messages; "" for the link that is nearest to the load.
+        body_name: Name of the second body in messages; "" for the pair of arm and load: messages name the
+            link that is nearest to the load.
         load_name: Name of the load if it belongs to the pair, else "".
         support_height: Height up to which the first body may touch the second one [m].
     """
@@ -81,9 +82,9 @@ class ClearanceChecker:
     The distance from this body must then not decrease. A held object is modelled by an upright cylinder
     under the tool, which may touch the table and the floors of bins.
 
-    Two bodies whose distance is known need no further query until a part of the arm may have moved by that
-    distance. The upper bound of the movement is the sum of the joint movements, each multiplied by the
-    maximum distance of a point of the arm from the axis of the joint.
+    The check is a conservative advancement: two bodies whose distance is known need no further query until a
+    part of the arm may have moved by that distance. The upper bound of the movement is the sum of the joint
+    movements, each multiplied by the maximum distance of a point of the arm from the axis of the joint.
 
     Attributes:
         world: World of the check, whose arm is at the last joint positions that needed a query.
@@ -112,8 +113,8 @@ class ClearanceChecker:
         pair_movements = [movements[:, pair.joints].sum(axis=1).tolist() for pair in pairs]
         # Movement up to which the bodies of each pair are farther apart than the margin [m].
         clear_until = [0.0] * len(pairs)
-        # A part that starts closer to a body than the margin must keep its initial distance until it has been
-        # apart by the margin once. Every other part must keep the margin.
+        # A part that starts within the margin of a body must not come closer than at the start, until the
+        # distance has exceeded the margin for the first time. Every other part must keep the margin.
         start_distances: dict[tuple[str, str], float] = {}
         for index, q in enumerate(path):
             due = [pair for pair in range(len(pairs)) if pair_movements[pair][index] >= clear_until[pair]]

@@ -2,6 +2,7 @@
 
 A path contains the names of all ancestors: `tree/repeat/do/2:try/retry/do/Grasp`. The name of a node is its
 label, skill, subtree or keyword. In a list, control nodes without label and duplicate names get an index.
+A subtree without label and its body have the same path if the body is a list.
 """
 
 from __future__ import annotations

@@ -18,10 +18,12 @@ class Node:
     """Base class of the nodes.
 
     Attributes:
-        span: Position of the skill, keyword or subtree name in the file; or of a list without keyword.
+        span: Position in the file: of the name of the skill or subtree, of the keyword, or of the list if
+            there is no keyword.
         label: Value of `as:`, or "".
         label_span: Position of the label in the file, or None.
-        path: Unique path from the root of the expanded tree; "" before expansion.
+        path: Path from the root of the expanded tree; "" before expansion. The path is unique, except that a
+            subtree without label and its body have the same path if the body is a list.
         is_list: True for a sequence that is written as a list, without keyword.
     """
 
@@ -75,7 +77,7 @@ class SkillNode(Node):
 
 @dataclass(frozen=True)
 class InvalidNode(Node):
-    """A node with an error that a finding reports; `parts` are the valid nodes below this node."""
+    """Placeholder for a node with an error that a finding reports; `parts` are the valid nodes below it."""
 
     parts: tuple[Node, ...] = ()
 
@@ -86,7 +88,12 @@ class InvalidNode(Node):
 
 
 class ValueOwner:
-    """A control node or a section of a control node: values of the keys that a class declares."""
+    """Base class of a control node and of a section, which set keys in the mission.
+
+    Attributes:
+        declaring_class: Class that declares the keys.
+        values: Values that the mission sets, by key.
+    """
 
     declaring_class: type[KeyOwner]
     values: Mapping[str, KeyValue]

@@ -29,7 +29,8 @@ class FailurePathNode:
     Attributes:
         node: Node of the mission.
         subtree: Name of the subtree that contains the node, or "".
-        control_node: Instance that explains the decision of a control node; None for other nodes.
+        control_node: Control node built from `node` to explain its decision, without being run; None if
+            `node` is not a control node.
         failure: Failure that the node received from its child.
     """
 
@@ -95,7 +96,7 @@ class FailedRun:
         return get_skill_name(path) + (f" of {last.item}" if last is not None and last.item else "")
 
     def format_place(self, node: Node) -> str:
-        """Return the source line of a node, with the file name if the file is not the mission file."""
+        """Return the location of a node: the line number, and the file name if it is not the mission file."""
         return node.span.describe_place(self.loaded.tree.span.source)
 
 
@@ -136,7 +137,7 @@ def find_failure_path(tree: Node, timeline: Timeline, origin: str, failure: str)
     """
     nodes = find_nodes_on_path(tree, origin)
     skill_or_label, _, reason = failure.rpartition(".")
-    # Above a node with a label, the mission may use this label in the name of the failure.
+    # For the ancestors of a node with a label, the failure may also have the name `label.reason`.
     source_names = {skill_or_label}
     failure_path: list[FailurePathNode] = []
     for index in reversed(range(len(nodes))):
@@ -166,7 +167,10 @@ def _make_propagated_failure(
 
 
 def find_nodes_on_path(tree: Node, path: str) -> list[Node]:
-    """Return the nodes from the root to the innermost node at `path`, or [] if no node has this path."""
+    """Return the nodes from the root to the node at `path`, or [] if no node has this path.
+
+    If a subtree and its body have this path, both are returned, the body last.
+    """
     for child in tree.children:
         if nodes := find_nodes_on_path(child, path):
             return [tree, *nodes]

@@ -68,7 +68,7 @@ class ReportData:
     Attributes:
         path: Run directory.
         start: Event of the start of the run.
-        result: Content of `result.json`; None if the file is missing or belongs to another run.
+        result: Content of `result.json`; None if it is missing, damaged, or older than the last resumption.
         end: Result; without a result, the event of the end of the run; None for an interrupted run.
         status: `SUCCESS`, `INCOMPLETE`, `FAILURE`, `FAULT`, `HALTED` or `INTERRUPTED`.
         nodes: Nodes of the tree.
