@@ -39,7 +39,7 @@ MIN_LABELLED_VISIBLE_FRACTION = 0.5
 MAX_HEAVILY_OCCLUDED_FRACTION = 1 / 6
 """Maximum fraction of heavily occluded objects in a scene; one such object is always allowed."""
 MAX_ATTEMPTS = 50
-"""Number of attempts to draw a scene in which all objects fit, before an error is raised."""
+"""Maximum number of random scenes that are drawn for an image before an error is raised."""
 UNVARIED_SCENE_FRACTION = 0.2
 """Fraction of the random scenes with table, light, camera and noise as in the cell file."""
 MIN_CONTRAST = 5
@@ -81,22 +81,25 @@ class SceneRenderer:
           through the centres of the unclipped boxes reach the heights of the object centres
 
         Raises:
-            InputError: The workspace has no room for the objects.
+            InputError: In all `MAX_ATTEMPTS` scenes, the workspace has no room for the objects, or too many
+                objects are heavily occluded.
         """
-        attempt = 0
-        while True:
+        problem = InputError(
+            f"too many objects are heavily occluded in {MAX_ATTEMPTS} scenes of cell {self._config.cell}; "
+            "ask for fewer objects or widen table.x and table.y"
+        )
+        for attempt in range(MAX_ATTEMPTS):
             rng = np.random.default_rng([seed, attempt])
-            attempt += 1
             for body in tuple(self._world.labels):
                 self._world.remove_object(body)
             try:
                 image = self._render_initial(self._scene, rng) if self._scene else self._render_random(rng)
                 if image is not None:
                     return replace(image, file=f"{self._camera_name}_{number:06d}")
-            except InputError:
+            except InputError as error:
                 # Whether the objects of a random scene find room in the workspace depends on chance.
-                if attempt == MAX_ATTEMPTS:
-                    raise
+                problem = error
+        raise problem
 
     def close(self) -> None:
         """Close the world; the renderer cannot be used afterwards."""
