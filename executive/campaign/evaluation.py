@@ -26,7 +26,7 @@ from executive.training.evaluation.metrics import NO_OBJECT, Evaluation
 from executive.training.evaluation.worst_mistakes import WorstMistakes
 from executive.training.labelled_image import LabelledImage
 from executive.training.rendering import generate_dataset, render_run_frames
-from executive.training.samples import Samples
+from executive.training.samples import LabelledDataset
 
 MAX_OBJECT_COUNT = 20
 """Maximum number of objects in a rendered scene; fewer if the table has no room for them."""
@@ -34,7 +34,7 @@ OpenProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], No
 """Function that opens a progress bar with a name; the context manager yields `update(done, total)`."""
 
 
-Images = Samples | list[LabelledImage]
+Images = LabelledDataset | list[LabelledImage]
 """Labelled images of a dataset, or of rendered scenes."""
 
 
@@ -159,7 +159,7 @@ def _open_images(
 ) -> Iterator[Images]:
     """Open the images of the dataset, or render scenes of the cell; a context manager."""
     if settings.dataset is not None:
-        yield Samples(settings.dataset)
+        yield LabelledDataset(settings.dataset)
         return
     assert cell is not None
     with tempfile.TemporaryDirectory() as folder:
@@ -170,7 +170,7 @@ def _open_images(
                     {cell.cell: cell}, Path(folder), image_count=settings.image_count, seed=settings.seed,
                     layout="coco", worker_count=settings.workers, valid_fraction=1.0, progress=update,
                 )  # fmt: skip
-                images = Samples(Path(folder))
+                images = LabelledDataset(Path(folder))
             else:
                 object_counts = (0, find_max_object_count(cell, MAX_OBJECT_COUNT))
                 table = cell.table.model_copy(update={"objects": object_counts})

@@ -80,9 +80,9 @@ def print_report(lines_and_tables: Iterable[RenderableType]) -> None:
 
 def report_polygons(folder: Path) -> None:
     """Print a note if labels in a dataset folder are polygons, of which only the bounding boxes are used."""
-    from executive.training.samples import Samples
+    from executive.training.samples import LabelledDataset
 
-    if count := Samples(folder).polygon_count:
+    if count := LabelledDataset(folder).polygon_count:
         click.echo(f"note: {count} polygons in {folder} are replaced by their bounding boxes", err=True)
 
 

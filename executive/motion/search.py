@@ -77,7 +77,7 @@ class MotionSearch:
         self._connector = Connector(limits)
         self._travel_height = compute_travel_height(config)
         self._end = end
-        self._straight_length = config.motion.straight
+        self._straight_part_length = config.motion.straight
         discs = make_tool_discs(config, task.load)
         if not isinstance(end, Goal) and task.load is None:
             # Without a load, the tool may tilt: the arm must reach named poses from any configuration.
@@ -124,14 +124,14 @@ class MotionSearch:
         """Return an iterator of candidates for the end of the motion, the fastest first."""
         if not isinstance(self._end, Goal):
             return iter([Candidate(0.0, JointState.at_rest(self._end), None, None)])
-        arrival_length = self._end.slow_length or self._straight_length
+        arrival_length = self._end.slow_length or self._straight_part_length
         return find_candidates(self._kinematics, self._limits, self._start, self._end, arrival_length)
 
     def _plan_direct_motions_and_detours(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
         """Plan and yield refined detours and collision-free direct motions, the fastest first."""
         motions, optimizers = self._evaluate_candidates(candidates)
         next_costs = [*(self._compute_total_cost(*pair) for pair in optimizers), math.inf][1:]
-        slower_detours: list[tuple[Candidate, Optimizer]] = []
+        deferred_optimizers: list[tuple[Candidate, Optimizer]] = []
         for (candidate, optimizer), next_cost in zip(optimizers, next_costs, strict=True):
             optimizer.improve(REFINEMENT_STEP_COUNT)
             cost = self._compute_total_cost(candidate, optimizer)
@@ -141,13 +141,13 @@ class MotionSearch:
             if not detours or detours[0][0] > cost:
                 detours += self._build_detour(candidate, optimizer, keeps_timing=True)
             else:
-                slower_detours.append((candidate, optimizer))
+                deferred_optimizers.append((candidate, optimizer))
             motions = sorted([*motions, *detours], key=itemgetter(0))
             # A detour may take longer than the cost of its optimizer; then the next detour is refined first.
             while motions and motions[0][0] <= MAX_DURATION_FACTOR * next_cost:
                 yield motions.pop(0)[1]
         yield from (motion for _, motion in motions)
-        for candidate, optimizer in slower_detours:
+        for candidate, optimizer in deferred_optimizers:
             yield from (motion for _, motion in self._build_detour(candidate, optimizer, keeps_timing=True))
 
     def _build_detour(
@@ -191,9 +191,9 @@ class MotionSearch:
                     motion = self._build_motion(candidate, free_part)
                     direct_motions.append((motion.duration, motion))
                     continue
-                slow_part = self._connect_by_via_points(candidate, EXTRA_HEIGHTS[0], prefers_lines=False)
-                duration = sum(piece.duration for piece in slow_part)
-                qs = sample_pieces(slow_part, SAMPLE_FRACTIONS * duration).q
+                initial_guess = self._connect_by_via_points(candidate, EXTRA_HEIGHTS[0], prefers_lines=False)
+                duration = sum(piece.duration for piece in initial_guess)
+                qs = sample_pieces(initial_guess, SAMPLE_FRACTIONS * duration).q
                 optimizer = Optimizer(problem, qs, duration)
                 optimizer.improve(INITIAL_STEP_COUNT)
                 optimizers.append((candidate, optimizer))
@@ -285,7 +285,7 @@ class MotionSearch:
         The cell file may require a straight departure. If the seal limits the acceleration of a load, the
         load also departs straight, because contact with the support could break the seal.
         """
-        length = self._straight_length or (LIFT_OFF_DISTANCE if self._payload else 0.0)
+        length = self._straight_part_length or (LIFT_OFF_DISTANCE if self._payload else 0.0)
         if not length or height + length > self._travel_height:
             return None
         waypoints = find_vertical_waypoints(self._kinematics, start, length)
@@ -295,4 +295,4 @@ class MotionSearch:
         line = CartesianLine(
             waypoints, length, self._limits, max_acceleration=acceleration, ends_in_motion=True
         )
-        return line if self._straight_length or line.max_acceleration >= acceleration else None
+        return line if self._straight_part_length or line.max_acceleration >= acceleration else None

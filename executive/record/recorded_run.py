@@ -21,7 +21,7 @@ from executive.mission.text.file_search import read_source
 from executive.record.diagnosis.diagnose import diagnose
 from executive.record.recorded_mission import format_tree
 from executive.record.recorder import Recorder
-from executive.record.result import FINAL_STATUSES, Audit, ItemCounts, Result, list_requests, write_result
+from executive.record.result import Audit, ItemCounts, Result, is_resumable, list_requests, write_result
 from executive.record.run_directory import SCENE_FILE, RunDirectory, make_dated_folder
 from executive.record.timeline.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
@@ -83,7 +83,7 @@ def record_run(
         recorder = Recorder(directory, saves_pictures=record.saves_pictures)
         recorded_run = RecordedRun(run, loaded, directory, recorder, record)
         result = recorded_run.execute(options.seed, start_time)
-    if not record.saves_pictures and result.status in FINAL_STATUSES:
+    if not record.saves_pictures and not is_resumable(result.status):
         # Only a resumption and a film need the log of the simulated world.
         directory.world_log.unlink(missing_ok=True)
     return result

@@ -26,9 +26,6 @@ QUIT_REQUEST = "quit"
 RESULT_VERSION = 3
 """Version of the schema of `result.json`; versions before 3 had other keys."""
 
-FINAL_STATUSES = ("SUCCESS", "FAILURE")
-"""Statuses of a run that cannot be resumed."""
-
 MISTAKE_DESCRIPTIONS = {
     "wrong_bin": "in a wrong bin",
     "fell_in_wrong_bin": "fallen into a wrong bin",
@@ -134,6 +131,11 @@ class Result:
     def disagreement(self) -> str:
         """Message with the counts of audit and ledger if they disagree, else ""."""
         return describe_disagreement(self.audit, self.items)
+
+
+def is_resumable(status: str) -> bool:
+    """Return True if a run can be resumed after it ended with a status, or was interrupted."""
+    return status not in ("SUCCESS", "FAILURE")
 
 
 def write_result(path: Path, result: Result) -> None:

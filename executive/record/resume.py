@@ -15,7 +15,7 @@ from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import RecordedRun, RecordOptions
 from executive.record.recorder import Recorder
 from executive.record.replayed_run import replay_and_compare
-from executive.record.result import FINAL_STATUSES, Result, read_result
+from executive.record.result import Result, is_resumable, read_result
 from executive.record.run_directory import RunDirectory
 from executive.replay.input_log import UNKNOWN_ACTION, InputLog
 from executive.replay.replayed_cell import ReplayedCell
@@ -97,9 +97,9 @@ def _check_end(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
         problem = f"ended with {end.held_item} in the tool and cannot be resumed"
         advice = "take it out of the tool and run the mission again"
         raise InputError(f'the run in "{directory.path}" {problem}; {advice}')
-    if end.status in FINAL_STATUSES and read_result(directory, events) is not None:
+    if not is_resumable(end.status) and read_result(directory, events) is not None:
         raise InputError(f'the run in "{directory.path}" ended as {end.status}; there is nothing to resume')
-    return end.status in FINAL_STATUSES
+    return not is_resumable(end.status)
 
 
 def _describe_missing_commands(replayed_cell: ReplayedCell) -> str:

@@ -32,7 +32,7 @@ class LabelledImage:
             region of the camera's full frame that the image shows [pixel].
         region: Region of the image [pixel] that is searched and labelled; None: the whole image.
         depth: Depth image `(H, W)` [m] in the format of `Frame.depth`; None without a depth sensor.
-        second_image: Image of the same scene from the same camera pose with different noise, or None.
+        repeated_image: Image of the same scene from the same camera pose with different noise, or None.
     """
 
     file: str
@@ -43,7 +43,7 @@ class LabelledImage:
     truth: Mapping[str, Any] = field(default_factory=dict)
     region: Box | None = None
     depth: Array | None = None
-    second_image: NDArray[np.uint8] | None = None
+    repeated_image: NDArray[np.uint8] | None = None
 
     def to_frame(self, frame_id: int) -> Frame:
         """Return the image as a frame, with the true camera pose if the pose is known."""

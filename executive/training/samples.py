@@ -65,10 +65,10 @@ class ImageAnnotation:
             for left, top, right, bottom in self.boxes
         )
 
-    def add(self, label: str, box: Box, message_start: str) -> None:
-        """Add an object; `message_start` is the start of the error message for too many objects."""
+    def add(self, label: str, box: Box, message_prefix: str) -> None:
+        """Add an object; `message_prefix` is the start of the error message for too many objects."""
         if len(self.labels) == MAX_OBJECT_COUNT:
-            raise InputError(f"{message_start} more than {MAX_OBJECT_COUNT} objects; divide the image")
+            raise InputError(f"{message_prefix} more than {MAX_OBJECT_COUNT} objects; divide the image")
         self.labels.append(label)
         self.boxes.append(box)
 
@@ -148,15 +148,15 @@ def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
             raise InputError(f"{file}: two {message}")
     for index, coco_object in enumerate(content.annotations):
         image_id, class_id = coco_object.image_id, coco_object.category_id
-        key = f"{file}: annotations[{index}]"
+        location = f"{file}: annotations[{index}]"
         if image_id not in annotations:
-            raise InputError(f"{key}.image_id: there is no image {image_id}")
+            raise InputError(f"{location}.image_id: there is no image {image_id}")
         if class_id not in class_names:
             known_ids = ", ".join(map(str, class_names))[:MAX_QUOTATION_LENGTH] or "none"
-            raise InputError(f"{key}.category_id: no category has the id {class_id}; ids: {known_ids}")
+            raise InputError(f"{location}.category_id: no category has the id {class_id}; ids: {known_ids}")
         left, top, width, height = coco_object.bbox
         box = left, top, left + width, top + height
-        annotations[image_id].add(class_names[class_id], box, f"{key}.image_id: image {image_id} has")
+        annotations[image_id].add(class_names[class_id], box, f"{location}.image_id: image {image_id} has")
     for index, image in enumerate(content.images):
         path = _find_image(split, image.file_name, f"{file}: images[{index}].file_name")
         yield path, annotations[image.id]
@@ -190,47 +190,47 @@ def _read_labels(file: Path, class_names: Mapping[int, str]) -> ImageAnnotation:
     for line_number, line in enumerate(_read_text(file, MAX_LABEL_FILE_SIZE).splitlines(), start=1):
         if not line.strip():
             continue
-        place = f"{file}:{line_number}"
+        location = f"{file}:{line_number}"
         try:
             class_number, *texts = line.split()
             values = [float(text) for text in texts]
             label = class_names[int(class_number)]
         except KeyError:
-            raise InputError(f"{place}: {class_number} is not one of {len(class_names)} classes") from None
+            raise InputError(f"{location}: {class_number} is not one of {len(class_names)} classes") from None
         except ValueError:
             problem = f'must be a class number and normalized coordinates, not "{line}"'
-            raise InputError(f"{place}: {problem}") from None
+            raise InputError(f"{location}: {problem}") from None
         is_polygon = len(values) > YOLO_BOX_VALUE_COUNT and len(values) % 2 == 0
         if len(values) != YOLO_BOX_VALUE_COUNT and not is_polygon:
             rule = f"a box has {YOLO_BOX_VALUE_COUNT} values and a polygon an even number, at least 6"
-            raise InputError(f"{place}: {rule}; this line has {len(values)}")
+            raise InputError(f"{location}: {rule}; this line has {len(values)}")
         # NaN and infinity fail the comparison, too.
         if not all(-NORMALIZED_TOLERANCE <= value <= 1 + NORMALIZED_TOLERANCE for value in values):
-            raise InputError(f'{place}: coordinates must be normalized (0 to 1), not "{line}"')
+            raise InputError(f'{location}: coordinates must be normalized (0 to 1), not "{line}"')
         if is_polygon:
             xs, ys = values[0::2], values[1::2]
             box = min(xs), min(ys), max(xs), max(ys)
         else:
             x, y, width, height = values
             box = x - width / 2, y - height / 2, x + width / 2, y + height / 2
-        annotation.add(label, box, f"{place}: the image has")
+        annotation.add(label, box, f"{location}: the image has")
         annotation.polygon_count += is_polygon
     return annotation
 
 
-def _find_image(folder: Path, name: str, place: str) -> Path:
-    """Return the path of the image `name`; `place` (file and key) starts the error messages.
+def _find_image(folder: Path, name: str, location: str) -> Path:
+    """Return the path of the image `name`; `location` (file and key) starts the error messages.
 
     Raises:
         InputError: The image is missing, is not a regular file, or lies outside of the folder.
     """
     path = folder / name
     if not name or is_outside_path(name):
-        raise InputError(f'{place}: "{name}" is not below {folder}')
+        raise InputError(f'{location}: "{name}" is not below {folder}')
     if not os.path.isfile(path):
-        raise InputError(f'{place}: "{name}" is not a file in {folder}')
+        raise InputError(f'{location}: "{name}" is not a file in {folder}')
     if has_outside_link(folder, name):
-        raise InputError(f'{place}: "{name}" is a link to a file outside of {folder}')
+        raise InputError(f'{location}: "{name}" is a link to a file outside of {folder}')
     return path
 
 
@@ -246,7 +246,7 @@ def _read_text(file: Path, max_size: int) -> str:
         raise InputError(f"{file} cannot be read: {error}") from error
 
 
-def read_json(file: Path) -> dict[str, Any]:
+def read_image_properties(file: Path) -> dict[str, Any]:
     """Return the content of a file such as `truth.json`: one value for each image file name.
 
     The result is {} if the file does not exist.
@@ -275,7 +275,7 @@ def _parse_file(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> 
         raise InputError(f"{file} cannot be read: {error}") from error
 
 
-class Samples:
+class LabelledDataset:
     """Labelled images of a split; a dataset is represented by its first split in `EVALUATION_SPLITS`.
 
     Args:
@@ -302,13 +302,14 @@ class Samples:
         Raises:
             InputError: An image cannot be read.
         """
-        ignored, truth = (read_json(self._split / name) for name in ("ignored.json", "truth.json"))
+        ignored_boxes = read_image_properties(self._split / "ignored.json")
+        truth = read_image_properties(self._split / "truth.json")
         for path, annotation in self._annotations.items():
             image = read_image(path)
             height, width = image.shape[:2]
             yield LabelledImage(
                 path.name, image, tuple(annotation.labels), annotation.to_pixel_boxes(width, height),
-                tuple(map(tuple, ignored.get(path.name, ()))), truth.get(path.name, {}),
+                tuple(map(tuple, ignored_boxes.get(path.name, ()))), truth.get(path.name, {}),
             )  # fmt: skip
 
 

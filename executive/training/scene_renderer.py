@@ -65,7 +65,7 @@ class SceneRenderer:
         self._world = build_world(config, scene or DECLARED_SCENE)
         self._config = self._world.config
         self._camera = self._config.cameras[self._camera_name]
-        self._matrix, _ = compute_calibration(self._camera)
+        self._camera_matrix, _ = compute_calibration(self._camera)
 
     def render_image(self, seed: int, number: int) -> LabelledImage:
         """Draw scenes from `seed` until few objects are heavily occluded, and return the labelled image.
@@ -109,7 +109,7 @@ class SceneRenderer:
         """Return the image of a random scene, or None if too many objects are heavily occluded."""
         world = self._world
         is_holding = arrangements.move_arm_randomly(world, self._camera, rng)
-        matrix, X_WC = self._matrix, get_camera_pose(world, self._camera)
+        matrix, X_WC = self._camera_matrix, get_camera_pose(world, self._camera)
         (colour, texture), light, noise = ((1.0, 1.0, 1.0), WOOD_TEXTURE), CELL_LIGHT, self._camera.noise
         if rng.random() >= UNVARIED_SCENE_FRACTION:
             matrix, X_WC = variations.draw_camera(self._camera, matrix, X_WC, rng)
@@ -128,7 +128,7 @@ class SceneRenderer:
         world.table_top.paint(colour, texture)
         rendered = render(world, matrix, X_WC, region, light)
         scale = IMAGE_SIZE / (region[2] - region[0])
-        labelled = self._label(rendered, MIN_CONTRAST * noise.read, objects_by_body, region[:2], scale)
+        labelled = self._label_image(rendered, MIN_CONTRAST * noise.read, objects_by_body, region[:2], scale)
         return labelled and replace(labelled, image=_resize(add_noise(rendered.image, noise, rng)))
 
     def _render_initial(self, scene: SceneConfig, rng: np.random.Generator) -> LabelledImage | None:
@@ -143,27 +143,27 @@ class SceneRenderer:
         whole_image = (0, 0, camera.width, camera.height)
         declared_X_WC = get_camera_pose(world, self._declared_camera).to_rounded_list(9)
         declared_matrix, _ = compute_calibration(self._declared_camera)
-        declared_view = {"part": whole_image, "matrix": declared_matrix, "X_WC": declared_X_WC}
+        declared_calibration = {"part": whole_image, "matrix": declared_matrix, "X_WC": declared_X_WC}
         objects = {
             body: SceneObject(label, world.models[body], world.get_object_pose(body))
             for body, label in world.labels.items()
         }
-        rendered = render(world, self._matrix, X_WC, whole_image, scene.light)
+        rendered = render(world, self._camera_matrix, X_WC, whole_image, scene.light)
         image = add_noise(rendered.image, camera.noise, rng)
         depth = None if camera.depth is None else add_depth_noise(rendered.depth, camera.depth, rng)
-        second_image = add_noise(rendered.image, camera.noise, rng)
+        repeated_image = add_noise(rendered.image, camera.noise, rng)
         left, top, right, bottom = region = camera.table_view
         pixels = np.s_[top:bottom, left:right]
         view_image, segmentation = rendered.image[pixels], rendered.segmentation[pixels]
         view = replace(rendered, image=view_image, segmentation=segmentation, region=region)
         # The minimum contrast depends on the declared noise, so that more noise does not reduce the labels.
-        labelled = self._label(view, MIN_CONTRAST * self._declared_camera.noise.read, objects)
+        labelled = self._label_image(view, MIN_CONTRAST * self._declared_camera.noise.read, objects)
         return labelled and replace(
-            labelled, image=image, truth={**labelled.truth, **declared_view}, region=region, depth=depth,
-            second_image=second_image,
+            labelled, image=image, truth={**labelled.truth, **declared_calibration}, region=region,
+            depth=depth, repeated_image=repeated_image,
         )  # fmt: skip
 
-    def _label(
+    def _label_image(
         self,
         rendered: RenderedImage,
         min_contrast: float,

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from executive.errors import InputError
-from executive.training.samples import Samples, read_annotations
+from executive.training.samples import LabelledDataset, read_annotations
 
 Content = dict[str, Any]
 
@@ -131,7 +131,7 @@ def test_boxes_and_polygons_of_yolo_are_read(yolo: Callable[..., Path]) -> None:
     box, polygon = annotation.to_pixel_boxes(100, 200)
     assert box == pytest.approx((40, 60, 60, 140))
     assert polygon == pytest.approx((10, 20, 30, 40))
-    assert Samples(split).polygon_count == 1
+    assert LabelledDataset(split).polygon_count == 1
 
 
 @pytest.mark.parametrize(

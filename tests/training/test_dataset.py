@@ -10,7 +10,7 @@ import yaml
 
 from executive.errors import InputError
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
-from executive.training.samples import Samples
+from executive.training.samples import LabelledDataset
 
 CLASSES = ("cube", "duck")
 BOXES = ((10.0, 20.0, 30.0, 60.0), (50.5, 10.25, 60.0, 20.0))
@@ -56,13 +56,13 @@ def test_yolo_boxes_are_centre_and_size_relative_to_the_image(tmp_path):
 
 
 def test_the_images_that_no_training_used_are_read_as_they_were_written(root):
-    (sample,) = Samples(root)
+    (sample,) = LabelledDataset(root)
     assert (sample.file, sample.labels, sample.image.shape) == ("a.jpg", ("duck", "cube"), (64, 128, 3))
     assert np.array(sample.boxes) == pytest.approx(np.array(BOXES), abs=1e-3)
     assert (sample.ignored_boxes, sample.truth) == (IGNORED, {"camera": "overhead"})
     assert sample.image[30, 60, 0] > 150 > 50 > sample.image[30, 60, 2]
-    assert len(Samples(root)) == 1
-    (sample,) = Samples(root / "train")
+    assert len(LabelledDataset(root)) == 1
+    (sample,) = LabelledDataset(root / "train")
     assert (sample.file, sample.labels, sample.boxes, sample.ignored_boxes) == ("b.jpg", (), (), ())
 
 
@@ -70,16 +70,16 @@ def test_what_cannot_be_written_or_read_is_explained(tmp_path):
     with pytest.raises(InputError, match='"voc" is unknown; use coco or yolo'):
         write_annotations(tmp_path, "voc", ENTRIES, CLASSES)
     with pytest.raises(InputError, match=r"no labelled images: neither it nor its folders test"):
-        Samples(tmp_path)
+        LabelledDataset(tmp_path)
     write_annotations(tmp_path, "yolo", ENTRIES, CLASSES)
     (tmp_path / "valid/images").mkdir()
     (tmp_path / "data.yaml").unlink()
     with pytest.raises(InputError, match=r"has no data\.yaml, which names the classes"):
-        list(Samples(tmp_path))
+        list(LabelledDataset(tmp_path))
 
 
 def test_a_damaged_image_is_named(root):
     (damaged,) = (root / "valid").rglob("a.jpg")
     damaged.write_bytes(b"no picture")
     with pytest.raises(InputError, match=r"a\.jpg"):
-        list(Samples(root))
+        list(LabelledDataset(root))

@@ -96,8 +96,8 @@ class ClearanceChecker:
         self._get_cylinder = functools.cache(self._add_cylinder)
         """Returns the body of the load (number 0) or of an obstacle, by radius [m], height [m] and number."""
         # The function is looked up once, because a look-up takes as long as a call.
-        self._get_points = self.world.client.getClosestPoints
-        self._reach = self._compute_reach()
+        self._get_closest_points = self.world.client.getClosestPoints
+        self._radii = self._compute_max_radii()
 
     def check(self, path: Array, task: Task = Task()) -> None:
         """Check that the joint positions along a path `(N, n)` [rad] keep the margin of the cell file.
@@ -108,7 +108,7 @@ class ClearanceChecker:
         load = task.load.object_class if task.load else None
         load_size = load.height + load.radius + load.contact_radius if load else 0.0
         pairs = self._list_pairs(load, self._place_obstacles(task.obstacles))
-        movements = np.abs(np.diff(path, axis=0, prepend=path[:1])).cumsum(axis=0) * (self._reach + load_size)
+        movements = np.abs(np.diff(path, axis=0, prepend=path[:1])).cumsum(axis=0) * (self._radii + load_size)
         # Upper bound of the movement since the start of the path [m], by pair and state.
         pair_movements = [movements[:, pair.joints].sum(axis=1).tolist() for pair in pairs]
         # Movement up to which the bodies of each pair are farther apart than the margin [m].
@@ -117,13 +117,13 @@ class ClearanceChecker:
         # distance has exceeded the margin for the first time. Every other part must keep the margin.
         start_distances: dict[tuple[str, str], float] = {}
         for index, q in enumerate(path):
-            due = [pair for pair in range(len(pairs)) if pair_movements[pair][index] >= clear_until[pair]]
+            due = [i for i in range(len(pairs)) if pair_movements[i][index] >= clear_until[i]]
             if due:
                 self._place_arm(q, load)
             closest: dict[tuple[str, str], ClosestApproach] = {}
-            for pair in due:
-                distance, approaches = self._measure_distance(pairs[pair])
-                clear_until[pair] = pair_movements[pair][index] + distance - self._margin - ROUNDING_ERROR
+            for i in due:
+                distance, approaches = self._measure_distance(pairs[i])
+                clear_until[i] = pair_movements[i][index] + distance - self._margin - ROUNDING_ERROR
                 for approach in approaches:
                     key = approach.part, approach.body
                     closest[key] = min(closest.get(key, approach), approach, key=attrgetter("clearance"))
@@ -187,7 +187,7 @@ class ClearanceChecker:
         """
         body_a, body_b, *link_pair = pair.bodies
         max_distance = self._margin + SEARCH_DISTANCE
-        all_points = self._get_points(body_a, body_b, max_distance, *link_pair)
+        all_points = self._get_closest_points(body_a, body_b, max_distance, *link_pair)
         all_points = [points for points in all_points if points[LINK_A] in pair.links]
         approaches = [
             ClosestApproach(
@@ -215,7 +215,7 @@ class ClearanceChecker:
         """Return the cylinder of a load."""
         return self._get_cylinder(load.radius + load.contact_radius, load.height, 0)
 
-    def _compute_reach(self) -> Array:
+    def _compute_max_radii(self) -> Array:
         """Return the maximum distance of a point of the arm from the axis of each joint `(n,)` [m]."""
         client, world, joints = self.world.client, self.world, range(self.world.robot.joint_count)
         states = client.getLinkStates(world.arm, joints, computeForwardKinematics=True)

@@ -11,7 +11,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.mission.model.conversion import ValueProblem, convert_constant
-from executive.mission.model.nodes import InnerNode, KeyValue, Node, NodeSection, ValueOwner, list_nodes
+from executive.mission.model.nodes import InnerNode, KeyedValues, KeyValue, Node, NodeSection, list_nodes
 from executive.mission.model.values import Literal, LocatedName, LocatedReason, Reference
 from executive.tree.keys import Child, Key, KeyKind, VariableName
 from executive.tree.node import ControlNode, NodeContext, make_inspection_context
@@ -62,18 +62,18 @@ def has_valid_constants(node: InnerNode) -> bool:
     return True
 
 
-def find_upper_bound(owner: ValueOwner, key: Key) -> int | None:
+def find_upper_bound(owner: KeyedValues, key: Key) -> int | None:
     """Return the maximum of a constant: the number of nodes under `key.max_key`; None for no maximum."""
     return len(list_nodes(owner.values[key.max_key])) if key.max_key in owner.values else None
 
 
-def _make_attributes(owner: ValueOwner, build_child: BuildChild) -> Mapping[str, object]:
+def _make_attributes(owner: KeyedValues, build_child: BuildChild) -> Mapping[str, object]:
     """Return the values of all attributes that the constructor of a control node or section needs."""
     keys = (key for key in owner.declaring_class.keys.values() if key.is_required or key.name in owner.values)
     return {key.attribute: _make_value(owner, key, owner.values.get(key.name), build_child) for key in keys}
 
 
-def _make_value(owner: ValueOwner, key: Key, value: KeyValue | None, build_child: BuildChild) -> object:
+def _make_value(owner: KeyedValues, key: Key, value: KeyValue | None, build_child: BuildChild) -> object:
     """Return the value of the attribute for `key`; `value` is None if the mission lacks the required key."""
     if isinstance(value, Node):
         return build_child(value)
@@ -100,7 +100,7 @@ def _make_value(owner: ValueOwner, key: Key, value: KeyValue | None, build_child
         return _make_valid_constant(key)
 
 
-def _convert_constant(owner: ValueOwner, key: Key, value: KeyValue | None) -> object:
+def _convert_constant(owner: KeyedValues, key: Key, value: KeyValue | None) -> object:
     """Return the converted value of a constant, or raise ValueProblem."""
     constant = value.value if isinstance(value, Literal) else None
     return convert_constant(key, constant, find_upper_bound(owner, key))

@@ -13,12 +13,12 @@ from dataclasses import replace
 from executive.mission.model.nodes import (
     InnerNode,
     InvalidNode,
+    KeyedValues,
     KeyValue,
     Node,
     NodeSection,
     SkillNode,
     SubtreeNode,
-    ValueOwner,
 )
 from executive.tree.keys import KeyKind
 
@@ -45,7 +45,7 @@ def _assign_path(node: Node, parent_path: str, key_path: str, name: str = "") ->
     return replace(node, path=path)
 
 
-def _assign_value_paths(owner: ValueOwner, path: str, section_path: str = "") -> dict[str, KeyValue]:
+def _assign_value_paths(owner: KeyedValues, path: str, section_path: str = "") -> dict[str, KeyValue]:
     """Return the values by key, with paths for the nodes in the values; `path` is that of the control node.
 
     If `owner` is a section, `section_path` is its path in the control node: `backoff`, or `cases/2`.

@@ -87,7 +87,7 @@ class InvalidNode(Node):
         return self.parts
 
 
-class ValueOwner:
+class KeyedValues:
     """Base class of a control node and of a section, which set keys in the mission.
 
     Attributes:
@@ -106,7 +106,7 @@ class ValueOwner:
 
 
 @dataclass(frozen=True)
-class NodeSection(ValueOwner):
+class NodeSection(KeyedValues):
     """A mapping below a key of a control node, such as `backoff` of `retry`.
 
     Attributes:
@@ -121,7 +121,7 @@ class NodeSection(ValueOwner):
 
 
 @dataclass(frozen=True)
-class InnerNode(Node, ValueOwner):
+class InnerNode(Node, KeyedValues):
     """A control node.
 
     Attributes:

@@ -75,7 +75,7 @@ def _list_changes(run: FailedRun) -> Iterator[str]:
         yield _format_advice(run, *handler_change)
     else:
         remedy = next(node.remedy for node in load_control_nodes().values() if node.remedy)
-        yield f"{remedy} {run.format_place(run.failure_path[-1].node)}"
+        yield f"{remedy} {run.format_location(run.failure_path[-1].node)}"
     for is_handler, entry, advice in changes:
         if not is_handler:
             yield _format_advice(run, entry, advice)
@@ -91,4 +91,4 @@ def _format_advice(run: FailedRun, entry: FailurePathNode, advice: Advice) -> st
     params = run.loaded.mission.params.items() if isinstance(value, Literal) else ()
     # If a value comes from a param, its span is the span of the value of the param.
     name = next((name for name, param in params if param.value.span == getattr(value, "span", None)), "")
-    return f"{advice.text} {f'with --set {name}=...' if name else f'at {run.format_place(changed_node)}'}"
+    return f"{advice.text} {f'with --set {name}=...' if name else f'at {run.format_location(changed_node)}'}"

@@ -14,7 +14,7 @@ from executive.record.diagnosis.advice import list_advice
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, FailureNode, ItemFailure, LostItem
 from executive.record.diagnosis.failed_run import FailedRun, describe_cause
 from executive.record.picture_recorder import find_picture
-from executive.record.result import FINAL_STATUSES
+from executive.record.result import is_resumable
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.activation import Reading, get_skill_name
 from executive.record.timeline.items import ItemHistory, Look, Sighting
@@ -81,7 +81,7 @@ def diagnose(
         held_item=end.held_item,
         raised_at=_find_exception_location(timeline.traceback),
         is_recorded=not run.is_record_lost,
-        can_resume=end.status not in FINAL_STATUSES and (not run.is_record_lost or has_journal),
+        can_resume=is_resumable(end.status) and (not run.is_record_lost or has_journal),
         picture=_find_picture_file(run, run_folder),
         advice=list(list_advice(run, arm_state, readings)),
     )

@@ -72,7 +72,7 @@ class FailedRun:
     def __init__(self, loaded: LoadedMission, timeline: Timeline, end: RunEnded) -> None:
         self.loaded, self.timeline, self.end = loaded, timeline, end
         is_failure, tree = end.status == "FAILURE", loaded.tree
-        self.failure_path = find_failure_path(tree, timeline, end.node, end.reason) if is_failure else []
+        self.failure_path = find_failure_path(tree, timeline, end) if is_failure else []
         # Lost items make a run fail after its tree has succeeded; then no node determined the status.
         self.lost_items = {
             name: item
@@ -95,7 +95,7 @@ class FailedRun:
         last = self.timeline.activation_by_path.get(path)
         return get_skill_name(path) + (f" of {last.item}" if last is not None and last.item else "")
 
-    def format_place(self, node: Node) -> str:
+    def format_location(self, node: Node) -> str:
         """Return the location of a node: the line number, and the file name if it is not the mission file."""
         return node.span.describe_place(self.loaded.tree.span.source)
 
@@ -130,20 +130,20 @@ def _describe_attempt(run: FailedRun) -> str:
     return f" on attempt {attempt} of {max_attempts}"
 
 
-def find_failure_path(tree: Node, timeline: Timeline, origin: str, failure: str) -> list[FailurePathNode]:
-    """Return the nodes through which a failure propagated, from the root to the origin.
+def find_failure_path(tree: Node, timeline: Timeline, end: RunEnded) -> list[FailurePathNode]:
+    """Return the nodes through which the failure of a run propagated, from the root to the origin.
 
-    `origin` is the path of the node in which the failure with the name `failure` (`Grasp.missed`) began.
+    `end.node` is the path of the node in which the failure began; `end.reason` is the name of the failure.
     """
-    nodes = find_nodes_on_path(tree, origin)
-    skill_or_label, _, reason = failure.rpartition(".")
+    nodes = find_nodes_on_path(tree, end.node)
+    skill_or_label, _, reason = end.reason.rpartition(".")
     # For the ancestors of a node with a label, the failure may also have the name `label.reason`.
     source_names = {skill_or_label}
     failure_path: list[FailurePathNode] = []
-    for index in reversed(range(len(nodes))):
-        node = nodes[index]
+    for index, node in reversed(list(enumerate(nodes))):
         child = nodes[index + 1] if index + 1 < len(nodes) else None
-        subtree = next((each.name for each in reversed(nodes[:index]) if isinstance(each, SubtreeNode)), "")
+        ancestors = reversed(nodes[:index])
+        subtree = next((ancestor.name for ancestor in ancestors if isinstance(ancestor, SubtreeNode)), "")
         control_node = make_inspection_instance(node) if isinstance(node, InnerNode) else None
         reasons = frozenset(Reason(source, reason) for source in source_names)
         propagated = _make_propagated_failure(timeline, node.path, control_node, child, reasons)
@@ -157,9 +157,11 @@ def _make_propagated_failure(
 ) -> PropagatedFailure:
     """Return the failure that the node at `path` received from `child`; at the origin, `child` is None."""
     activation = timeline.activation_by_path.get(path) or _NO_ACTIVATION
-    children = [each for key in control.keys for each in control.list_children(key)] if control else []
+    children = (
+        [instance for key in control.keys for instance in control.list_children(key)] if control else []
+    )
     return PropagatedFailure(
-        child=next((each for each in children if get_mission_node(each) is child), None),
+        child=next((entry for entry in children if get_mission_node(entry) is child), None),
         name=activation.reason, reasons=reasons, handled_counts=activation.handled_counts,
         last_messages=activation.message_by_reason, last_handled_name=activation.last_handled_reason,
         last_choice=activation.choice, duration=activation.end - activation.start,

@@ -23,7 +23,7 @@ from executive.training.evaluation.matching import BoxMatch, is_ignored, match_d
 from executive.training.evaluation.metrics import Distribution, Evaluation
 from executive.training.evaluation.worst_mistakes import WorstMistakes
 from executive.training.labelled_image import LabelledImage
-from executive.training.samples import Samples
+from executive.training.samples import LabelledDataset
 
 MIN_CONFIDENCE = 0.01
 """Minimum confidence of the detections of a model file; the average precision needs low confidences."""
@@ -64,9 +64,9 @@ def evaluate(
         min_confidence = answer.error_rates.threshold if threshold is None else threshold
         matches = _match_confident(answer, sample, min_confidence)
         errors.add(matches, sample, frame)
-        if sample.second_image is not None:
+        if sample.repeated_image is not None:
             with contextlib.suppress(Unavailable):
-                second_answer, _ = detector.detect(replace(frame, image=sample.second_image))
+                second_answer, _ = detector.detect(replace(frame, image=sample.repeated_image))
                 second_matches = _match_confident(second_answer, sample, min_confidence)
                 repeated_errors.add(matches, second_matches, sample, frame)
         if cell is not None and (frame_statistics := compute_frame_statistics(frame, cell)):
@@ -129,7 +129,7 @@ def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -
     """
     detector = CellDetector({MODEL_NAME: make_model_config(model, labels)}, MODEL_NAME, base=Path())
     with contextlib.closing(detector):
-        return evaluate(detector, Samples(folder), threshold=threshold)
+        return evaluate(detector, LabelledDataset(folder), threshold=threshold)
 
 
 class AveragePrecision:

@@ -56,7 +56,7 @@ def draw_frame(
     """
     frame = Image.new("RGB", (WIDTH, HEIGHT), BACKGROUND)
     frame.paste(Image.fromarray(picture), (0, 0))
-    _draw_camera_image(frame, state.picture_file)
+    _draw_camera_image(frame, state.image_file)
     if has_caption and (state.incident_text or state.action_text):
         text, max_lines = (state.incident_text, 2) if state.incident_text else (state.action_text, 1)
         lines = style.wrap_text(text, _CAPTION_FONT_SIZE, MAX_CAPTION_WIDTH, max_lines)

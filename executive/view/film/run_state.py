@@ -76,7 +76,7 @@ class FilmRunState:
 
     Attributes:
         timeline: Timeline of the events up to the control step.
-        picture_file: File of the last image up to the control step; None before the first image.
+        image_file: File of the last image up to the control step; None before the first image.
         time: Start of the control step on the clock of the run [s].
     """
 
@@ -84,7 +84,7 @@ class FilmRunState:
         self, events: Sequence[TimedEvent], nodes: Sequence[OutlineNode], image_files: Sequence[Path]
     ) -> None:
         self.timeline = Timeline(has_history=False)
-        self.picture_file: Path | None = None
+        self.image_file: Path | None = None
         self.time = 0.0
         self._later_events = deque(events)
         self._later_image_files = deque(sorted(image_files))
@@ -129,7 +129,7 @@ class FilmRunState:
             if text := _describe_incident(timed_event):
                 self._last_incident, self._last_incident_time = text, timed_event.clock
         while self._later_image_files and int(self._later_image_files[0].stem.partition("_")[0]) <= step:
-            self.picture_file = self._later_image_files.popleft()
+            self.image_file = self._later_image_files.popleft()
 
 
 def _get_end_key(activation: Activation | None) -> tuple[int, str]:

@@ -22,7 +22,7 @@ from executive.record.diagnosis.diagnosis_text import list_labelled_sentences, m
 from executive.record.journal import find_run_end, find_run_start, read_journal
 from executive.record.pictures.palette import PALETTE
 from executive.record.recorded_mission import read_tree
-from executive.record.result import FINAL_STATUSES, list_requests, read_result
+from executive.record.result import is_resumable, list_requests, read_result
 from executive.record.run_directory import RunDirectory, convert_os_errors
 from executive.record.timeline.activation import find_last_failure, format_counts, group_by_node
 from executive.record.timeline.timeline import Timeline
@@ -105,7 +105,7 @@ class ReportData:
         self.repeat_command = format_repeat_command(
             mission, self.start.seed, self.start.overrides, self.requests, directory.scene
         )
-        self.resume_command = "" if self.status in FINAL_STATUSES else make_resume_command(str(path))
+        self.resume_command = make_resume_command(str(path)) if is_resumable(self.status) else ""
         self.replay_command = shlex.join(["executive", "replay", str(path)])
 
 

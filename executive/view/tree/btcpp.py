@@ -135,7 +135,7 @@ class _Exporter:
             self._add_node(element, child)
         return element
 
-    def _add_custom_node(self, parent: Element, name: str, part: nodes.ValueOwner) -> Element:
+    def _add_custom_node(self, parent: Element, name: str, part: nodes.KeyedValues) -> Element:
         """Add a custom node for `part`, which is a control node, or a section that contains nodes."""
         keys = part.declaring_class.keys.values()
         ports = [key for key in keys if not _has_nodes(key)]

@@ -134,7 +134,8 @@ def test_queries_are_left_out_only_while_nothing_can_be_near(
     clearance: ClearanceChecker, overhead: CellConfig, monkeypatch
 ) -> None:
     rng, query_counts, answers = np.random.default_rng(3), [], []
-    get_points, (home, limits) = clearance._get_points, (np.radians(overhead.arm.poses_deg["home"]), 0.9)
+    get_points, limits = clearance._get_closest_points, 0.9
+    home = np.radians(overhead.arm.poses_deg["home"])
     paths = [np.linspace(home, home + rng.uniform(-limits, limits, 7), 40) for _ in range(25)]
     for search_distance in (0.0, collision.SEARCH_DISTANCE):
         monkeypatch.setattr(collision, "SEARCH_DISTANCE", search_distance)
@@ -145,7 +146,7 @@ def test_queries_are_left_out_only_while_nothing_can_be_near(
             query_counts[-1] += 1
             return get_points(*args)
 
-        monkeypatch.setattr(clearance, "_get_points", count)
+        monkeypatch.setattr(clearance, "_get_closest_points", count)
         for path in paths:
             try:
                 clearance.check(path, Task(DUCK.load, (TOWER,)))

@@ -13,7 +13,7 @@ from executive.training.evaluation.evaluate import evaluate
 @pytest.fixture
 def twice(sample):
     """The image, taken twice."""
-    return replace(sample, second_image=sample.image)
+    return replace(sample, repeated_image=sample.image)
 
 
 def test_a_miss_and_a_wrong_class_that_come_again_are_repeated(saying, twice, sample):

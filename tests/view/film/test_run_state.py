@@ -43,12 +43,12 @@ def test_what_happens_in_a_step_is_seen_in_it_and_not_before(state: FilmRunState
     state.advance_to(2, 2 / 240)
     assert (statuses(state), state.action_text) == ({"tree": "RUNNING"}, "")
     assert list(state.timeline.items.by_name) == ["cube-1"]
-    assert state.picture_file is None
+    assert state.image_file is None
     state.advance_to(3, 3 / 240)
     assert statuses(state)["tree/Grasp"] == "RUNNING"
     assert state.action_text == "Grasp cube-1"
     assert state.timeline.find_current_activation("tree/Grasp").reason_or_item == "cube-1"
-    assert state.picture_file == Path("frames/000003_cube-1.jpg")
+    assert state.image_file == Path("frames/000003_cube-1.jpg")
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_a_failure_with_an_item_is_shown_for_some_time(state: FilmRunState) -> N
     state.advance_to(240, 1.0)
     assert state.incident_text == "Grasp.missed: no seal"
     state.advance_to(300, 1.25)
-    assert state.picture_file == Path("frames/000250_cube-1_missed.jpg")
+    assert state.image_file == Path("frames/000250_cube-1_missed.jpg")
     assert state.incident_text
     state.advance_to(700, 1.0 + INCIDENT_DISPLAY_TIME + 0.01)
     assert state.incident_text == ""
