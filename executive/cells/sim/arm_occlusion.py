@@ -51,7 +51,10 @@ class ArmOcclusion:
         self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
 
     def compute_visibility_mask(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:
-        """Return a mask `(H, W)` of the visible pixels; `size` is width and height of the image [pixel]."""
+        """Return a mask `(H, W)` of the visible pixels.
+
+        `matrix` is the camera matrix `(3, 3)` [pixel], and `size` is width and height of the image [pixel].
+        """
         q = self._world.get_joint_positions()
         X_WT = self._kinematics.compute_tool_pose(q)
         X_WF = X_WT @ self._X_TF

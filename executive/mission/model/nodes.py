@@ -122,7 +122,7 @@ class NodeSection(KeyedValues):
 
 @dataclass(frozen=True)
 class InnerNode(Node, KeyedValues):
-    """A control node.
+    """A control node in the mission file; the run executes an instance of its `declaring_class`.
 
     Attributes:
         declaring_class: Class of the control node, which declares the keys.

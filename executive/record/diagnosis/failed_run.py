@@ -157,9 +157,7 @@ def _make_propagated_failure(
 ) -> PropagatedFailure:
     """Return the failure that the node at `path` received from `child`; at the origin, `child` is None."""
     activation = timeline.activation_by_path.get(path) or _NO_ACTIVATION
-    children = (
-        [instance for key in control.keys for instance in control.list_children(key)] if control else []
-    )
+    children = [entry for key in control.keys for entry in control.list_children(key)] if control else []
     return PropagatedFailure(
         child=next((entry for entry in children if get_mission_node(entry) is child), None),
         name=activation.reason, reasons=reasons, handled_counts=activation.handled_counts,

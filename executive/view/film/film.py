@@ -71,4 +71,4 @@ def _draw_frames(
             state.advance_to(step, step * start.step)
             yield draw_frame(source, picture, state, subtitle, duration)
     last_frame = draw_frame(source, picture, state, subtitle, duration, has_caption=False)
-    yield from [add_result(last_frame, source.result)] * result_frame_count
+    yield from [add_result(last_frame, source.outcome)] * result_frame_count

@@ -34,7 +34,7 @@ class FilmSource:
         config: Configuration of the cell.
         bin_colours: Colour of each bin in the format `#rrggbb` of Pillow, by bin name.
         item_count: Number of items in the run.
-        result: Result from result.json, or else from the journal; None for an interrupted run.
+        outcome: Result from result.json, or else from the journal; None for an interrupted run.
 
     Raises:
         InputError: The journal, the tree, the cell or the log of the world is missing in the record.
@@ -63,7 +63,7 @@ class FilmSource:
         }
         changes = (timed.event for timed in self.events if isinstance(timed.event, ItemChanged))
         self.item_count = len({change.item for change in changes})
-        self.result = read_result(directory, events) or find_run_end(events)
+        self.outcome = read_result(directory, events) or find_run_end(events)
 
 
 class FilmRunState:

@@ -69,11 +69,11 @@ class ReportData:
         path: Run directory.
         start: Event of the start of the run.
         result: Content of `result.json`; None if it is missing, damaged, or older than the last resumption.
-        end: Result; without a result, the event of the end of the run; None for an interrupted run.
+        outcome: Result; without a result, the event of the end of the run; None for an interrupted run.
         status: `SUCCESS`, `INCOMPLETE`, `FAILURE`, `FAULT`, `HALTED` or `INTERRUPTED`.
         nodes: Nodes of the tree.
         timeline: Timeline of the run.
-        items: Last change of each item that is not a phantom.
+        item_states: Last change of each item that is not a phantom.
         activity_times: Time of the run by item and activity.
         pictures: Pictures of decisions and failures.
         requests: Requests of the operator, in order.
@@ -91,12 +91,12 @@ class ReportData:
         self.path = path
         self.start = find_run_start(events, path, "there is nothing to report")
         self.result = read_result(directory, events)
-        self.end = self.result or find_run_end(events)
-        self.status = INTERRUPTED if self.end is None else self.end.status
+        self.outcome = self.result or find_run_end(events)
+        self.status = INTERRUPTED if self.outcome is None else self.outcome.status
         self.nodes = read_tree(directory.tree)
         self.timeline = Timeline.from_events(events)
         all_items = self.timeline.items.list_items()
-        self.items = [item for item in all_items if item.state != "phantom"]
+        self.item_states = [item for item in all_items if item.state != "phantom"]
         self.activity_times = compute_activity_times(self.timeline, self.nodes)
         self.pictures = collect_pictures(directory.pictures, [item.item for item in all_items])
         self.requests = list_requests(self.timeline)
@@ -109,17 +109,17 @@ class ReportData:
         self.replay_command = shlex.join(["executive", "replay", str(path)])
 
 
-def try_write_report(run: str) -> tuple[str, str]:
-    """Write the report of the run in the directory `run`; return file and error message, of which one is "".
+def try_write_report(run_directory: str) -> tuple[str, str]:
+    """Write the report of the run in `run_directory`; return file and error message, of which one is "".
 
     The function raises no exception, because an error of the report must not change the result of the run.
     """
     try:
-        return str(write_report(Path(run))), ""
+        return str(write_report(Path(run_directory))), ""
     except ExecutiveError as error:
         return "", f"no report was written: {error}"
     except Exception as error:
-        advice = f"`executive --debug report {run}` shows the traceback"
+        advice = f"`executive --debug report {run_directory}` shows the traceback"
         return "", f"no report was written: {type(error).__name__}: {error}; {advice}"
 
 
@@ -139,9 +139,9 @@ def write_report(path: Path) -> Path:
 
 def render_report(data: ReportData) -> str:
     """Return the report of a run as HTML; texts of missions and skills are escaped."""
-    result, params, item_names = data.result, data.start.params, [item.item for item in data.items]
+    result, params, outcome = data.result, data.start.params, data.outcome
     # A reason that repeats the status, such as "fault", is omitted.
-    reason = "" if data.end is None or data.end.reason.upper() == data.status else data.end.reason
+    reason = "" if outcome is None or outcome.reason.upper() == data.status else outcome.reason
     warning = "" if result is None else result.disagreement
     return render_template(
         "report/report.html",
@@ -159,16 +159,15 @@ def render_report(data: ReportData) -> str:
         tree=Markup(make_svg(data.nodes, data.start.mission, _make_node_results(data))),
         timeline=Markup(draw_lanes(data.timeline, data.nodes)),
         params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
-        scan_pictures=[each for each in data.pictures if each.reason and each.item not in item_names],
     )
 
 
 def _describe_end(data: ReportData) -> str:
     """Return a text about the end of the run: the verdict, the message, or the number of placed objects."""
-    result, end = data.result, data.end
-    if end is None:
+    result, outcome = data.result, data.outcome
+    if outcome is None:
         return "The journal has no end: the run was killed, or is still running."
-    if verdict := end.message if result is None else result.verdict:
+    if verdict := outcome.message if result is None else result.verdict:
         return verdict
     if result is None:
         return "The run ended, but its result.json is missing."
@@ -195,13 +194,13 @@ def _make_node_results(data: ReportData) -> dict[str, NodeResult]:
     return results
 
 
-def collect_pictures(folder: Path, items: Collection[str]) -> list[Picture]:
+def collect_pictures(folder: Path, item_names: Collection[str]) -> list[Picture]:
     """Return the pictures of a run: the last decision for each object, then all failures by time.
 
     If the pictures are too large for one page, the first pictures are embedded and the others linked.
-    `folder` is the folder `frames` of the run; `items` are the names of all items of the run.
+    `folder` is the folder `frames` of the run; `item_names` are the names of all items of the run.
     """
-    links = [_link_picture(file, items) for file in folder.glob("*.jpg")]
+    links = [_link_picture(file, item_names) for file in folder.glob("*.jpg")]
     pictures = sorted(links, key=attrgetter("tick", "file"))
     decisions = {picture.item: picture for picture in pictures if picture.item and not picture.reason}
     failures = [picture for picture in pictures if picture.reason]
@@ -218,13 +217,13 @@ def collect_pictures(folder: Path, items: Collection[str]) -> list[Picture]:
     return shown_pictures
 
 
-def _link_picture(file: Path, items: Collection[str]) -> Picture:
+def _link_picture(file: Path, item_names: Collection[str]) -> Picture:
     """Return a link to a picture, with the information in its file name `<tick>_<item>_<reason>`."""
     path = f"{file.parent.name}/{file.name}"
     tick_text, _, subject = file.stem.partition("_")
     tick = int(tick_text) if tick_text.isdecimal() else 0
     # The name of an item may be the beginning of the name of another item, so long names are tried first.
-    for item in sorted(items, key=len, reverse=True):
+    for item in sorted(item_names, key=len, reverse=True):
         if subject == item or subject.startswith(f"{item}_"):
             return Picture(quote(path), path, tick, item, subject.removeprefix(item).removeprefix("_"))
     return Picture(quote(path), path, tick, "", subject)

@@ -84,11 +84,11 @@ def test_the_source_is_the_record_and_may_be_cut_off(copy: RunDirectory) -> None
     source = FilmSource(copy)
     assert (source.start.mission, source.start.seed) == ("bring_one", 5)
     assert (source.config.cell, source.nodes[0].path) == ("overhead", "tree")
-    assert (source.result.status, source.item_count) == ("SUCCESS", 6)
+    assert (source.outcome.status, source.item_count) == ("SUCCESS", 6)
     lines = copy.journal.read_text().splitlines(keepends=True)
     copy.journal.write_text("".join(lines[:-1]))
     copy.result.write_text("{")
-    assert FilmSource(copy).result is None
+    assert FilmSource(copy).outcome is None
 
 
 @pytest.mark.parametrize(

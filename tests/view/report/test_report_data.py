@@ -62,10 +62,10 @@ def test_a_result_from_before_the_run_was_taken_up_again_is_not_its_end(failed, 
     run = copy(failed)
     append(run, 312, RunResumed(310, "", {}))
     facts = ReportData(run)
-    assert (facts.status, facts.end, facts.timeline.clock) == (INTERRUPTED, None, 1.3)
+    assert (facts.status, facts.outcome, facts.timeline.clock) == (INTERRUPTED, None, 1.3)
     append(run, 400, run_ended("HALTED", reason="halted", message="halted by the user", ticks=400))
     facts = ReportData(run)
-    assert (facts.status, facts.end.message) == ("HALTED", "halted by the user")
+    assert (facts.status, facts.outcome.message) == ("HALTED", "halted by the user")
     assert facts.resume_command == shlex.join(["executive", "run", "--resume", str(run)])
 
 
@@ -83,9 +83,9 @@ def test_a_result_that_is_none_tells_nothing(failed, copy, content):
     run = copy(failed)
     (run / "result.json").write_bytes(content.encode(errors="surrogatepass"))
     facts = ReportData(run)
-    assert (facts.status, facts.end) == ("FAILURE", facts.timeline.ended)
+    assert (facts.status, facts.outcome) == ("FAILURE", facts.timeline.ended)
     without_end(run)
-    assert (ReportData(run).status, ReportData(run).end) == (INTERRUPTED, None)
+    assert (ReportData(run).status, ReportData(run).outcome) == (INTERRUPTED, None)
 
 
 def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(done, copy):
