@@ -20,8 +20,8 @@ CLUSTER_EXTRA = "cluster"
 """Extra of this project with the packages for the connection to a scheduler."""
 FILES_KEY = "hash of the files of executive"
 """Key of the hash of this project's files, which differs for commits with the same version number."""
-HASHED_SUFFIXES = (".py", ".yaml", ".onnx")
-"""Suffixes of the files that are hashed: code, shipped missions and cells, and models."""
+HASHED_SUFFIXES = (".py", ".yaml", ".onnx", ".urdf")
+"""Suffixes of the hashed files: code, shipped missions and cells, models of detectors and of the tool."""
 INSTALLATION_ADVICE = "install the same versions there, and start the scheduler and its workers again"
 """Advice to the user of a worker with other software."""
 
