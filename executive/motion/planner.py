@@ -116,7 +116,8 @@ class Planner:
         """
         qs = motion.sample_within_limits(self.limits).q
         has_guarded_part = motion.guarded_start_time < math.inf
-        free_qs = qs[: math.ceil(motion.guarded_start_time / STEP)] if has_guarded_part else qs
+        # The first state belongs to the free part, even if the tool starts in the guarded part.
+        free_qs = qs[: max(1, math.ceil(motion.guarded_start_time / STEP))] if has_guarded_part else qs
         search.require_clearance(free_qs)
         if self._check_collision is not None:
             free_path = downsample_path(free_qs, MAX_CHECK_SPACING)

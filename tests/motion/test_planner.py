@@ -87,6 +87,13 @@ def test_a_fixed_question_gets_a_fixed_answer(planner, config, home, name: str) 
     assert motion.samples.q.mean(axis=0) == pytest.approx(mean, abs=2e-4)
 
 
+def test_a_motion_may_begin_inside_its_guarded_part(planner, home) -> None:
+    start = planner.plan(home, Goal((0.5, 0.0, 0.055))).end
+    goal = Goal((0.5, 0.0, 0.05), guarded_length=0.015, guarded_speed=0.04, fast_length=0.014)
+    motion = planner.plan(start, goal, Task(target=Obstacle(0.5, 0.0, 0.0354, 0.05, "it")))
+    assert motion.guarded_start_time == 0.0
+
+
 @given(on_the_table, st.floats(0.008, 0.03), st.floats(0.02, 0.08))
 @settings(max_examples=10)
 def test_the_guarded_part_is_straight_even_and_no_faster_than_asked(
