@@ -22,7 +22,7 @@ JobResult = TypeVar("JobResult")
 MAX_HALT_DELAY = 0.1
 """Maximum time between a signal to this process and the signals to its workers [s]."""
 MAX_CRASHES = 2
-"""Number of worker processes that have died during a job when the job counts as failed."""
+"""A job fails as soon as this many worker processes have died while they executed it."""
 
 
 @dataclass(frozen=True)
@@ -31,19 +31,19 @@ class JobOptions:
 
     Attributes:
         workers: Number of worker processes on this computer.
-        progress: Function that is called with the number of finished jobs and the number of all jobs.
+        on_progress: Function that is called with the number of finished jobs and the number of all jobs.
         on_halt: Function that is called after the first signal (Ctrl-C, SIGTERM).
     """
 
     workers: int = 2
-    progress: Callable[[int, int], None] = lambda *_: None
+    on_progress: Callable[[int, int], None] = lambda *_: None
     on_halt: Callable[[], None] = lambda: None
 
 
 def run_jobs(
     jobs: Sequence[Job],
     run_job: Callable[[Job], JobResult],
-    make_failure: Callable[[Job, BaseException], JobResult],
+    make_fault_result: Callable[[Job, BaseException], JobResult],
     options: JobOptions = JobOptions(),
     on_result: Callable[[int, JobResult, int], None] = lambda *_: None,
 ) -> list[JobResult | None]:
@@ -56,7 +56,7 @@ def run_jobs(
     Args:
         jobs: The jobs.
         run_job: Function that executes a job and returns its result.
-        make_failure: Function that returns the result after an exception or the death of the processes.
+        make_fault_result: Function that returns the result after an exception or the death of the processes.
         options: Number of processes, and functions that are called during the execution.
         on_result: Function that is called with the index and the result of each job as soon as it ends, and
             with the number of processes that died during the job.
@@ -65,50 +65,52 @@ def run_jobs(
         KeyboardInterrupt: A second signal arrived before the running jobs had halted.
     """
     pending_indices = deque(range(len(jobs)))
+    running_jobs: dict[Future[JobResult], tuple[int, WorkerPool]] = {}
     results: dict[int, JobResult] = {}
     crash_counts: Counter[int] = Counter()
-    running_jobs: dict[Future[JobResult], tuple[int, WorkerPool]] = {}
     # Each pool has one process, because the death of a process breaks all jobs of its pool.
     idle_pools = [WorkerPool(1) for _ in range(min(options.workers, len(jobs)))]
     is_halted, signal_event = False, threading.Event()
     try:
         with handle_signals(HALT_SIGNALS, lambda *_: signal_event.set()):
-            while running_jobs or (pending_indices and not is_halted):
-                while pending_indices and idle_pools and not is_halted and not signal_event.is_set():
-                    index, pool = pending_indices.popleft(), idle_pools.pop()
+            while running_jobs or pending_indices:
+                # Start jobs in the idle pools. No job starts after a signal.
+                while pending_indices and idle_pools and not signal_event.is_set():
+                    pool = idle_pools.pop()
                     try:
-                        running_jobs[pool.submit(run_job, jobs[index])] = index, pool
-                    except BrokenExecutor:  # The process died after its last result was read.
+                        future = pool.submit(run_job, jobs[pending_indices[0]])
+                    except BrokenExecutor:  # The process of the pool has died; the job stays pending.
                         pool.shutdown()
-                        pending_indices.appendleft(index)
                         idle_pools.append(WorkerPool(1))
+                    else:
+                        running_jobs[future] = pending_indices.popleft(), pool
                 ended_jobs, _ = wait(running_jobs, MAX_HALT_DELAY, FIRST_COMPLETED)
-                # Two signals within `MAX_HALT_DELAY` count as one signal: the command `timeout` sends two.
+                # Halt after the first signal, and quit after the second one. Two signals within
+                # `MAX_HALT_DELAY` count as one signal: the command `timeout` sends two.
                 if signal_event.is_set():
                     signal_event.clear()
                     if is_halted:
                         kill_workers()
                         raise KeyboardInterrupt
                     is_halted = True
+                    pending_indices.clear()
                     options.on_halt()
                 if is_halted:
                     _halt_runs()
+                # Store the results. A job whose process died becomes pending again, or has failed.
                 for future in ended_jobs:
                     (index, pool), error = running_jobs.pop(future), future.exception()
-                    if isinstance(error, BrokenExecutor):
-                        pool.shutdown()
-                        pool = WorkerPool(1)
                     idle_pools.append(pool)
                     if isinstance(error, BrokenExecutor):
                         if is_halted:
-                            continue  # The signal also killed a worker.
+                            continue  # The signal also killed the worker.
                         crash_counts[index] += 1
                         if crash_counts[index] < MAX_CRASHES:
                             pending_indices.appendleft(index)
                             continue
-                    results[index] = future.result() if error is None else make_failure(jobs[index], error)
+                    results[index] = make_fault_result(jobs[index], error) if error else future.result()
                     on_result(index, results[index], crash_counts[index])
-                    options.progress(len(results), len(jobs))
+                    options.on_progress(len(results), len(jobs))
     finally:
         for pool in (*idle_pools, *(pool for _, pool in running_jobs.values())):
             pool.shutdown()

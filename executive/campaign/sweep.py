@@ -11,6 +11,8 @@ from pathlib import Path
 from executive.campaign.pool import JobOptions, run_jobs
 from executive.campaign.results.database import ResultsDatabase
 from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings, make_record
+from executive.campaign.results.sweep_summary import SweepResults, summarize_runs
+from executive.campaign.results.tables import ITEMS, RUNS, SKILLS
 from executive.errors import ExecutiveError
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import load_skills
@@ -60,9 +62,9 @@ def run_sweep(
 ) -> None:
     """Execute all jobs, and store the record of each run as soon as the run ends.
 
-    A run whose process dies twice has the status `FAULT`. After Ctrl-C or SIGTERM no further run starts, and
-    current runs are halted; halted runs are not stored. `cluster` is the address of a dask scheduler, whose
-    workers execute the jobs, or None.
+    A run gets the status `FAULT` after two of its worker processes died. After Ctrl-C or SIGTERM no further
+    run starts, and current runs are halted; halted runs are not stored. `cluster` is the address of a dask
+    scheduler, whose workers execute the jobs, or None.
     """
 
     def store(_: int, record: RunRecord, crash_count: int) -> None:
@@ -77,12 +79,20 @@ def run_sweep(
         run_jobs_on_cluster(jobs, cluster, options, store)
 
 
+def read_results(database: ResultsDatabase, name: str) -> SweepResults:
+    """Return the results of all stored runs of a sweep; `name` is `A` or `B` in a comparison, else ""."""
+    settings, runs, skills = database.settings, database.read(RUNS), database.read(SKILLS)
+    summaries = summarize_runs(runs, skills, functools.partial(make_repeat_command, settings))
+    planned_run_count = len(list_jobs(settings, database.path.parent))
+    return SweepResults(name, settings, runs, database.read(ITEMS), summaries, planned_run_count)
+
+
 def run_job(job: SweepJob) -> RunRecord:
     """Execute and record one run, and return its rows; write a report if the run has a problem."""
     settings, timeline = job.settings, Timeline()
     loaded = _load_mission(settings.mission, tuple({**settings.overrides, **job.variant}.items()))
     options = RunOptions(job.seed, scene=settings.scene)
-    record_options = RecordOptions(saves_pictures=settings.saves_pictures, timeline=timeline)
+    record_options = RecordOptions(saves_pictures=settings.saves_images, timeline=timeline)
     result = record_run(loaded, options, job.runs_folder, record_options)
     record = make_record(job.index, job.variant, result, timeline)
     if record.run.problem:
@@ -92,9 +102,9 @@ def run_job(job: SweepJob) -> RunRecord:
 
 def make_fault_record(job: SweepJob, error: BaseException) -> RunRecord:
     """Return the record of a run that raised an exception or whose processes died."""
-    message = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
+    text = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
     run = RunRow(
-        job=job.index, seed=job.seed, variant=job.variant, status="FAULT", reason="fault", message=message
+        run_index=job.index, seed=job.seed, variant=job.variant, status="FAULT", reason="fault", message=text
     )
     return RunRecord(run)
 

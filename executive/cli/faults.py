@@ -36,7 +36,7 @@ def parse_fault_numbers(text: str) -> tuple[int, ...]:
 @options.json_option
 def command(
     mission: str, oracle: bool, pairs: int | None, fault_numbers: tuple[int, ...] | None,
-    list_only: bool, workers: int, seed: int, overrides: dict[str, str], runs: Path, as_json: bool,
+    list_only: bool, workers: int, seed: int, overrides: dict[str, str], runs_folder: Path, as_json: bool,
 ) -> int:  # fmt: skip
     """Inject each possible fault into a run of a mission.
 
@@ -66,7 +66,7 @@ def command(
                 text, exit_code = "\n".join(f"{number:4} {text}" for number, text in descriptions.items()), 0
             elif fault_numbers is not None:
                 faults = campaign.select_faults(fault_numbers)
-                trial, path = record_trial(mission_under_test, campaign.nominal_run, faults, runs)
+                trial, path = record_trial(mission_under_test, campaign.nominal_run, faults, runs_folder)
                 output = {**fault_results.trial_to_json(trial), "run": str(path)}
                 text = "\n".join((*fault_results.list_trial_lines(trial), str(path)))
                 exit_code = int(bool(trial.problems))

@@ -25,7 +25,7 @@ from executive.cli.streams import keep_stdout_clean, print_json
 @json_option
 def command(
     run: str, output: Path | None, gif: bool, speed: float | None, force: bool, quiet: bool, workers: int,
-    runs: Path, as_json: bool,
+    runs_folder: Path, as_json: bool,
 ) -> None:  # fmt: skip
     """Make a film of a recorded run.
 
@@ -40,7 +40,7 @@ def command(
         from executive.view.film.formats import choose_format, prepare_file
         from executive.view.film.run_state import FilmSource
 
-        directory = RunDirectory(find_run(run, runs))
+        directory = RunDirectory(find_run(run, runs_folder))
         film_format = choose_format(output, gif)
         film_file = output or directory.path / f"film{film_format.suffix}"
         source = FilmSource(directory)

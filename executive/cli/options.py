@@ -99,16 +99,19 @@ def check_usage(*errors: tuple[object, str]) -> None:
 
 
 make_overrides_option = partial(click.option, metavar="KEY=VALUE", multiple=True, callback=_parse_overrides)
-"""Returns a repeatable option KEY=VALUE; the arguments are names of option and argument, and `help`."""
+"""Make a repeatable option with values KEY=VALUE.
+
+Arguments: the option name, the parameter name, and `help`.
+"""
 overrides_option = make_overrides_option(
     "--set", "overrides",
     help="Set a param of the mission, or a key of the cell: cell.KEY.KEY=VALUE; repeatable.",
 )  # fmt: skip
 variations_option = click.option(
     "--vary", "variations", metavar="KEY=[VALUE, ...]", multiple=True, callback=_parse_variations,
-    help="Run every seed with each of the values, named as in --set; repeatable: all combinations are run.",
+    help="Run every seed with each of these values of KEY (see --set); repeatable, all combinations are run.",
 )  # fmt: skip
-runs_option = click.option("--runs", type=FOLDER, default=Path("runs"), help="Folder with run directories.")
+runs_option = click.option("--runs", "runs_folder", type=FOLDER, default="runs", help="Folder of the runs.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
 seed_option = click.option("--seed", type=click.IntRange(0, MAX_SEED), default=0, help="Random seed.")
 scene_option = click.option(
@@ -130,12 +133,12 @@ _SWEEP_OPTIONS = (
         "--cluster", metavar="ADDRESS",
         help="Run on the workers of a dask scheduler, for example tcp://scheduler:8786 (extra: cluster).",
     ),
-    click.option("--frames", is_flag=True, help="Save the camera images on which decisions are based."),
+    click.option("--save-images", is_flag=True, help="Save the camera images on which decisions are based."),
     overrides_option, scene_option, runs_option, json_option,
 )  # fmt: skip
 """Options that the commands `sweep` and `compare` share."""
 _SWEEP_SETTINGS = {
-    "mission", "missions", "seeds", "frames", "scene",
+    "mission", "missions", "seeds", "save_images", "scene",
     "variations", "overrides", "overrides_a", "overrides_b",
 }  # fmt: skip
 """Parameters of `sweep` and `compare` whose values `--resume` reads from the results."""
@@ -148,24 +151,26 @@ def add_sweep_options(command: CommandT) -> CommandT:
     return command
 
 
-def check_distinct(names: str, values: Mapping[str, object], other_values: Mapping[str, object]) -> None:
-    """Check that no key has a value in both mappings, which the options `names` give."""
-    keys = ", ".join(values.keys() & other_values.keys())
-    check_usage((keys, f"{names} both give {keys}; omit one of them"))
+def check_distinct(overrides: Mapping[str, str], options: str, values: Mapping[str, object]) -> None:
+    """Raise a usage error if a key is in both mappings; `options` names the options of the second mapping."""
+    for key in overrides.keys() & values.keys():
+        raise click.UsageError(f"{key} is set with --set and also with {options}; omit one of them")
 
 
-def check_resume(ctx: click.Context, *, has_runs: bool, runs_text: str, settings_text: str) -> None:
-    """Check that a command line states either the runs of `sweep` or `compare`, or `--resume`.
+def check_resume(
+    ctx: click.Context, *, has_missions_and_seeds: bool, required_arguments: str, resumed_settings: str
+) -> None:
+    """Check that the command line gives either missions and seeds, or `--resume`, but not both.
 
     Args:
         ctx: Context of the command.
-        has_runs: True if the command line states missions and seeds.
-        runs_text: Arguments that the command needs.
-        settings_text: Settings that `--resume` reads, and their source.
+        has_missions_and_seeds: True if the command line gives missions and seeds.
+        required_arguments: Arguments that the command needs, for the message.
+        resumed_settings: Settings that `--resume` reads, and their source, for the message.
     """
     is_resume, names = ctx.params["resume"] is not None, ctx.params.keys() & _SWEEP_SETTINGS
     has_settings = any(ctx.get_parameter_source(name) is not ParameterSource.DEFAULT for name in names)
     check_usage(
-        (not is_resume and not has_runs, f"give {runs_text}"),
-        (is_resume and has_settings, f"--resume takes {settings_text}; omit them"),
+        (not is_resume and not has_missions_and_seeds, f"give {required_arguments}"),
+        (is_resume and has_settings, f"--resume takes {resumed_settings}; omit them"),
     )

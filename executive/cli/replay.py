@@ -16,7 +16,7 @@ from executive.exit_codes import ExitCode
 @click.option("--mission", "mission_file", type=FILE, help="Mission file instead of the recorded mission.")
 @runs_option
 @json_option
-def command(run: str, mission_file: Path | None, runs: Path, as_json: bool) -> ExitCode:
+def command(run: str, mission_file: Path | None, runs_folder: Path, as_json: bool) -> ExitCode:
     """Repeat the decisions of a recorded run.
 
     RUN is a run directory or `latest`. Nothing moves and nothing is simulated: tree, skills and ledger get
@@ -29,7 +29,7 @@ def command(run: str, mission_file: Path | None, runs: Path, as_json: bool) -> E
         from executive.record.replayed_run import replay_run
         from executive.record.run_directory import find_run
 
-        path = find_run(run, runs)
+        path = find_run(run, runs_folder)
         result = replay_run(path, read_journal(path / "journal.jsonl"), load_skills(), mission_file)
         comparison = ", all as recorded" if result.is_equal else f" as recorded, then {result.difference}"
         click.echo(f"{result.decisions} decisions{comparison} ({path})", err=True)

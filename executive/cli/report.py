@@ -14,7 +14,7 @@ from executive.cli.streams import keep_stdout_clean, print_json
 @click.argument("run", metavar="RUN")
 @runs_option
 @json_option
-def command(run: str, runs: Path, as_json: bool) -> None:
+def command(run: str, runs_folder: Path, as_json: bool) -> None:
     """Write the report of a recorded run.
 
     RUN is a run directory or `latest`. Prints the path of the report. Every run writes its report when it
@@ -24,7 +24,7 @@ def command(run: str, runs: Path, as_json: bool) -> None:
         from executive.record.run_directory import find_run
         from executive.view.report.page import write_report
 
-        file = write_report(find_run(run, runs))
+        file = write_report(find_run(run, runs_folder))
     if as_json:
         print_json({"report": str(file), "bytes": file.stat().st_size})
     else:

@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 @click.pass_context
 def command(
     ctx: click.Context, mission: str | None, resume: str | None, seed: int, overrides: dict[str, str],
-    scene: Path | None, runs: Path, as_json: bool, quiet: bool, has_page: bool, paused: bool, gui: bool,
-    realtime: bool, requests: tuple[str, ...],
+    scene: Path | None, runs_folder: Path, as_json: bool, quiet: bool, has_page: bool, paused: bool,
+    gui: bool, realtime: bool, requests: tuple[str, ...],
 ) -> ExitCode:  # fmt: skip
     """Run a mission and record the run.
 
@@ -88,10 +88,10 @@ def command(
             )  # fmt: skip
             if mission is None:
                 assert resume is not None
-                result, start_event = _resume(resume, run_options, runs, record)
+                result, start_event = _resume(resume, run_options, runs_folder, record)
                 repeat_arguments = start_event.file, start_event.seed, start_event.overrides
             else:
-                result = _run_mission(mission, overrides, run_options, runs, record)
+                result = _run_mission(mission, overrides, run_options, runs_folder, record)
                 repeat_arguments = mission, seed, overrides
             # The command that repeats the run also contains requests that the operator made during the run.
             all_requests, used_scene = requests or result.requests, RunDirectory(Path(result.run)).scene
@@ -118,7 +118,7 @@ def command(
 
 
 def _run_mission(
-    mission: str, overrides: dict[str, str], run_options: RunOptions, runs: Path, record: RecordOptions
+    mission: str, overrides: dict[str, str], run_options: RunOptions, runs_folder: Path, record: RecordOptions
 ) -> Result:
     """Run a mission, record the run and return its result."""
     from executive.mission.load import load_mission
@@ -133,11 +133,11 @@ def _run_mission(
 
         # Only simulated cells read the scene file, but its errors are reported for every cell.
         load_scene(run_options.scene, loaded_mission.cell_config)
-    return record_run(loaded_mission, run_options, runs, record)
+    return record_run(loaded_mission, run_options, runs_folder, record)
 
 
 def _resume(
-    name: str, run_options: RunOptions, runs: Path, record: RecordOptions
+    name: str, run_options: RunOptions, runs_folder: Path, record: RecordOptions
 ) -> tuple[Result, RunStarted]:
     """Resume an interrupted run; return the result and the start event of the run."""
     from executive.plugins import load_skills
@@ -145,7 +145,7 @@ def _resume(
     from executive.record.resume import resume_run
     from executive.record.run_directory import find_run
 
-    path = find_run(name, runs)
+    path = find_run(name, runs_folder)
     result = resume_run(path, load_skills(), run_options, record)
     return result, find_run_start(read_journal(path / "journal.jsonl"), path, "run the mission again")
 

@@ -15,7 +15,6 @@ from executive.exit_codes import ExitCode
 
 if TYPE_CHECKING:
     from executive.campaign.results.database import ResultsDatabase
-    from executive.campaign.results.sweep_summary import SweepResults
 
 
 @click.command(name="sweep")
@@ -28,53 +27,56 @@ if TYPE_CHECKING:
 @options.add_sweep_options
 @click.option(
     "--require", metavar="EXPR",
-    help='Exit with code 1 if the runs do not meet EXPR: "success>=0.99 and p95(robot_time_s)<20".',
+    help='Exit with code 1 if the runs do not meet EXPR: "success_rate>=0.99 and p95(robot_time_s)<20".',
 )  # fmt: skip
 @click.option("--junit", type=options.FILE, help="Write a report in the JUnit XML format to this file.")
-@click.option("--export", type=options.FOLDER, help="Write the tables of runs, items and phases as Parquet.")
+@click.option("--export", type=options.FOLDER, help="Write the tables of runs, items and skills as Parquet.")
 @click.pass_context
 def command(
     ctx: click.Context, mission: str | None, seeds: range | None, variations: dict[str, tuple[str, ...]],
-    resume: Path | None, workers: int, cluster: str | None, frames: bool, overrides: dict[str, str],
-    scene: Path | None, runs: Path, require: str | None, junit: Path | None, export: Path | None,
+    resume: Path | None, workers: int, cluster: str | None, save_images: bool, overrides: dict[str, str],
+    scene: Path | None, runs_folder: Path, require: str | None, junit: Path | None, export: Path | None,
     as_json: bool,
 ) -> int:  # fmt: skip
     """Run a mission once for every seed and variant, and summarize the runs.
 
     MISSION is a file or the name of a shipped mission. A new folder below --runs contains results.sqlite, the
     page results.html, and the run directories. A run gets a report if it did not succeed or if the audit
-    disagrees; `executive report` writes the report of another run. Exit code 1 if --require is not met.
-    Ctrl-C ends the current runs; then the results of the complete runs are printed. A second Ctrl-C quits
-    immediately.
+    contradicts the ledger; `executive report` writes the report of another run. Exit code 1 if --require is
+    not met. Ctrl-C ends the current runs; then the results of the complete runs are printed. A second Ctrl-C
+    quits immediately.
     """
     options.check_resume(
-        ctx, has_runs=None not in (mission, seeds), runs_text="a MISSION and --seeds, or --resume SWEEP",
-        settings_text="mission, seeds and settings from the sweep",
+        ctx, has_missions_and_seeds=None not in (mission, seeds),
+        required_arguments="a MISSION and --seeds, or --resume SWEEP",
+        resumed_settings="mission, seeds and settings from the sweep",
     )  # fmt: skip
-    options.check_distinct("--set and --vary", overrides, variations)
+    options.check_distinct(overrides, "--vary", variations)
     with keep_stdout_clean():
-        from executive.campaign.results.export import check_exporter, export_tables
+        from executive.campaign.results.export import check_pyarrow_installed, export_tables
         from executive.campaign.results.junit import write_junit
         from executive.campaign.results.requirement import describe_unmet_conditions, parse_requirement
         from executive.campaign.results.results_page import write_page
         from executive.campaign.results.sweep_folder import create_sweep, make_settings, open_sweep
-        from executive.campaign.sweep import make_repeat_command
+        from executive.campaign.sweep import make_repeat_command, read_results
         from executive.cell.json_values import to_json
         from executive.cli.progress import print_report
-        from executive.cli.sweep_tables import list_summary
+        from executive.cli.sweep_tables import render_summary
 
         conditions = parse_requirement(require) if require else ()
         if export is not None:
-            check_exporter()
+            check_pyarrow_installed()
         if resume is not None:
             database = open_sweep(resume)
         else:
             assert mission is not None and seeds is not None
-            database = create_sweep(make_settings(mission, seeds, overrides, variations, scene, frames), runs)
+            settings = make_settings(mission, seeds, overrides, variations, scene, save_images)
+            database = create_sweep(settings, runs_folder)
         with closing(database):
             click.echo(f"results: {database.path}", err=True)
-            results = execute_missing_runs(database, "", workers, cluster)
-            print_report(list_summary(results.summaries, results.planned_run_count))
+            execute_missing_runs(database, "", workers, cluster)
+            results = read_results(database, "")
+            print_report(render_summary(results.summaries, results.planned_run_count))
             page = write_page(database.path.parent, [results])
             click.echo(f"page: {page}", err=True)
             if junit is not None:
@@ -82,45 +84,35 @@ def command(
                 write_junit(junit, results.settings.mission_name, results.runs, make_command)
             if export is not None:
                 export_tables(database, export)
-        unmet = describe_unmet_conditions(conditions, results.runs, results.summaries)
-        for message in unmet:
+        unmet_conditions = describe_unmet_conditions(conditions, results.runs, results.summaries)
+        for message in unmet_conditions:
             click.echo(message, err=True)
     if as_json:
         print_json(to_json({
             "settings": results.settings, "results": str(database.path), "page": str(page),
-            "asked": results.planned_run_count, "cut_off": results.is_incomplete,
-            "variants": results.summaries, "unmet": unmet, "runs": results.runs,
+            "planned_run_count": results.planned_run_count, "is_incomplete": results.is_incomplete,
+            "variants": results.summaries, "unmet_conditions": unmet_conditions, "runs": results.runs,
         }))  # fmt: skip
-    return ExitCode.HALTED if results.is_incomplete else ExitCode(int(bool(unmet)))
+    return ExitCode.HALTED if results.is_incomplete else ExitCode(int(bool(unmet_conditions)))
 
 
-def execute_missing_runs(
-    database: ResultsDatabase, name: str, workers: int, cluster: str | None, *, is_halted: bool = False
-) -> SweepResults:
-    """Execute the missing runs of a sweep, and return the results of all its runs.
+def execute_missing_runs(database: ResultsDatabase, name: str, workers: int, cluster: str | None) -> None:
+    """Execute the missing runs of a sweep, and store their results.
 
     Args:
         database: Database of the sweep.
         name: `A` or `B` in a comparison, else "".
         workers: Number of worker processes.
         cluster: Address of a dask scheduler, whose workers execute the runs, or None.
-        is_halted: True after a halt of the comparison; no run is executed.
     """
     from executive.campaign.pool import JobOptions
-    from executive.campaign.results.sweep_summary import SweepResults, summarize_runs
-    from executive.campaign.results.tables import ITEMS, PHASES, RUNS
-    from executive.campaign.sweep import list_jobs, make_repeat_command, run_sweep
+    from executive.campaign.results.tables import RUNS
+    from executive.campaign.sweep import list_jobs, run_sweep
     from executive.cli.progress import print_cancellation, print_halt, show_progress
 
-    settings = database.settings
-    jobs = list_jobs(settings, database.path.parent)
-    stored = {run.job for run in database.read(RUNS)}
-    missing = [job for job in jobs if job.index not in stored]
-    if not is_halted:
-        title = f"{name}: {settings.mission}" if name else settings.mission
-        with show_progress(title, print_lines=True) as progress:
-            on_halt = print_halt if cluster is None else print_cancellation
-            run_sweep(missing, database, JobOptions(workers, progress, on_halt), cluster)
-    runs, make_command = database.read(RUNS), functools.partial(make_repeat_command, settings)
-    summaries = summarize_runs(runs, database.read(PHASES), make_command)
-    return SweepResults(name, settings, runs, database.read(ITEMS), summaries, len(jobs))
+    mission, jobs = database.settings.mission, list_jobs(database.settings, database.path.parent)
+    stored_indices = {run.run_index for run in database.read(RUNS)}
+    missing_jobs = [job for job in jobs if job.index not in stored_indices]
+    with show_progress(f"{name}: {mission}" if name else mission, print_lines=True) as progress:
+        on_halt = print_halt if cluster is None else print_cancellation
+        run_sweep(missing_jobs, database, JobOptions(workers, progress, on_halt), cluster)

@@ -16,26 +16,26 @@ from executive.view.terminal.summary import describe_end
 
 MAX_LISTED_SEEDS = 10
 """Maximum number of seeds that are listed for a group of failures."""
-MAX_CHANGED_SEEDS = 20
+MAX_LISTED_CHANGED_SEEDS = 20
 """Maximum number of seeds with a changed outcome that are listed."""
 
 
-def list_summary(summaries: Sequence[VariantSummary], planned_run_count: int) -> Iterator[RenderableType]:
+def render_summary(summaries: Sequence[VariantSummary], planned_run_count: int) -> Iterator[RenderableType]:
     """Yield lines and a table with the summary of a sweep of `planned_run_count` runs."""
-    run_count = sum(summary.success.denominator for summary in summaries)
-    success_count = sum(summary.success.numerator for summary in summaries)
+    run_count = sum(summary.success_rate.denominator for summary in summaries)
+    success_count = sum(summary.success_rate.numerator for summary in summaries)
     if run_count == planned_run_count:
         yield f"{success_count} of {run_count} runs succeeded"
     else:
-        successes = f"; {success_count} of them succeeded" if run_count else ""
-        yield f"{run_count} of {planned_run_count} runs, halted{successes}"
+        successes = f"; {success_count} of the {run_count} succeeded" if run_count else ""
+        yield f"halted after {run_count} of {planned_run_count} runs{successes}"
     if not summaries:
         return
     yield _make_table(summaries)
     for summary in summaries:
-        if summary.variant and summary.failures:
+        if summary.variant and summary.failure_groups:
             yield f"with {describe_variant(summary.variant)}:"
-        for group in summary.failures:
+        for group in summary.failure_groups:
             yield from _list_failure_lines(group)
 
 
@@ -45,19 +45,19 @@ def _make_table(summaries: Sequence[VariantSummary]) -> Table:
     table.add_column("(95 % interval)", no_wrap=True)
     for summary in summaries:
         table.add_column(describe_variant(summary.variant) or "all runs", justify="right")
-    columns = list(map(_list_texts, summaries))
+    columns = list(map(_format_metrics, summaries))
     for name in dict.fromkeys(name for column in columns for name in column):
         table.add_row(name, *(column.get(name, "") for column in columns))
     return table
 
 
-def _list_texts(summary: VariantSummary) -> dict[str, str]:
+def _format_metrics(summary: VariantSummary) -> dict[str, str]:
     """Return the values of the metrics of a variant as text, by name."""
     objects, robot_time, planning = summary.correct_objects, summary.robot_time_s, summary.planning
     texts = {
-        "success": _format_percentage(summary.success),
+        "success rate": _format_percentage(summary.success_rate),
         "objects in the right bin": _format_percentage(objects),
-        "": f"{objects.numerator} of {objects.denominator}",
+        "count in the right bin": f"{objects.numerator} of {objects.denominator}",
         "ledger and audit agree": _format_percentage(summary.agreement),
         "objects per hour": _format_estimate(summary.objects_per_hour),
         "robot time, median [s]": f"{robot_time.median:.1f} ({robot_time.min:.1f} to {robot_time.max:.1f})",
@@ -65,9 +65,9 @@ def _list_texts(summary: VariantSummary) -> dict[str, str]:
         "motions planned ahead": f"{planning.ahead} of {planning.motions}",
         "waited for plans [s]": f"{planning.waited_s:.1f}",
     }
-    for phase in summary.phases:
-        failures = f"{phase.failures} of {phase.activations} failed"
-        texts[f"{phase.phase}, mean [s]"] = f"{phase.robot_time_s:.2f} ({failures})"
+    for skill in summary.skills:
+        failures = f"{skill.failed_activations} of {skill.activations} failed"
+        texts[f"{skill.skill}, mean [s]"] = f"{skill.mean_robot_time_s:.2f} ({failures})"
     return texts
 
 
@@ -99,8 +99,8 @@ def _format_estimate(estimate: Estimate) -> str:
     return f"{estimate.value:.0f}{interval}"
 
 
-def list_differences(
-    differences: Sequence[Difference], changed: Sequence[RunPair], pair_count: int
+def render_differences(
+    differences: Sequence[Difference], changed_pairs: Sequence[RunPair], pair_count: int
 ) -> Iterator[RenderableType]:
     """Yield lines and a table with the differences, and with the seeds whose outcome changed."""
     table = Table("", "A", "B", "B minus A", "95 % interval", box=SIMPLE_HEAD, padding=(0, 1))
@@ -111,12 +111,13 @@ def list_differences(
         table.add_row(difference.metric, *map(_format_number, values), interval)
     yield f"{pair_count} pairs of runs with the same seed"
     yield table
-    yield f"{len(changed)} seeds with a different outcome"
-    for pair in changed[:MAX_CHANGED_SEEDS]:
-        outcomes = [" ".join(filter(None, (run.status, run.problem, run.run))) for run in (pair.a, pair.b)]
+    yield f"{len(changed_pairs)} seeds with a different outcome"
+    for pair in changed_pairs[:MAX_LISTED_CHANGED_SEEDS]:
+        texts = [(run.status, run.problem, run.run_directory) for run in (pair.a, pair.b)]
+        outcomes = [" ".join(filter(None, run_texts)) for run_texts in texts]
         yield f"  seed {pair.seed}: A {outcomes[0]}; B {outcomes[1]}"
-    if len(changed) > MAX_CHANGED_SEEDS:
-        yield f"  and {len(changed) - MAX_CHANGED_SEEDS} more; the page lists them"
+    if len(changed_pairs) > MAX_LISTED_CHANGED_SEEDS:
+        yield f"  and {len(changed_pairs) - MAX_LISTED_CHANGED_SEEDS} more; the page lists them"
 
 
 def _format_number(value: float | None) -> str:

@@ -30,7 +30,7 @@ def test_every_job_is_done_and_the_results_are_in_their_order() -> None:
     calls: list[tuple[int, int]] = []
     stored: list[tuple[int, float | str, int]] = []
     results = run_jobs(
-        [4, 3, 2, 2], half, why, JobOptions(progress=lambda done, all: calls.append((done, all))),
+        [4, 3, 2, 2], half, why, JobOptions(on_progress=lambda done, all: calls.append((done, all))),
         lambda *result: stored.append(result),
     )  # fmt: skip
     assert (results, calls) == ([2.0, "3: 3 is odd", 1.0, 1.0], [(1, 4), (2, 4), (3, 4), (4, 4)])

@@ -38,13 +38,13 @@ from executive.run.assembly import RunOptions
 
 SETTINGS = SweepSettings(
     mission="sort", mission_name="sort", cell="c.yaml", overrides={"a": "1"}, variations={}, first_seed=0,
-    last_seed=3, scene=None, saves_pictures=False, inputs_hash="", versions={},
+    last_seed=3, scene=None, saves_images=False, inputs_hash="", versions={},
 )  # fmt: skip
 
 
 def record(job: SweepJob, **values: object) -> RunRecord:
     end = {"status": "SUCCESS", "reason": "", "message": "", "node": ""}
-    return RunRecord(RunRow(job=job.index, seed=job.seed, variant=job.variant, **end | values))
+    return RunRecord(RunRow(run_index=job.index, seed=job.seed, variant=job.variant, **end | values))
 
 
 def swept(folder: Path, work: Callable[[SweepJob], RunRecord], count: int = 4, **options) -> list[RunRow]:
@@ -84,7 +84,7 @@ def work(job: SweepJob) -> RunRecord:
 @pytest.mark.slow
 def test_every_seed_is_run_once_in_another_process(tmp_path: Path) -> None:
     reported: list[tuple[int, int]] = []
-    rows = swept(tmp_path, work, progress=lambda done, total: reported.append((done, total)))
+    rows = swept(tmp_path, work, on_progress=lambda done, total: reported.append((done, total)))
     assert [row.seed for row in rows] == [0, 1, 2, 3]
     assert rows[0].ticks != os.getpid()
     assert rows[0].message == "1"
@@ -176,9 +176,15 @@ def test_runs_of_a_worker_are_equal_to_single_runs(tmp_path: Path) -> None:
             single,
             Timeline.from_events(read_journal(Path(single.run) / "journal.jsonl")),
         )
-        same_run = replace(expected.run, wall_time_s=found.run.wall_time_s, run=found.run.run)
+        same_run = replace(
+            expected.run, wall_time_s=found.run.wall_time_s, run_directory=found.run.run_directory
+        )
         assert found == replace(expected, run=same_run)
-        assert found.run.trace == json.loads((Path(found.run.run) / "result.json").read_text())["trace"] != ""
+        assert (
+            found.run.decision_hash
+            == json.loads((Path(found.run.run_directory) / "result.json").read_text())["trace"]
+            != ""
+        )
 
 
 @pytest.mark.slow
@@ -192,7 +198,10 @@ def test_only_a_run_with_a_problem_has_a_report(tmp_path: Path) -> None:
     for name, has_report in (("sort_fruit", False), (str(mission), True)):
         settings = replace(SETTINGS, mission=name, overrides=overrides)
         run = run_job(list_jobs(settings, tmp_path)[0]).run
-        assert (run.problem != "", (Path(run.run) / "report.html").is_file()) == (has_report, has_report), run
+        assert (run.problem != "", (Path(run.run_directory) / "report.html").is_file()) == (
+            has_report,
+            has_report,
+        ), run
 
 
 @pytest.mark.slow
@@ -206,5 +215,5 @@ def test_simulated_runs_of_a_worker_are_equal_to_single_runs(tmp_path: Path) -> 
     history = Timeline()
     single = record_run(loaded, RunOptions(7), tmp_path / "single", RecordOptions(timeline=history))
     expected = make_record(2, {}, single, history)
-    same_run = replace(expected.run, wall_time_s=found.run.wall_time_s, run=found.run.run)
+    same_run = replace(expected.run, wall_time_s=found.run.wall_time_s, run_directory=found.run.run_directory)
     assert found == replace(expected, run=same_run)

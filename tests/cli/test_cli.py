@@ -193,13 +193,19 @@ def test_help_names_every_command_and_every_exit_code():
             "sweep --resume x --set a=1",
             "--resume takes mission, seeds and settings from the sweep; omit them",
         ),
-        ("sweep sort --seeds 3 --set a=1 --vary a=[1]", "--set and --vary both give a; omit one of them"),
+        (
+            "sweep sort --seeds 3 --set a=1 --vary a=[1]",
+            "a is set with --set and also with --vary; omit one of them",
+        ),
         (
             "sweep sort --seeds 3 --vary a=1",
             '"a=1" is not of the form KEY=[VALUE, ...], for example attempts',
         ),
         ("sweep sort --seeds 3 --vary a=[1,1]", '"a=[1,1]" contains a value twice'),
-        ("sweep sort --seeds 3 --require succes>1", 'there is no metric "succes"; the metrics are success,'),
+        (
+            "sweep sort --seeds 3 --require succes>1",
+            'there is no metric "succes"; the metrics are success_rate,',
+        ),
         ("sweep --resume nowhere", 'there is no file "nowhere"; name the file results.sqlite of a sweep, or'),
         (
             f"sweep sort --seeds {2**32}",

@@ -27,7 +27,7 @@ def compare(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Re
         for job in jobs:
             has_loss = job.settings.overrides.get("cell.table.objects") == "[1, 1]" and job.seed % 2 == 0
             record = make_record(job, "FAILURE" if has_loss else "SUCCESS")
-            run = replace(record.run, run=str(tmp_path / f"{database.path.parent.name}{job.seed}"))
+            run = replace(record.run, run_directory=str(tmp_path / f"{database.path.parent.name}{job.seed}"))
             database.append(replace(record, run=run))
 
     monkeypatch.setattr("executive.campaign.sweep.run_sweep", run_sweep)
@@ -63,7 +63,7 @@ def test_a_loss_is_detected_and_both_reports_are_linked(compare, tmp_path: Path)
     figures = json.loads(shown.stdout)
     success = figures["differences"][0]
     assert (success["difference"], success["high"] < 0) == (-0.5, True)
-    assert [pair["seed"] for pair in figures["changed"]] == [0, 2, 4, 6, 8]
+    assert [pair["seed"] for pair in figures["changed_pairs"]] == [0, 2, 4, 6, 8]
     assert [settings["overrides"] for settings in figures["settings"]] == [
         {"cell.kind": "fake"},
         {"cell.kind": "fake", "cell.table.objects": "[1, 1]"},
@@ -95,7 +95,10 @@ def test_a_mission_compared_with_itself_and_resumed(compare) -> None:
         (("sort_fruit",), "give one or two missions and --seeds, or --resume FOLDER"),
         (("a", "b", "c", "--seeds", "0:2"), "give one or two missions and --seeds, or --resume FOLDER"),
         (("--resume", ".", "--set-a", "a=1"), "--resume takes missions, seeds and settings from the comp"),
-        (("a", "--seeds", "1", "--set", "x=1", "--set-b", "x=2"), "--set and --set-a or --set-b both give x"),
+        (
+            ("a", "--seeds", "1", "--set", "x=1", "--set-b", "x=2"),
+            "x is set with --set and also with --set-a or --set-b",
+        ),
     ],
 )
 def test_contradicting_options_are_explained(compare, words: tuple[str, ...], message: str) -> None:

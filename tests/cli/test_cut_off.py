@@ -52,12 +52,13 @@ def test_it_says_at_once_that_it_halts_and_then_how_far_it_came(tmp_path: Path, 
         shown, said = sweep.communicate()
     assert sweep.returncode == 130
     figures = json.loads(shown)
-    assert (figures["asked"], figures["cut_off"]) == (400, True)
-    success = figures["variants"][0]["success"]
-    assert 1 <= len(figures["runs"]) == success["denominator"] < 400
-    halting, summary = said.index("halting: no new runs start"), said.index(" of 400 runs, halted; ")
+    assert (figures["planned_run_count"], figures["is_incomplete"]) == (400, True)
+    success_rate = figures["variants"][0]["success_rate"]
+    run_count, success_count = len(figures["runs"]), success_rate["numerator"]
+    assert 1 <= run_count == success_rate["denominator"] < 400
+    halting, summary = said.index("halting: no new runs start"), said.index(" of 400 runs; ")
     assert halting < summary
-    assert f"{len(figures['runs'])} of 400 runs, halted; {success['numerator']} of them succeeded" in said
+    assert f"halted after {run_count} of 400 runs; {success_count} of the {run_count} succeeded" in said
 
 
 def invoke(*words: str) -> Result:
@@ -73,19 +74,19 @@ def test_a_killed_sweep_resumes_with_the_missing_runs_only(tmp_path: Path) -> No
         sweep.communicate()
     (database,) = runs.glob("*/*_sweep_*/results.sqlite")
     with closing(sqlite3.connect(database)) as connection:
-        stored = connection.execute("SELECT * FROM runs ORDER BY job").fetchall()
+        stored = connection.execute("SELECT * FROM runs ORDER BY run_index").fetchall()
     assert 3 <= len(stored) < 12
     resumed = invoke("sweep", "--resume", str(database.parent), "--json")
     assert resumed.exit_code == 0, resumed.stderr
     figures = json.loads(resumed.stdout)
     assert [run["seed"] for run in figures["runs"]] == list(range(12))
     with closing(sqlite3.connect(database)) as connection:
-        rows = connection.execute("SELECT * FROM runs ORDER BY job").fetchall()
+        rows = connection.execute("SELECT * FROM runs ORDER BY run_index").fetchall()
     assert set(stored) <= set(rows), "no stored run was run again"
     again = json.loads(
         invoke("sweep", "sort_fruit", *OBJECTS, "--seeds", "0:12", "--json", "--runs", str(runs)).stdout
     )
-    names = ("seed", "status", "items", "audit", "robot_time_s", "ticks", "trace", "planning")
+    names = ("seed", "status", "items", "audit", "robot_time_s", "ticks", "decision_hash", "planning")
     assert [[run[name] for name in names] for run in figures["runs"]] == [
         [run[name] for name in names] for run in again["runs"]
     ]

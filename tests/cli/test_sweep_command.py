@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.campaign.results.database import ResultsDatabase
-from executive.campaign.results.rows import PhaseRow, RunRecord, RunRow
+from executive.campaign.results.rows import RunRecord, RunRow, SkillRow
 from executive.campaign.sweep import SweepJob
 from executive.cli.main import main
 from executive.record.result import Audit, ItemCounts
@@ -21,12 +21,19 @@ def make_record(job: SweepJob, status: str = "SUCCESS") -> RunRecord:
     failure = ("Grasp.missed", "no seal", "tree/Grasp")
     reason, message, node = ("", "", "") if status == "SUCCESS" else failure
     run = RunRow(
-        job=job.index, seed=job.seed, variant=job.variant, status=status, reason=reason, message=message,
-        node=node, items=ItemCounts(seen=2, placed=2), audit=Audit(right=2), robot_time_s=10.0 + job.seed,
-        wall_time_s=6.0, run="" if status == "FAULT" else f"runs/{job.seed}",
+        run_index=job.index, seed=job.seed, variant=job.variant, status=status, reason=reason,
+        message=message, node=node, items=ItemCounts(seen=2, placed=2), audit=Audit(right=2),
+        robot_time_s=10.0 + job.seed, wall_time_s=6.0,
+        run_directory="" if status == "FAULT" else f"runs/{job.seed}",
     )  # fmt: skip
     return RunRecord(
-        run, (), (PhaseRow(job=job.index, phase="Grasp", activations=2, failures=1, robot_time_s=0.5),)
+        run,
+        (),
+        (
+            SkillRow(
+                run_index=job.index, skill="Grasp", activations=2, failed_activations=1, robot_time_s=0.5
+            ),
+        ),
     )
 
 
@@ -47,20 +54,20 @@ def sweep(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Resu
 
 
 @pytest.mark.parametrize(
-    ("statuses", "asked", "code", "expected"),
+    ("statuses", "run_count", "code", "expected"),
     [
         ("SUCCESS", 1, 0, "1 of 1 runs succeeded\n"),
         ("SUCCESS FAILURE", 2, 0, "1 of 2 runs succeeded\n"),
-        ("SUCCESS FAILURE", 6, 130, "2 of 6 runs, halted; 1 of them succeeded\n"),
-        ("", 6, 130, "0 of 6 runs, halted\n"),
+        ("SUCCESS FAILURE", 6, 130, "halted after 2 of 6 runs; 1 of the 2 succeeded\n"),
+        ("", 6, 130, "halted after 0 of 6 runs\n"),
     ],
 )
-def test_a_sweep_succeeds_if_all_runs_were_made(sweep, statuses, asked, code, expected):
-    shown = sweep(statuses, "--seeds", f"0:{asked}", "--json")
+def test_a_sweep_succeeds_if_all_runs_were_made(sweep, statuses, run_count, code, expected):
+    shown = sweep(statuses, "--seeds", f"0:{run_count}", "--json")
     assert (shown.exit_code, expected in shown.stderr) == (code, True), shown.stderr
     figures = json.loads(shown.stdout)
-    assert (figures["asked"], figures["cut_off"], len(figures["runs"])) == (
-        asked,
+    assert (figures["planned_run_count"], figures["is_incomplete"], len(figures["runs"])) == (
+        run_count,
         code == 130,
         len(statuses.split()),
     )
@@ -71,8 +78,8 @@ def test_the_summary_shows_every_variant_and_how_to_repeat_a_failure(sweep):
     shown = sweep("SUCCESS SUCCESS FAULT SUCCESS", *words)
     said = " ".join(shown.stderr.split())
     assert "3 of 4 runs succeeded" in said
-    assert "success 100.00% (34.2 to 100.0) 50.00% (9.5 to 90.5)" in said
-    assert "4 of 4 4 of 4" in said
+    assert "success rate 100.00% (34.2 to 100.0) 50.00% (9.5 to 90.5)" in said
+    assert "count in the right bin 4 of 4 4 of 4" in said
     assert "Grasp, mean [s] 0.50 (2 of 4 failed) 0.50 (2 of 4 failed)" in said
     assert (
         "with cell.table.objects=[2, 2]: 1 run: FAULT Grasp.missed at tree/Grasp: no seal seeds 3; repeat"
@@ -82,11 +89,11 @@ def test_the_summary_shows_every_variant_and_how_to_repeat_a_failure(sweep):
 
 
 def test_an_unmet_requirement_is_the_reason_of_exit_code_1(sweep):
-    words = ("--seeds", "0:2", "--json", "--require", "success >= 0.99 and p95(robot_time_s) < 20")
+    words = ("--seeds", "0:2", "--json", "--require", "success_rate >= 0.99 and p95(robot_time_s) < 20")
     shown = sweep("SUCCESS FAILURE", *words)
-    message = "success>=0.99 is not met: the value is 0.5"
+    message = "success_rate>=0.99 is not met: the value is 0.5"
     assert (shown.exit_code, shown.stderr.splitlines()[-1]) == (1, message)
-    assert json.loads(shown.stdout)["unmet"] == [message]
+    assert json.loads(shown.stdout)["unmet_conditions"] == [message]
     assert sweep("SUCCESS SUCCESS", *words).exit_code == 0
     assert sweep("SUCCESS", *words).exit_code == 130, "a halt is more important"
 

@@ -79,7 +79,7 @@ def run_jobs_on_cluster(
                                 continue
                         record = make_fault_record(jobs[index], error)
                     on_result(index, record, crash_counts[index])
-                    options.progress(len(jobs) - len(unfinished_jobs), len(jobs))
+                    options.on_progress(len(jobs) - len(unfinished_jobs), len(jobs))
                 signal_event.wait(POLLING_PERIOD)
             if signal_event.is_set():
                 options.on_halt()

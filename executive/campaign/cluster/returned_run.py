@@ -38,11 +38,11 @@ class ReturnedRun:
 def pack_run(record: RunRecord, root: Path) -> ReturnedRun:
     """Return a run, and delete its run directory on the worker."""
     content = b""
-    if record.run.run:
-        archive = Path(shutil.make_archive(record.run.run, "zip", record.run.run))
+    if record.run.run_directory:
+        archive = Path(shutil.make_archive(record.run.run_directory, "zip", record.run.run_directory))
         content = archive.read_bytes()
         archive.unlink()
-        shutil.rmtree(record.run.run)
+        shutil.rmtree(record.run.run_directory)
     return ReturnedRun(str(root), _RECORD_ADAPTER.dump_json(record).decode(), content)
 
 
@@ -54,9 +54,9 @@ def unpack_run(returned: ReturnedRun) -> RunRecord:
     """
     text = returned.record.replace(returned.root, "")
     record = _RECORD_ADAPTER.validate_json(text)
-    if not record.run.run:
+    if not record.run.run_directory:
         return record
-    folder = Path(record.run.run)
+    folder = Path(record.run.run_directory)
     with convert_os_errors(f'write the run directory "{folder}"'):
         folder.parent.mkdir(parents=True, exist_ok=True)
         # Runs of two workers may have the same name.

@@ -131,11 +131,11 @@ class Campaign:
         """
 
         def report(ended_count: int, total: int) -> None:
-            self._options.progress(offset + ended_count, offset + total)
+            self._options.on_progress(offset + ended_count, offset + total)
 
         jobs = list(map(self.select_faults, combinations))
         run_job = partial(run_trial, self.mission, self.nominal_run)
-        trials = run_jobs(jobs, run_job, _make_aborted_trial, replace(self._options, progress=report))
+        trials = run_jobs(jobs, run_job, _make_aborted_trial, replace(self._options, on_progress=report))
         complete_trials = [trial for trial in trials if trial is not None and not trial.is_halted_by_user]
         return complete_trials, len(complete_trials) == len(combinations)
 

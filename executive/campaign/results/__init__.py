@@ -1,1 +1,1 @@
-"""Results of many runs: rows per run, item and phase, the database that stores the rows, and statistics."""
+"""Results of many runs: rows per run, item and skill, the database that stores the rows, and statistics."""

@@ -1,4 +1,4 @@
-"""Database of a sweep: one SQLite file with the settings, and the rows of each ended run."""
+"""Database of a sweep: one SQLite file with the settings, and the rows of each completed run."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from contextlib import closing
 from pathlib import Path
 
 from executive.campaign.results.rows import RunRecord, SweepSettings
-from executive.campaign.results.tables import ITEMS, PHASES, RUNS, SETTINGS, RowT, Table
+from executive.campaign.results.tables import ITEMS, RUNS, SETTINGS, SKILLS, RowT, Table
 from executive.errors import InputError
 
 FILE_NAME = "results.sqlite"
 """Name of the database in the folder of a sweep."""
 SCHEMA_VERSION = 1
 """Version of the tables, stored as `user_version` of the file."""
-LOCK_TIMEOUT = 60.0
+BUSY_TIMEOUT = 60.0
 """Maximum time for which a transaction waits for another program that reads the file [s]."""
 
 
@@ -46,8 +46,8 @@ class ResultsDatabase:
         if settings is None and not path.is_file():
             advice = f"name the file {FILE_NAME} of a sweep, or its folder"
             raise InputError(f'there is no file "{path}"; {advice}')
-        with self._explain_errors():
-            self._connection = sqlite3.connect(path, timeout=LOCK_TIMEOUT)
+        with self._convert_sqlite_errors():
+            self._connection = sqlite3.connect(path, timeout=BUSY_TIMEOUT)
             if settings is not None:
                 self._create_tables(settings)
             (version,) = self._connection.execute("PRAGMA user_version").fetchone()
@@ -75,14 +75,14 @@ class ResultsDatabase:
         Raises:
             InputError: The file cannot be written, or contains the run already.
         """
-        with self._explain_errors(), self._connection as connection:
+        with self._convert_sqlite_errors(), self._connection as connection:
             connection.execute(RUNS.insertion_sql, RUNS.encode(record.run))
             connection.executemany(ITEMS.insertion_sql, map(ITEMS.encode, record.items))
-            connection.executemany(PHASES.insertion_sql, map(PHASES.encode, record.phases))
+            connection.executemany(SKILLS.insertion_sql, map(SKILLS.encode, record.skills))
 
     def read(self, table: Table[RowT]) -> list[RowT]:
         """Return all rows of a table, sorted by the first column of the key, then by insertion."""
-        with self._explain_errors(), closing(self._connection.execute(table.selection_sql)) as cursor:
+        with self._convert_sqlite_errors(), closing(self._connection.execute(table.selection_sql)) as cursor:
             return list(map(table.decode, cursor))
 
     def close(self) -> None:
@@ -94,13 +94,13 @@ class ResultsDatabase:
 
     def _create_tables(self, settings: SweepSettings) -> None:
         with self._connection as connection:
-            for table in (SETTINGS, RUNS, ITEMS, PHASES):
+            for table in (SETTINGS, RUNS, ITEMS, SKILLS):
                 connection.execute(table.creation_sql)
             connection.execute(SETTINGS.insertion_sql, SETTINGS.encode(settings))
             connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
 
     @contextlib.contextmanager
-    def _explain_errors(self) -> Iterator[None]:
+    def _convert_sqlite_errors(self) -> Iterator[None]:
         """Convert an error of SQLite to an InputError with the path of the file."""
         try:
             yield

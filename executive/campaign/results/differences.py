@@ -51,7 +51,10 @@ class Difference:
 
 
 def pair_runs(runs_a: Sequence[RunRow], runs_b: Sequence[RunRow]) -> list[RunPair]:
-    """Return the pairs of runs with the same seed; a run without the other run of its pair is omitted."""
+    """Return the pairs of runs with the same seed.
+
+    Runs with a seed that only one mission has are omitted.
+    """
     runs_by_seed = {run.seed: run for run in runs_b}
     return [RunPair(run.seed, run, runs_by_seed[run.seed]) for run in runs_a if run.seed in runs_by_seed]
 
@@ -67,7 +70,7 @@ def compute_differences(pairs: Sequence[RunPair]) -> list[Difference]:
     throughputs = [(*_get_throughput_terms(pair.a), *_get_throughput_terms(pair.b)) for pair in pairs]
     times = [(pair.a.robot_time_s, 1, pair.b.robot_time_s, 1) for pair in both_succeeded]
     return [
-        _estimate_difference("success", successes),
+        _estimate_difference("success rate", successes),
         _estimate_difference("objects per hour", throughputs),
         _estimate_difference("robot time if both runs succeed [s]", times),
     ]

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from executive.campaign.results.database import ResultsDatabase
-from executive.campaign.results.tables import ITEMS, PHASES, RUNS, RowT, Table
+from executive.campaign.results.tables import ITEMS, RUNS, SKILLS, RowT, Table
 from executive.errors import InputError
 from executive.record.run_directory import convert_os_errors
 
 
-def check_exporter() -> None:
-    """Check that the package that writes Parquet files is installed.
+def check_pyarrow_installed() -> None:
+    """Check that `pyarrow`, which writes Parquet files, is installed.
 
     Raises:
         InputError: The package is not installed.
@@ -24,7 +24,7 @@ def check_exporter() -> None:
 
 
 def export_tables(database: ResultsDatabase, folder: Path) -> None:
-    """Write the files `runs.parquet`, `items.parquet` and `phases.parquet` into a folder.
+    """Write the files `runs.parquet`, `items.parquet` and `skills.parquet` into a folder.
 
     Raises:
         InputError: A file cannot be written.
@@ -33,7 +33,7 @@ def export_tables(database: ResultsDatabase, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         _write(RUNS, database, folder)
         _write(ITEMS, database, folder)
-        _write(PHASES, database, folder)
+        _write(SKILLS, database, folder)
 
 
 def _write(table: Table[RowT], database: ResultsDatabase, folder: Path) -> None:

@@ -63,18 +63,18 @@ def divide_sums(numerators: FloatArray, denominators: FloatArray, axis: int) -> 
 
 
 def compute_bootstrap_interval(
-    compute_statistic: Callable[..., FloatArray], columns: Sequence[Sequence[float] | FloatArray]
+    compute_statistic: Callable[..., FloatArray], samples: Sequence[Sequence[float] | FloatArray]
 ) -> tuple[float, float] | tuple[None, None]:
-    """Return the 95 % percentile bootstrap interval of a statistic of paired columns.
+    """Return the 95 % percentile bootstrap interval of a statistic of paired samples.
 
-    Columns with fewer than two values have no interval: both limits are None. The BCa method is not used,
+    Samples with fewer than two values have no interval: both limits are None. The BCa method is not used,
     because it is not defined for equal values; the percentile method returns [x, x] for equal values x.
 
     Args:
-        compute_statistic: Function of resampled columns and of the keyword `axis`.
-        columns: Columns of equal length.
+        compute_statistic: Function of the resampled samples and of the keyword `axis`.
+        samples: Samples of equal length.
     """
-    if len(columns[0]) < 2:
+    if len(samples[0]) < 2:
         return None, None
     from scipy.stats import bootstrap
 
@@ -82,7 +82,7 @@ def compute_bootstrap_interval(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         interval = bootstrap(
-            columns, compute_statistic, paired=True, vectorized=True, batch=100,
+            samples, compute_statistic, paired=True, vectorized=True, batch=100,
             n_resamples=RESAMPLE_COUNT, method="percentile", rng=np.random.default_rng(BOOTSTRAP_SEED),
         ).confidence_interval  # fmt: skip
     return float(interval.low), float(interval.high)

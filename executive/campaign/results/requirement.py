@@ -1,4 +1,4 @@
-"""Requirement on the results of a sweep, for instance `success>=0.99 and p95(robot_time_s)<20`."""
+"""Requirement on the results of a sweep, for instance `success_rate>=0.99 and p95(robot_time_s)<20`."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.campaign.results.intervals import Estimate
 from executive.campaign.results.rows import RunRow, describe_variant
 from executive.campaign.results.sweep_summary import VariantSummary
 from executive.campaign.results.tables import RUNS
 from executive.errors import InputError
 
-METRICS = ("success", "agreement", "objects_per_hour")
+METRICS = ("success_rate", "agreement", "objects_per_hour")
 """Metrics of a variant: names of attributes of `VariantSummary` with the type `Estimate`."""
 PERCENTILES: Mapping[str, float] = {"min": 0, "median": 50, "p50": 50, "p95": 95, "p99": 99, "max": 100}
 """Percentiles of a column over the runs, by name [%]."""
@@ -26,26 +25,27 @@ OPERATORS = {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operat
 _COLUMN_INDICES = {
     column.name: index
     for index, column in enumerate(RUNS.columns)
-    if column.sql_type != "TEXT" and column.name not in ("job", "seed")
+    if column.sql_type != "TEXT" and column.name not in ("run_index", "seed")
 }
-"""Index of each column with numbers in an encoded `RunRow`, by name."""
-_CONDITION = re.compile(
+"""Positions of the numeric columns in the tuple from `RUNS.encode`, by column name."""
+_CONDITION_PATTERN = re.compile(
     r"\s*(\w+)\s*(?:\(\s*(\w+)\s*\))?\s*([<>]=?)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 )
+"""Matches `success_rate>=0.99` and `p95(robot_time_s)<20`."""
 
 
 @dataclass(frozen=True)
 class Condition:
-    """A metric that is compared with a number.
+    """Comparison of a metric with a number.
 
     Attributes:
-        name: Metric of a variant, or statistic of `column` over the runs.
+        metric: Metric of a variant, or statistic of `column` over the runs.
         column: Column of the runs; "" for a metric of a variant.
         symbol: Key of `OPERATORS`.
         limit: Number with which the metric is compared.
     """
 
-    name: str
+    metric: str
     column: str
     symbol: str
     limit: float
@@ -53,23 +53,23 @@ class Condition:
     def compute_value(self, runs: Sequence[RunRow], summary: VariantSummary) -> float | None:
         """Return the value of the metric for the runs of a variant; None without data."""
         if not self.column:
-            estimate: Estimate = getattr(summary, self.name)
-            return estimate.value
+            value: float | None = getattr(summary, self.metric).value
+            return value
         values = [RUNS.encode(run)[_COLUMN_INDICES[self.column]] for run in runs]
         numbers = [float(value) for value in values if value is not None]
         if not numbers:
             return None
-        percentile = PERCENTILES.get(self.name)
+        percentile = PERCENTILES.get(self.metric)
         return float(np.mean(numbers) if percentile is None else np.percentile(numbers, percentile))
 
     def __str__(self) -> str:
         """Return the text of the condition."""
-        metric = f"{self.name}({self.column})" if self.column else self.name
+        metric = f"{self.metric}({self.column})" if self.column else self.metric
         return f"{metric}{self.symbol}{self.limit:g}"
 
 
 def parse_requirement(text: str) -> tuple[Condition, ...]:
-    """Return the conditions in a text that joins them with `and`.
+    """Parse conditions that are separated by `and`.
 
     Raises:
         InputError: The text contains something else, or an unknown metric, statistic or column.
@@ -95,9 +95,9 @@ def describe_unmet_conditions(
 
 def _parse_condition(text: str) -> Condition:
     """Return a condition from its text."""
-    match = _CONDITION.fullmatch(text)
+    match = _CONDITION_PATTERN.fullmatch(text)
     if match is None:
-        advice = "write for example success>=0.99 and p95(robot_time_s)<20"
+        advice = "write for example success_rate>=0.99 and p95(robot_time_s)<20"
         raise InputError(f'"{text.strip()}" is no comparison of a metric with a number; {advice}')
     metric, column = match[1], match[2] or ""
     if metric not in (STATISTICS if column else METRICS):

@@ -32,16 +32,17 @@ class Group:
     """Runs of one variant of a sweep; each table of the page has one column per group.
 
     Attributes:
-        label: Name of the sweep (`A` or `B` in a comparison) and values of the variant; else `all runs`.
+        label: Name of the sweep (`A` or `B` in a comparison) and values of the variant; `all runs` if both
+            are empty.
         summary: Summary of the runs.
         robot_times: Duration of each run [s].
-        object_times: Time during which each placed object was the selected target [s].
+        item_times: Time during which each placed item was the selected target [s].
     """
 
     label: str
     summary: VariantSummary
     robot_times: Sequence[float]
-    object_times: Sequence[float]
+    item_times: Sequence[float]
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Histogram:
     Attributes:
         description: Label of the group, number of values, range and median: the alternative text of the plot.
         counts: Number of values in each bin.
-        low, high: Limits of the first and the last bin, equal for all groups.
+        low, high: Lower edge of the first bin and upper edge of the last bin; equal for all groups.
     """
 
     description: str
@@ -62,9 +63,15 @@ class Histogram:
 
 def write_page(
     folder: Path, sweeps: Sequence[SweepResults],
-    differences: Sequence[Difference] = (), changed: Sequence[RunPair] = (),
+    differences: Sequence[Difference] = (), changed_pairs: Sequence[RunPair] = (),
 ) -> Path:  # fmt: skip
     """Write the page of a sweep, or of a comparison of two sweeps, into `folder`; return its path.
+
+    Args:
+        folder: Folder of the sweep or comparison.
+        sweeps: Results of the sweep, or of A and B.
+        differences: Differences of the comparison.
+        changed_pairs: Pairs of runs with different outcomes.
 
     Raises:
         InputError: The file cannot be written.
@@ -78,13 +85,11 @@ def write_page(
         groups=groups,
         plots={
             "Robot time of a run [s]": _make_histograms({group.label: group.robot_times for group in groups}),
-            "Time per placed object [s]": _make_histograms(
-                {group.label: group.object_times for group in groups}
-            ),
+            "Time per placed item [s]": _make_histograms({group.label: group.item_times for group in groups}),
         },
-        phases=list(dict.fromkeys(phase.phase for group in groups for phase in group.summary.phases)),
+        skills=list(dict.fromkeys(skill.skill for group in groups for skill in group.summary.skills)),
         differences=differences,
-        changed=changed,
+        changed_pairs=changed_pairs,
         problems=problems,
         limit=MAX_LISTED_RUNS,
         link=lambda run: _make_link(run, folder),
@@ -99,8 +104,8 @@ def _list_groups(sweep: SweepResults) -> list[Group]:
     """Return one group for each variant of a sweep."""
     groups = []
     for summary in sweep.summaries:
-        runs = {run.job: run for run in sweep.runs if run.variant == summary.variant}
-        items = [item for item in sweep.items if item.job in runs and item.state == "placed"]
+        runs = {run.run_index: run for run in sweep.runs if run.variant == summary.variant}
+        items = [item for item in sweep.items if item.run_index in runs and item.state == "placed"]
         label = " ".join(filter(None, (sweep.name, describe_variant(summary.variant)))) or "all runs"
         times = [run.robot_time_s for run in runs.values()]
         groups.append(Group(label, summary, times, [item.robot_time_s for item in items]))
@@ -130,5 +135,5 @@ def _make_link(run_directory: str, folder: Path) -> str:
 def write_missing_reports(pairs: Sequence[RunPair]) -> None:
     """Write the report of each run that has a run directory without a report."""
     for run in (run for pair in pairs for run in (pair.a, pair.b)):
-        if run.run and not RunDirectory(Path(run.run)).report.is_file():
-            try_write_report(run.run)
+        if run.run_directory and not RunDirectory(Path(run.run_directory)).report.is_file():
+            try_write_report(run.run_directory)

@@ -1,9 +1,9 @@
-"""Rows of the results of a sweep: one per run, one per item, and one per phase of a run."""
+"""Rows of the results of a sweep: one per run, one per item of a run, and one per skill of a run."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from itertools import pairwise, product
 from pathlib import Path
 from typing import ClassVar
@@ -16,7 +16,10 @@ from executive.record.timeline.timeline import PlanningTotals, Timeline
 
 
 class Row:
-    """Base class of the rows; the docstrings of the fields are the comments of the columns."""
+    """Base class of the rows.
+
+    The docstring of each field becomes the comment of its SQL column (see `tables.py`).
+    """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(use_attribute_docstrings=True)
 
@@ -41,7 +44,7 @@ class SweepSettings(Row):
     """Last seed of each variant."""
     scene: Path | None
     """Scene file; NULL: no change of the simulated world."""
-    saves_pictures: bool
+    saves_images: bool
     """1 if the runs save the images on which decisions are based."""
     inputs_hash: str
     """Hash of mission, libraries, cell and scene; `--resume` requires equal inputs."""
@@ -57,9 +60,9 @@ class SweepSettings(Row):
 
 @dataclass(frozen=True, kw_only=True)
 class RunRow(Row):
-    """A run; all columns except `wall_time_s`, `run` and `crashes` are equal in a repetition of the run."""
+    """A run; a repetition of the run changes only `wall_time_s`, `run_directory` and `crashes`."""
 
-    job: int
+    run_index: int
     """Index of the run in the sweep, from 0: variant by variant, and seed by seed."""
     seed: int
     """Random seed."""
@@ -76,18 +79,18 @@ class RunRow(Row):
     items: ItemCounts = field(default_factory=ItemCounts)
     """Number of items by final state, from the ledger."""
     audit: Audit | None = None
-    """True places of the objects, and agreement with the ledger; NULL in a cell without ground truth."""
+    """Count of objects by ground-truth location, and whether the ledger agrees; NULL without ground truth."""
     planning: PlanningTotals = field(default_factory=PlanningTotals)
     """Number of planned motions, and time for which skills waited for plans [s]."""
     ticks: int = 0
     """Number of control steps."""
     robot_time_s: float = 0.0
-    """Duration on the clock of the run [s]."""
+    """Duration on the run clock (simulated time in simulation, real time on hardware) [s]."""
     wall_time_s: float = 0.0
     """Duration on a wall clock [s]."""
-    trace: str = ""
+    decision_hash: str = ""
     """Hash of all decisions."""
-    run: str = ""
+    run_directory: str = ""
     """Path of the run directory; "" if there is none."""
     crashes: int = 0
     """Number of worker processes that died during the run; after the first, the run was repeated."""
@@ -99,14 +102,20 @@ class RunRow(Row):
 
     @property
     def problem(self) -> str:
-        """Reason of a run that did not succeed; `disagreement` if the audit contradicts a successful run."""
+        """Reason for the failure, or "" if there is no problem.
+
+        The value is `disagreement` if the run succeeded but the audit contradicts the ledger.
+        """
         if self.is_success:
             return "disagreement" if describe_disagreement(self.audit, self.items) else ""
         return self.reason or self.status
 
     @property
     def explanation(self) -> str:
-        """Message of the end of the run; without a message, the disagreement of audit and ledger, or ""."""
+        """Message about the end of the run.
+
+        If there is none, a description of the disagreement between audit and ledger; "" if they agree.
+        """
         return self.message or describe_disagreement(self.audit, self.items)
 
 
@@ -114,36 +123,36 @@ class RunRow(Row):
 class ItemRow(Row):
     """An item of the ledger."""
 
-    job: int
+    run_index: int
     """Index of the run."""
     item: str
     """Name of the item."""
     label: str
     """Class of the item."""
     state: str
-    """Final state: placed, rejected, skipped, lost or phantom."""
+    """Final state: placed, rejected, skipped, lost, or phantom (false positive: no such object)."""
     bin: str
     """Bin into which the item was placed, or ""."""
-    attempts: int
+    failed_attempts: int
     """Number of failed attempts to pick the item."""
     robot_time_s: float
     """Time during which the item was the selected target and had no final state [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class PhaseRow(Row):
+class SkillRow(Row):
     """All activations of one skill in a run."""
 
-    job: int
+    run_index: int
     """Index of the run."""
-    phase: str
+    skill: str
     """Name of the skill."""
     activations: int
     """Number of activations."""
-    failures: int
+    failed_activations: int
     """Number of failed activations."""
     robot_time_s: float
-    """Total duration of the activations [s]; the phases of parallel branches overlap."""
+    """Total duration of the activations [s]; the skills of parallel branches overlap."""
 
 
 def describe_variant(variant: Mapping[str, str]) -> str:
@@ -158,36 +167,36 @@ class RunRecord:
     Attributes:
         run: Row of the run.
         items: Rows of the items, in the order of their detection.
-        phases: Rows of the phases, in the order of their first activation.
+        skills: Rows of the skills, in the order of their first activation.
     """
 
     run: RunRow
     items: tuple[ItemRow, ...] = ()
-    phases: tuple[PhaseRow, ...] = ()
+    skills: tuple[SkillRow, ...] = ()
 
 
-def make_record(job: int, variant: Mapping[str, str], result: Result, timeline: Timeline) -> RunRecord:
+def make_record(run_index: int, variant: Mapping[str, str], result: Result, timeline: Timeline) -> RunRecord:
     """Return the rows of a run; values are rounded as in `result.json`.
 
     Args:
-        job: Index of the run in the sweep.
+        run_index: Index of the run in the sweep.
         variant: Values of the varied params and keys of the cell, by name.
         result: Result of the run.
-        timeline: Timeline of the run; its `has_history` is True.
+        timeline: Timeline of the run; it must keep its history (`has_history`).
     """
-    values, names = to_json(result), {field.name for field in fields(RunRow)}
-    shared_values = {name: value for name, value in values.items() if name in names}
-    run = TypeAdapter(RunRow).validate_python({"job": job, "variant": variant, **shared_values})
-    return RunRecord(run, tuple(_list_items(job, timeline)), tuple(_list_phases(job, timeline)))
+    values = {name: value for name, value in to_json(result).items() if name in RunRow.__dataclass_fields__}
+    values |= {"decision_hash": result.trace, "run_directory": result.run}
+    run = TypeAdapter(RunRow).validate_python({"run_index": run_index, "variant": variant, **values})
+    return RunRecord(run, tuple(_list_items(run_index, timeline)), tuple(_list_skills(run_index, timeline)))
 
 
-def _list_items(job: int, timeline: Timeline) -> Iterator[ItemRow]:
+def _list_items(run_index: int, timeline: Timeline) -> Iterator[ItemRow]:
     """Yield the row of each item."""
     for name, history in timeline.items.by_name.items():
         last = history.last_change
         yield ItemRow(
-            job=job, item=name, label=last.label, state=last.state, bin=last.bin, attempts=last.attempts,
-            robot_time_s=_measure_item_time(name, timeline),
+            run_index=run_index, item=name, label=last.label, state=last.state, bin=last.bin,
+            failed_attempts=last.attempts, robot_time_s=_measure_item_time(name, timeline),
         )  # fmt: skip
 
 
@@ -202,11 +211,11 @@ def _measure_item_time(name: str, timeline: Timeline) -> float:
     return round(sum(durations), DECIMAL_PLACES)
 
 
-def _list_phases(job: int, timeline: Timeline) -> Iterator[PhaseRow]:
+def _list_skills(run_index: int, timeline: Timeline) -> Iterator[SkillRow]:
     """Yield the row of each skill."""
     for skill in dict.fromkeys(activation.skill for activation in timeline.activations if activation.skill):
         activations = [activation for activation in timeline.activations if activation.skill == skill]
         failure_count = sum(activation.status == "FAILURE" for activation in activations)
         time = round(sum(activation.end - activation.start for activation in activations), DECIMAL_PLACES)
-        counts = {"activations": len(activations), "failures": failure_count}
-        yield PhaseRow(job=job, phase=skill, **counts, robot_time_s=time)
+        counts = {"activations": len(activations), "failed_activations": failure_count}
+        yield SkillRow(run_index=run_index, skill=skill, **counts, robot_time_s=time)

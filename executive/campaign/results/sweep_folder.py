@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -44,7 +45,7 @@ def create_database(folder: Path, settings: SweepSettings) -> ResultsDatabase:
 
 def make_settings(
     mission: str, seeds: range, overrides: Mapping[str, str], variations: Mapping[str, tuple[str, ...]],
-    scene: Path | None, saves_pictures: bool,
+    scene: Path | None, saves_images: bool,
 ) -> SweepSettings:  # fmt: skip
     """Check the inputs of a sweep, and return its settings.
 
@@ -54,7 +55,7 @@ def make_settings(
         overrides: Values of params of the mission and keys of the cell, as given with `--set`.
         variations: Values of `--vary`, by param of the mission or key of the cell.
         scene: Scene file; None: no change of the simulated world.
-        saves_pictures: True to save the images on which decisions are based.
+        saves_images: True to save the images on which decisions are based.
 
     Raises:
         MissionError: A variant has errors.
@@ -63,7 +64,7 @@ def make_settings(
     settings = SweepSettings(
         mission=mission, mission_name="", cell="", overrides=overrides, variations=variations,
         first_seed=seeds[0], last_seed=seeds[-1], scene=scene,
-        saves_pictures=saves_pictures, inputs_hash="", versions=dict(list_versions()),
+        saves_images=saves_images, inputs_hash="", versions=dict(list_versions()),
     )  # fmt: skip
     missions = _load_variants(settings)
     name, cell, inputs_hash = missions[0].mission.name, missions[0].cell_path, _hash_inputs(missions, scene)
@@ -76,15 +77,17 @@ def open_sweep(path: Path) -> ResultsDatabase:
     Raises:
         InputError: There is no such sweep, another process executes the sweep, or an input has changed.
     """
-    database = ResultsDatabase(get_database_path(path))
-    settings = database.settings
-    if _hash_inputs(_load_variants(settings), settings.scene) != settings.inputs_hash:
-        raise InputError(
-            f'the mission "{settings.mission}", its libraries, its cell, its weights or its scene changed '
-            f'after the sweep "{path}" began, and the results would mix both versions; restore the files, or '
-            "start a new sweep without --resume"
-        )
-    database.lock()
+    with ExitStack() as stack:  # It closes the database after an error.
+        database = stack.enter_context(closing(ResultsDatabase(get_database_path(path))))
+        settings = database.settings
+        if _hash_inputs(_load_variants(settings), settings.scene) != settings.inputs_hash:
+            raise InputError(
+                f'the mission "{settings.mission}", its libraries, its cell, its weights or its scene '
+                f'changed after the sweep "{path}" began, and the results would mix both versions; restore '
+                "the files, or start a new sweep without --resume"
+            )
+        database.lock()
+        stack.pop_all()
     return database
 
 
@@ -105,9 +108,12 @@ def open_comparison(folder: Path) -> list[ResultsDatabase]:
     """Open the databases of a comparison to resume the comparison.
 
     Raises:
-        InputError: There is no such comparison, or an input has changed.
+        InputError: There is no such comparison, another process executes it, or an input has changed.
     """
-    return [open_sweep(folder / side) for side in SIDES]
+    with ExitStack() as stack:  # It closes the first database if the second one cannot be opened.
+        databases = [stack.enter_context(closing(open_sweep(folder / side))) for side in SIDES]
+        stack.pop_all()
+    return databases
 
 
 def _load_variants(settings: SweepSettings) -> list[LoadedMission]:
@@ -123,7 +129,11 @@ def _load_variants(settings: SweepSettings) -> list[LoadedMission]:
 
 
 def _hash_inputs(missions: Iterable[LoadedMission], scene: Path | None) -> str:
-    """Return a hash of the texts of missions, libraries and scene, the cells, and the weights."""
+    """Return a hash of all inputs.
+
+    The inputs are the texts of the missions, libraries and scene, the cell configurations, and the detector
+    weights.
+    """
     inputs: list[object] = [] if scene is None else [read_source(scene).text]
     for loaded in missions:
         cell, base = loaded.cell_config, loaded.cell_path.parent

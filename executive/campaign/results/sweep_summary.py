@@ -1,4 +1,4 @@
-"""Summary of a sweep: success, objects per hour, agreement, phases and failures of each variant."""
+"""Summary of a sweep: success, objects per hour, agreement, skills and failures of each variant."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass
 
 from executive.campaign.results.intervals import Estimate, estimate_proportion, estimate_ratio
-from executive.campaign.results.rows import ItemRow, PhaseRow, RunRow, SweepSettings
+from executive.campaign.results.rows import ItemRow, RunRow, SkillRow, SweepSettings
 from executive.record.timeline.timeline import PlanningTotals
 
 SECONDS_PER_HOUR = 3600.0
 """Number of seconds per hour [s]."""
-RepeatCommand = Callable[[RunRow], str]
+RepeatCommandFactory = Callable[[RunRow], str]
 """Function that returns the command line that repeats a run."""
 
 
@@ -34,19 +34,19 @@ class SummaryStatistics:
 
 
 @dataclass(frozen=True)
-class PhaseSummary:
+class SkillSummary:
     """Number and time of the activations of one skill in all runs of a variant.
 
     Attributes:
-        phase: Name of the skill.
-        activations, failures: Number of activations, and number of failed activations.
-        robot_time_s: Mean time per run [s].
+        skill: Name of the skill.
+        activations, failed_activations: Number of activations, and number of failed activations.
+        mean_robot_time_s: Mean time per run [s].
     """
 
-    phase: str
+    skill: str
     activations: int
-    failures: int
-    robot_time_s: float
+    failed_activations: int
+    mean_robot_time_s: float
 
 
 @dataclass(frozen=True)
@@ -77,26 +77,27 @@ class VariantSummary:
 
     Attributes:
         variant: Values of the varied params and keys of the cell, by name.
-        success: Proportion of the successful runs.
+        success_rate: Proportion of the successful runs.
         correct_objects: Proportion of objects in a permitted bin; the denominator is 0 without ground truth.
         agreement: Proportion of the runs in which the audit confirms the ledger.
         objects_per_hour: Placed objects per hour of robot time.
-        robot_time_s, wall_time_s: Duration of a run on the clock of the run and on a wall clock [s].
+        robot_time_s, wall_time_s: Duration of a run in run time (simulated in simulation) and in wall
+            time [s].
         planning: Statistics of motion planning, summed over the runs.
-        phases: The skills, by decreasing time.
-        failures: Groups of runs with the same problem, by decreasing number of runs.
+        skills: The skills, by decreasing time.
+        failure_groups: Groups of runs with the same problem, by decreasing number of runs.
     """
 
     variant: Mapping[str, str]
-    success: Estimate
+    success_rate: Estimate
     correct_objects: Estimate
     agreement: Estimate
     objects_per_hour: Estimate
     robot_time_s: SummaryStatistics
     wall_time_s: SummaryStatistics
     planning: PlanningTotals
-    phases: tuple[PhaseSummary, ...]
-    failures: tuple[FailureGroup, ...]
+    skills: tuple[SkillSummary, ...]
+    failure_groups: tuple[FailureGroup, ...]
 
 
 @dataclass(frozen=True)
@@ -125,49 +126,50 @@ class SweepResults:
 
 
 def summarize_runs(
-    runs: Sequence[RunRow], phases: Sequence[PhaseRow], make_repeat_command: RepeatCommand
+    runs: Sequence[RunRow], skills: Sequence[SkillRow], make_repeat_command: RepeatCommandFactory
 ) -> list[VariantSummary]:
     """Return the summary of each variant, in the order of the jobs."""
     runs_by_variant: dict[tuple[tuple[str, str], ...], list[RunRow]] = defaultdict(list)
     for run in runs:
         runs_by_variant[tuple(run.variant.items())].append(run)
-    return [_summarize_variant(group, phases, make_repeat_command) for group in runs_by_variant.values()]
+    return [_summarize_variant(group, skills, make_repeat_command) for group in runs_by_variant.values()]
 
 
 def _summarize_variant(
-    runs: Sequence[RunRow], phases: Sequence[PhaseRow], make_repeat_command: RepeatCommand
+    runs: Sequence[RunRow], skills: Sequence[SkillRow], make_repeat_command: RepeatCommandFactory
 ) -> VariantSummary:
-    """Return the summary of the runs of one variant; `phases` contains the phases of all variants."""
+    """Return the summary of the runs of one variant; `skills` contains the rows of all variants."""
     audits, plannings = [run.audit for run in runs if run.audit], [run.planning for run in runs]
     object_count = sum(audit.right + audit.wrong_bin + audit.left + audit.elsewhere for audit in audits)
-    jobs = {run.job for run in runs}
+    run_indices = {run.run_index for run in runs}
     hours = [run.robot_time_s / SECONDS_PER_HOUR for run in runs]
     return VariantSummary(
         variant=runs[0].variant,
-        success=estimate_proportion(sum(run.is_success for run in runs), len(runs)),
+        success_rate=estimate_proportion(sum(run.is_success for run in runs), len(runs)),
         correct_objects=estimate_proportion(sum(audit.right for audit in audits), object_count),
         agreement=estimate_proportion(sum(audit.agrees for audit in audits), len(audits)),
         objects_per_hour=estimate_ratio([run.items.placed for run in runs], hours),
         robot_time_s=SummaryStatistics.from_values([run.robot_time_s for run in runs]),
         wall_time_s=SummaryStatistics.from_values([run.wall_time_s for run in runs]),
         planning=PlanningTotals(*map(sum, zip(*map(astuple, plannings), strict=True))),
-        phases=_summarize_phases([phase for phase in phases if phase.job in jobs], len(runs)),
-        failures=_group_failures(runs, make_repeat_command),
+        skills=_summarize_skills([row for row in skills if row.run_index in run_indices], len(runs)),
+        failure_groups=_group_failures(runs, make_repeat_command),
     )
 
 
-def _summarize_phases(phases: Sequence[PhaseRow], run_count: int) -> tuple[PhaseSummary, ...]:
+def _summarize_skills(skills: Sequence[SkillRow], run_count: int) -> tuple[SkillSummary, ...]:
     """Return the summary of each skill, by decreasing time."""
     summaries = []
-    for name in dict.fromkeys(phase.phase for phase in phases):
-        rows = [phase for phase in phases if phase.phase == name]
-        activations, failures = sum(row.activations for row in rows), sum(row.failures for row in rows)
+    for name in dict.fromkeys(row.skill for row in skills):
+        rows = [row for row in skills if row.skill == name]
+        activations = sum(row.activations for row in rows)
+        failed_activations = sum(row.failed_activations for row in rows)
         time = sum(row.robot_time_s for row in rows) / run_count
-        summaries.append(PhaseSummary(name, activations, failures, time))
-    return tuple(sorted(summaries, key=lambda summary: -summary.robot_time_s))
+        summaries.append(SkillSummary(name, activations, failed_activations, time))
+    return tuple(sorted(summaries, key=lambda summary: -summary.mean_robot_time_s))
 
 
-def _group_failures(runs: Sequence[RunRow], make_repeat_command: RepeatCommand) -> tuple[FailureGroup, ...]:
+def _group_failures(runs: Sequence[RunRow], make_command: RepeatCommandFactory) -> tuple[FailureGroup, ...]:
     """Return the runs with a problem, grouped by status, reason and node, by decreasing number of runs."""
     groups: dict[tuple[str, str, str], list[RunRow]] = defaultdict(list)
     for run in runs:
@@ -176,6 +178,6 @@ def _group_failures(runs: Sequence[RunRow], make_repeat_command: RepeatCommand) 
     failures = []
     for (status, reason, node), group in groups.items():
         first, seeds = group[0], tuple(run.seed for run in group)
-        command = make_repeat_command(first)
-        failures.append(FailureGroup(status, reason, node, seeds, first.explanation, first.run, command))
+        message, directory, command = first.explanation, first.run_directory, make_command(first)
+        failures.append(FailureGroup(status, reason, node, seeds, message, directory, command))
     return tuple(sorted(failures, key=lambda failure: -len(failure.seeds)))

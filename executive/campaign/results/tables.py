@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, is_dataclass, replace
-from typing import Any, Generic, TypeAlias, TypeVar, get_args, get_type_hints
+from typing import Any, Generic, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
 
 from pydantic import TypeAdapter
 
-from executive.campaign.results.rows import ItemRow, PhaseRow, Row, RunRow, SweepSettings
+from executive.campaign.results.rows import ItemRow, Row, RunRow, SkillRow, SweepSettings
 
 RowT = TypeVar("RowT", bound=Row)
 SqlValue: TypeAlias = str | int | float | None
@@ -24,7 +24,8 @@ class Column:
         path: Name of the field; for a nested dataclass, followed by the name of the inner field.
         sql_type: Type in SQLite.
         is_json: True if the column stores a mapping or a sequence as JSON text.
-        comment: Description of the field; for a nested dataclass, only its first column has one.
+        comment: Description of the field; in a nested dataclass, the description of the outer field on the
+            first column, "" on the others.
     """
 
     path: tuple[str, ...]
@@ -99,15 +100,16 @@ def _list_columns(row_class: type) -> list[Column]:
     properties = TypeAdapter(row_class).json_schema()["properties"]
     for name, field_schema in properties.items():
         hint, comment = hints[name], field_schema.get("description", "")
-        types = [argument for argument in get_args(hint) or (hint,) if argument is not type(None)]
-        if isinstance(types[0], type) and is_dataclass(types[0]):
-            inner_columns = _list_columns(types[0])
+        # A field with the type `T | None` has the columns of `T`.
+        value_type = get_args(hint)[0] if type(None) in get_args(hint) else hint
+        if isinstance(value_type, type) and is_dataclass(value_type):
+            inner_columns = _list_columns(value_type)
             inner_columns[0] = replace(inner_columns[0], comment=comment)
             columns += [replace(column, path=(name, *column.path)) for column in inner_columns]
         else:
-            # Only types of mappings and sequences have several arguments; their values are stored as JSON.
-            sql_type = {bool: "INTEGER", int: "INTEGER", float: "REAL"}.get(hint, "TEXT")
-            columns.append(Column((name,), sql_type, len(types) > 1, comment))
+            # Generic types (`Mapping[K, V]`, `tuple[T, ...]`, `list[T]`) are collections, stored as JSON.
+            sql_type = {bool: "INTEGER", int: "INTEGER", float: "REAL"}.get(value_type, "TEXT")
+            columns.append(Column((name,), sql_type, get_origin(value_type) is not None, comment))
     return columns
 
 
@@ -123,6 +125,6 @@ def _get_value(values: Mapping[str, object], column: Column) -> SqlValue:
 
 
 SETTINGS = Table("settings", SweepSettings, "mission")
-RUNS = Table("runs", RunRow, "job")
-ITEMS = Table("items", ItemRow, "job", "item")
-PHASES = Table("phases", PhaseRow, "job", "phase")
+RUNS = Table("runs", RunRow, "run_index")
+ITEMS = Table("items", ItemRow, "run_index", "item")
+SKILLS = Table("skills", SkillRow, "run_index", "skill")

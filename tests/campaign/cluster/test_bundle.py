@@ -105,11 +105,11 @@ def test_a_worker_runs_a_skill_of_another_package(project: Path, tmp_path: Path,
         plugin.teardown(worker)  # type: ignore[arg-type]
     remote = unpack_run(first)
     assert local.run.status == "SUCCESS"
-    assert (remote.run.status, remote.run.trace) == (local.run.status, local.run.trace)
-    journals = {(Path(one.run.run) / "journal.jsonl").read_bytes() for one in (local, remote)}
+    assert (remote.run.status, remote.run.decision_hash) == (local.run.status, local.run.decision_hash)
+    journals = {(Path(one.run.run_directory) / "journal.jsonl").read_bytes() for one in (local, remote)}
     assert len(journals) == 1
     # Both runs of the worker may have the name of the local run.
-    assert len({local.run.run, remote.run.run, unpack_run(second).run.run}) == 3
+    assert len({local.run.run_directory, remote.run.run_directory, unpack_run(second).run.run_directory}) == 3
 
 
 def test_a_worker_with_other_software_is_described() -> None:

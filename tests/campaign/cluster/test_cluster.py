@@ -66,7 +66,7 @@ def sweep(folder: Path, cluster: str | None = None, **options: Any) -> list[RunR
     with closing(create_sweep(make_settings("sort_fruit", SEEDS, FAKE, {}, None, False), folder)) as database:
         jobs = list_jobs(database.settings, database.path.parent)
         run_sweep(jobs, database, JobOptions(**options), cluster)
-        assert [row.job for row in database.read(ITEMS) if row.state != "placed"] == []
+        assert [row.run_index for row in database.read(ITEMS) if row.state != "placed"] == []
         return database.read(RUNS)
 
 
@@ -79,19 +79,21 @@ def test_a_killed_worker_costs_only_time(cluster, tmp_path: Path, monkeypatch: p
         if done >= 1 and (worker := next(kills, None)):
             os.kill(worker.pid, signal.SIGKILL)
 
-    remote = sweep(tmp_path / "remote", cluster=address, progress=kill)
+    remote = sweep(tmp_path / "remote", cluster=address, on_progress=kill)
     assert next(kills, None) is None
     local = sweep(tmp_path / "local")
 
     def strip(row: RunRow) -> RunRow:
-        return replace(row, wall_time_s=0.0, run="")
+        return replace(row, wall_time_s=0.0, run_directory="")
 
     assert list(map(strip, remote)) == list(map(strip, local))
     assert [row.status for row in remote] == ["SUCCESS"] * len(SEEDS)
     for one, other in zip(remote, local, strict=True):
-        journals = [(Path(row.run) / "journal.jsonl").read_bytes() for row in (one, other)]
+        journals = [(Path(row.run_directory) / "journal.jsonl").read_bytes() for row in (one, other)]
         assert journals[0] == journals[1]
-        assert str(tmp_path / "w") not in (Path(one.run) / "result.json").read_text(encoding="utf-8")
+        assert str(tmp_path / "w") not in (Path(one.run_directory) / "result.json").read_text(
+            encoding="utf-8"
+        )
 
 
 def test_a_scheduler_without_workers_or_with_other_software_gives_an_explanation(

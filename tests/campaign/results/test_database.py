@@ -14,38 +14,40 @@ from pathlib import Path
 import pytest
 
 from executive.campaign.results.database import ResultsDatabase, get_database_path
-from executive.campaign.results.rows import ItemRow, PhaseRow, RunRecord, RunRow, SweepSettings
-from executive.campaign.results.tables import ITEMS, PHASES, RUNS
+from executive.campaign.results.rows import ItemRow, RunRecord, RunRow, SkillRow, SweepSettings
+from executive.campaign.results.tables import ITEMS, RUNS, SKILLS
 from executive.errors import InputError
 from executive.record.result import Audit, ItemCounts
 from executive.record.timeline.timeline import PlanningTotals
 
 SETTINGS = SweepSettings(
     mission="sort.yaml", mission_name="sort", cell="cells/fruit.yaml", overrides={"attempts": "3"},
-    variations={"speed": ("1", "2")}, first_seed=0, last_seed=9, scene=None, saves_pictures=False,
+    variations={"speed": ("1", "2")}, first_seed=0, last_seed=9, scene=None, saves_images=False,
     inputs_hash="abc", versions={"python": "3.11"},
 )  # fmt: skip
 RUN = RunRow(
-    job=3, seed=3, variant={"speed": "1"}, status="FAILURE", reason="Grasp.missed", message="no “seal”",
-    node="tree/Grasp", items=ItemCounts(seen=2, placed=1, lost=1), audit=Audit(agrees=False, right=1),
-    planning=PlanningTotals(4, 2, 0.1), ticks=70, robot_time_s=0.1 + 0.2, wall_time_s=1.5, trace="f00",
-    run="runs/x", crashes=1,
+    run_index=3, seed=3, variant={"speed": "1"}, status="FAILURE", reason="Grasp.missed",
+    message="no “seal”", node="tree/Grasp", items=ItemCounts(seen=2, placed=1, lost=1),
+    audit=Audit(agrees=False, right=1), planning=PlanningTotals(4, 2, 0.1), ticks=70, robot_time_s=0.1 + 0.2,
+    wall_time_s=1.5, decision_hash="f00", run_directory="runs/x", crashes=1,
 )  # fmt: skip
-ITEM = ItemRow(job=3, item="cube-1", label="cube", state="lost", bin="", attempts=2, robot_time_s=1 / 3)
-PHASE = PhaseRow(job=3, phase="Grasp", activations=3, failures=2, robot_time_s=2 / 3)
-RECORD = RunRecord(RUN, (ITEM,), (PHASE,))
+ITEM = ItemRow(
+    run_index=3, item="cube-1", label="cube", state="lost", bin="", failed_attempts=2, robot_time_s=1 / 3
+)
+SKILL = SkillRow(run_index=3, skill="Grasp", activations=3, failed_activations=2, robot_time_s=2 / 3)
+RECORD = RunRecord(RUN, (ITEM,), (SKILL,))
 
 
 def test_all_rows_are_read_as_they_were_stored(tmp_path: Path) -> None:
     path = tmp_path / "results.sqlite"
-    plain = RunRow(job=0, seed=0, status="SUCCESS", reason="", message="", node="")
+    plain = RunRow(run_index=0, seed=0, status="SUCCESS", reason="", message="", node="")
     with closing(ResultsDatabase(path, SETTINGS)) as database:
         database.append(RECORD)
         database.append(RunRecord(plain))
     with closing(ResultsDatabase(get_database_path(tmp_path))) as database:
         assert database.settings == SETTINGS
         assert database.read(RUNS) == [plain, RUN]
-        assert (database.read(ITEMS), database.read(PHASES)) == ([ITEM], [PHASE])
+        assert (database.read(ITEMS), database.read(SKILLS)) == ([ITEM], [SKILL])
     assert [path.name for path in tmp_path.iterdir()] == ["results.sqlite"], "one file contains everything"
 
 
@@ -55,20 +57,22 @@ def test_the_schema_describes_every_table_and_column(tmp_path: Path) -> None:
         (schema,) = connection.execute("SELECT sql FROM sqlite_master WHERE name = 'runs'").fetchone()
         names = [row[1] for row in connection.execute("PRAGMA table_info(runs)")]
     assert schema.startswith("CREATE TABLE runs ( -- A run; ")
-    assert "  robot_time_s REAL, -- Duration on the clock of the run [s].\n" in schema
-    assert "  audit_agrees INTEGER, -- True places of the objects, and agreement" in schema
-    assert {"job", "items_placed", "audit_right", "planning_waited_s", "crashes"} <= set(names)
+    assert "  robot_time_s REAL, -- Duration on the run clock (simulated time in simulation" in schema
+    assert "  audit_agrees INTEGER, -- Count of objects by ground-truth location, and whether" in schema
+    assert {"run_index", "items_placed", "audit_right", "planning_waited_s", "crashes"} <= set(names)
 
 
 def test_a_run_is_stored_completely_or_not_at_all(tmp_path: Path) -> None:
     with closing(ResultsDatabase(tmp_path / "a", SETTINGS)) as database:
         with pytest.raises(
-            InputError, match=r"cannot be read or written: UNIQUE.* phases\.job, phases\.phase"
+            InputError, match=r"cannot be read or written: UNIQUE.* skills\.run_index, skills\.skill"
         ):
-            database.append(replace(RECORD, phases=(PHASE, PHASE)))
+            database.append(replace(RECORD, skills=(SKILL, SKILL)))
         assert (database.read(RUNS), database.read(ITEMS)) == ([], [])
         database.append(RECORD)
-        with pytest.raises(InputError, match=r"UNIQUE constraint failed: runs\.job; runs that were stored"):
+        with pytest.raises(
+            InputError, match=r"UNIQUE constraint failed: runs\.run_index; runs that were stored"
+        ):
             database.append(RECORD)
 
 

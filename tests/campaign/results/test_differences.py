@@ -10,7 +10,7 @@ from executive.record.result import Audit, ItemCounts
 def make_run(seed: int, status: str = "SUCCESS", time: float = 10.0, placed: int = 4) -> RunRow:
     reason = "" if status == "SUCCESS" else "Grasp.missed"
     return RunRow(
-        job=seed, seed=seed, status=status, reason=reason, message="", node="", robot_time_s=time,
+        run_index=seed, seed=seed, status=status, reason=reason, message="", node="", robot_time_s=time,
         items=ItemCounts(seen=placed, placed=placed), audit=Audit(right=placed),
     )  # fmt: skip
 

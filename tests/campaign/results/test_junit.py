@@ -31,8 +31,8 @@ def assert_valid(element: ElementTree.Element) -> None:
 
 def run(seed: int, status: str = "SUCCESS", reason: str = "", message: str = "", **more: object) -> RunRow:
     return RunRow(
-        job=seed, seed=seed, status=status, reason=reason, message=message,
-        node="tree/Grasp" if reason else "", wall_time_s=2.5, run=f"runs/{seed}", **more,
+        run_index=seed, seed=seed, status=status, reason=reason, message=message,
+        node="tree/Grasp" if reason else "", wall_time_s=2.5, run_directory=f"runs/{seed}", **more,
     )  # fmt: skip
 
 

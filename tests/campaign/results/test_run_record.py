@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.campaign.results.rows import ItemRow, PhaseRow, make_record
+from executive.campaign.results.rows import ItemRow, SkillRow, make_record
 from executive.events import ItemChanged, NodeEnded, NodeStarted, RunEnded, TargetSelected, TimedEvent
 from executive.mission.load import load_mission
 from executive.plugins import load_cell_kind, load_skills
@@ -40,14 +40,28 @@ def test_an_item_takes_the_time_from_its_selections_to_its_end() -> None:
         (9.0, RunEnded("INCOMPLETE", "", "", "", False, "", 9, 9.0)),
     )
     assert make_record(4, {}, RESULT, seen).items == (
-        ItemRow(job=4, item="cube-1", label="cube", state="rejected", bin="", attempts=3, robot_time_s=3.0),
         ItemRow(
-            job=4, item="duck-1", label="duck", state="placed", bin="right", attempts=0, robot_time_s=3.0
+            run_index=4,
+            item="cube-1",
+            label="cube",
+            state="rejected",
+            bin="",
+            failed_attempts=3,
+            robot_time_s=3.0,
+        ),
+        ItemRow(
+            run_index=4,
+            item="duck-1",
+            label="duck",
+            state="placed",
+            bin="right",
+            failed_attempts=0,
+            robot_time_s=3.0,
         ),
     )
 
 
-def test_a_phase_contains_all_activations_of_a_skill() -> None:
+def test_a_row_contains_all_activations_of_a_skill() -> None:
     seen = timeline(
         (0.0, NodeStarted("tree")),
         (0.0, NodeStarted("tree/Grasp", "Grasp")),
@@ -57,9 +71,9 @@ def test_a_phase_contains_all_activations_of_a_skill() -> None:
         (0.4, NodeStarted("tree/Release", "Release")),
         (0.5, NodeEnded("tree/Release", "INVALID", "Release")),
     )
-    assert make_record(4, {}, RESULT, seen).phases == (
-        PhaseRow(job=4, phase="Grasp", activations=2, failures=1, robot_time_s=0.3),
-        PhaseRow(job=4, phase="Release", activations=1, failures=0, robot_time_s=0.1),
+    assert make_record(4, {}, RESULT, seen).skills == (
+        SkillRow(run_index=4, skill="Grasp", activations=2, failed_activations=1, robot_time_s=0.3),
+        SkillRow(run_index=4, skill="Release", activations=1, failed_activations=0, robot_time_s=0.1),
     )
 
 
@@ -73,7 +87,7 @@ def test_the_rows_follow_from_the_record_of_the_run(seed: int, tmp_path: Path) -
     stored = read_result(RunDirectory(Path(result.run)), journal)
     assert stored is not None
     assert record == make_record(5, {"a": "1"}, stored, Timeline.from_events(journal))
-    assert (record.run.job, record.run.seed, record.run.variant) == (5, seed, {"a": "1"})
+    assert (record.run.run_index, record.run.seed, record.run.variant) == (5, seed, {"a": "1"})
     assert record.run.items.placed == sum(item.state == "placed" for item in record.items) > 0
     assert 0 < sum(item.robot_time_s for item in record.items) < record.run.robot_time_s
-    assert {"Detect", "Grasp", "Release"} <= {phase.phase for phase in record.phases}
+    assert {"Detect", "Grasp", "Release"} <= {row.skill for row in record.skills}

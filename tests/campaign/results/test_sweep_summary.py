@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from executive.campaign.results.intervals import Estimate, estimate_proportion, estimate_ratio
-from executive.campaign.results.rows import PhaseRow, RunRow
+from executive.campaign.results.rows import RunRow, SkillRow
 from executive.campaign.results.sweep_summary import (
     FailureGroup,
-    PhaseSummary,
+    SkillSummary,
     SummaryStatistics,
     summarize_runs,
 )
@@ -18,10 +18,11 @@ from executive.record.timeline.timeline import PlanningTotals
 
 def run(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **more: object) -> RunRow:
     fields = {
-        "job": seed, "seed": seed, "status": status, "reason": "" if status == "SUCCESS" else "Grasp.missed",
-        "message": "", "node": "", "items": ItemCounts(seen=right + left, placed=right, rejected=left),
+        "run_index": seed, "seed": seed, "status": status,
+        "reason": "" if status == "SUCCESS" else "Grasp.missed", "message": "", "node": "",
+        "items": ItemCounts(seen=right + left, placed=right, rejected=left),
         "audit": Audit(right=right, left=left), "planning": PlanningTotals(10, 8, 0.1),
-        "robot_time_s": 30.0 + seed, "wall_time_s": 6.0, "run": f"runs/{seed}",
+        "robot_time_s": 30.0 + seed, "wall_time_s": 6.0, "run_directory": f"runs/{seed}",
     }  # fmt: skip
     return RunRow(**fields | more)
 
@@ -36,12 +37,12 @@ def test_the_summary_counts_objects_and_groups_problems() -> None:
     (summary,) = summarize_runs(runs, [], repeat)
     assert [
         (share.numerator, share.denominator, share.value)
-        for share in (summary.success, summary.correct_objects, summary.agreement)
+        for share in (summary.success_rate, summary.correct_objects, summary.agreement)
     ] == [(2, 5, 0.4), (17, 19, 17 / 19), (4, 5, 0.8)]
     assert summary.objects_per_hour.value == pytest.approx(18 * 3600 / 160)
     assert summary.robot_time_s == SummaryStatistics(30.0, 32.0, 32.0, 34.0)
     assert summary.planning == PlanningTotals(50, 40, pytest.approx(0.5))
-    assert summary.failures == (
+    assert summary.failure_groups == (
         FailureGroup("FAILURE", "Grasp.missed", "", (1, 3), "", "runs/1", "repeat 1"),
         FailureGroup(
             "SUCCESS", "disagreement", "", (2,),
@@ -53,16 +54,16 @@ def test_the_summary_counts_objects_and_groups_problems() -> None:
     )  # fmt: skip
 
 
-def test_variants_and_their_phases_are_separate() -> None:
+def test_variants_and_their_skills_are_separate() -> None:
     runs = [run(0, variant={"a": "1"}), run(1, variant={"a": "1"}), run(2, variant={"a": "2"}, audit=None)]
-    phases = [
-        PhaseRow(job=job, phase=name, activations=2, failures=job, robot_time_s=time)
+    skills = [
+        SkillRow(run_index=job, skill=name, activations=2, failed_activations=job, robot_time_s=time)
         for job, name, time in ((0, "Grasp", 1.0), (0, "Transit", 5.0), (1, "Grasp", 2.0), (2, "Grasp", 7.0))
     ]
-    first, second = summarize_runs(runs, phases, repeat)
+    first, second = summarize_runs(runs, skills, repeat)
     assert (first.variant, second.variant) == ({"a": "1"}, {"a": "2"})
-    assert first.phases == (PhaseSummary("Transit", 2, 0, 2.5), PhaseSummary("Grasp", 4, 1, 1.5))
-    assert second.phases == (PhaseSummary("Grasp", 2, 2, 7.0),)
+    assert first.skills == (SkillSummary("Transit", 2, 0, 2.5), SkillSummary("Grasp", 4, 1, 1.5))
+    assert second.skills == (SkillSummary("Grasp", 2, 2, 7.0),)
     # Without ground truth no object counts.
     assert (second.correct_objects, second.agreement) == (Estimate(0, 0), Estimate(0, 0))
     assert summarize_runs([], [], repeat) == []
