@@ -25,7 +25,7 @@ from executive.exit_codes import ExitCode
 @click.pass_context
 def command(
     ctx: click.Context, missions: tuple[str, ...], seeds: range | None, overrides_a: dict[str, str],
-    overrides_b: dict[str, str], resume: Path | None, workers: int, cluster: str | None, save_images: bool,
+    overrides_b: dict[str, str], resume: Path | None, workers: int, cluster: str | None, save_frames: bool,
     overrides: dict[str, str], scene: Path | None, runs_folder: Path, as_json: bool,
 ) -> int:  # fmt: skip
     """Run the missions A and B once for every seed, and estimate the differences.
@@ -56,7 +56,7 @@ def command(
         else:
             assert seeds is not None
             settings = [
-                make_settings(mission, seeds, {**overrides, **own_overrides}, {}, scene, save_images)
+                make_settings(mission, seeds, {**overrides, **own_overrides}, {}, scene, save_frames)
                 for mission, own_overrides in ((missions[0], overrides_a), (missions[-1], overrides_b))
             ]
             databases = create_comparison(settings, runs_folder)

@@ -133,12 +133,15 @@ _SWEEP_OPTIONS = (
         "--cluster", metavar="ADDRESS",
         help="Run on the workers of a dask scheduler, for example tcp://scheduler:8786 (extra: cluster).",
     ),
-    click.option("--save-images", is_flag=True, help="Save the camera images on which decisions are based."),
+    click.option(
+        "--frames", "save_frames", is_flag=True,
+        help="Save the camera images on which decisions are based.",
+    ),
     overrides_option, scene_option, runs_option, json_option,
 )  # fmt: skip
 """Options that the commands `sweep` and `compare` share."""
 _SWEEP_SETTINGS = {
-    "mission", "missions", "seeds", "save_images", "scene",
+    "mission", "missions", "seeds", "save_frames", "scene",
     "variations", "overrides", "overrides_a", "overrides_b",
 }  # fmt: skip
 """Parameters of `sweep` and `compare` whose values `--resume` reads from the results."""

@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 @options.add_sweep_options
 @click.option(
     "--require", metavar="EXPR",
-    help='Exit with code 1 if the runs do not meet EXPR: "success_rate>=0.99 and p95(robot_time_s)<20".',
+    help='Exit with code 1 if the runs do not meet EXPR: "success>=0.99 and p95(robot_time_s)<20".',
 )  # fmt: skip
 @click.option("--junit", type=options.FILE, help="Write a report in the JUnit XML format to this file.")
 @click.option("--export", type=options.FOLDER, help="Write the tables of runs, items and skills as Parquet.")
 @click.pass_context
 def command(
     ctx: click.Context, mission: str | None, seeds: range | None, variations: dict[str, tuple[str, ...]],
-    resume: Path | None, workers: int, cluster: str | None, save_images: bool, overrides: dict[str, str],
+    resume: Path | None, workers: int, cluster: str | None, save_frames: bool, overrides: dict[str, str],
     scene: Path | None, runs_folder: Path, require: str | None, junit: Path | None, export: Path | None,
     as_json: bool,
 ) -> int:  # fmt: skip
@@ -70,7 +70,7 @@ def command(
             database = open_sweep(resume)
         else:
             assert mission is not None and seeds is not None
-            settings = make_settings(mission, seeds, overrides, variations, scene, save_images)
+            settings = make_settings(mission, seeds, overrides, variations, scene, save_frames)
             database = create_sweep(settings, runs_folder)
         with closing(database):
             click.echo(f"results: {database.path}", err=True)

@@ -22,8 +22,8 @@ MAX_LISTED_CHANGED_SEEDS = 20
 
 def render_summary(summaries: Sequence[VariantSummary], planned_run_count: int) -> Iterator[RenderableType]:
     """Yield lines and a table with the summary of a sweep of `planned_run_count` runs."""
-    run_count = sum(summary.success_rate.denominator for summary in summaries)
-    success_count = sum(summary.success_rate.numerator for summary in summaries)
+    run_count = sum(summary.success.denominator for summary in summaries)
+    success_count = sum(summary.success.numerator for summary in summaries)
     if run_count == planned_run_count:
         yield f"{success_count} of {run_count} runs succeeded"
     else:
@@ -55,7 +55,7 @@ def _format_metrics(summary: VariantSummary) -> dict[str, str]:
     """Return the values of the metrics of a variant as text, by name."""
     objects, robot_time, planning = summary.correct_objects, summary.robot_time_s, summary.planning
     texts = {
-        "success rate": _format_percentage(summary.success_rate),
+        "success rate": _format_percentage(summary.success),
         "objects in the right bin": _format_percentage(objects),
         "count in the right bin": f"{objects.numerator} of {objects.denominator}",
         "ledger and audit agree": _format_percentage(summary.agreement),

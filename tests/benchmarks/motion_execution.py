@@ -145,6 +145,8 @@ class _Execution:
             self._step()
         if not self._tool.holding:
             self._missed += 1
+            # The arm leaves the table, because the next scene may have an object where the tool is now.
+            self._move(scene.drop, scene.fetch_task, scene, lambda: False)
             return
         carrying = self._move(
             scene.drop, scene.make_carry_task(self._tool.holding_force), scene, lambda: not self._tool.holding

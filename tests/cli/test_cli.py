@@ -204,7 +204,7 @@ def test_help_names_every_command_and_every_exit_code():
         ("sweep sort --seeds 3 --vary a=[1,1]", '"a=[1,1]" contains a value twice'),
         (
             "sweep sort --seeds 3 --require succes>1",
-            'there is no metric "succes"; the metrics are success_rate,',
+            'there is no metric "succes"; the metrics are success,',
         ),
         ("sweep --resume nowhere", 'there is no file "nowhere"; name the file results.sqlite of a sweep, or'),
         (

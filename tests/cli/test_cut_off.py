@@ -53,9 +53,9 @@ def test_it_says_at_once_that_it_halts_and_then_how_far_it_came(tmp_path: Path, 
     assert sweep.returncode == 130
     figures = json.loads(shown)
     assert (figures["planned_run_count"], figures["is_incomplete"]) == (400, True)
-    success_rate = figures["variants"][0]["success_rate"]
-    run_count, success_count = len(figures["runs"]), success_rate["numerator"]
-    assert 1 <= run_count == success_rate["denominator"] < 400
+    success = figures["variants"][0]["success"]
+    run_count, success_count = len(figures["runs"]), success["numerator"]
+    assert 1 <= run_count == success["denominator"] < 400
     halting, summary = said.index("halting: no new runs start"), said.index(" of 400 runs; ")
     assert halting < summary
     assert f"halted after {run_count} of 400 runs; {success_count} of the {run_count} succeeded" in said

@@ -89,9 +89,9 @@ def test_the_summary_shows_every_variant_and_how_to_repeat_a_failure(sweep):
 
 
 def test_an_unmet_requirement_is_the_reason_of_exit_code_1(sweep):
-    words = ("--seeds", "0:2", "--json", "--require", "success_rate >= 0.99 and p95(robot_time_s) < 20")
+    words = ("--seeds", "0:2", "--json", "--require", "success >= 0.99 and p95(robot_time_s) < 20")
     shown = sweep("SUCCESS FAILURE", *words)
-    message = "success_rate>=0.99 is not met: the value is 0.5"
+    message = "success>=0.99 is not met: the value is 0.5"
     assert (shown.exit_code, shown.stderr.splitlines()[-1]) == (1, message)
     assert json.loads(shown.stdout)["unmet_conditions"] == [message]
     assert sweep("SUCCESS SUCCESS", *words).exit_code == 0

@@ -1,4 +1,4 @@
-"""Requirement on the results of a sweep, for instance `success_rate>=0.99 and p95(robot_time_s)<20`."""
+"""Requirement on the results of a sweep, for instance `success>=0.99 and p95(robot_time_s)<20`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from executive.campaign.results.sweep_summary import VariantSummary
 from executive.campaign.results.tables import RUNS
 from executive.errors import InputError
 
-METRICS = ("success_rate", "agreement", "objects_per_hour")
+METRICS = ("success", "agreement", "objects_per_hour")
 """Metrics of a variant: names of attributes of `VariantSummary` with the type `Estimate`."""
 PERCENTILES: Mapping[str, float] = {"min": 0, "median": 50, "p50": 50, "p95": 95, "p99": 99, "max": 100}
 """Percentiles of a column over the runs, by name [%]."""
@@ -31,7 +31,7 @@ _COLUMN_INDICES = {
 _CONDITION_PATTERN = re.compile(
     r"\s*(\w+)\s*(?:\(\s*(\w+)\s*\))?\s*([<>]=?)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 )
-"""Matches `success_rate>=0.99` and `p95(robot_time_s)<20`."""
+"""Matches `success>=0.99` and `p95(robot_time_s)<20`."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def _parse_condition(text: str) -> Condition:
     """Return a condition from its text."""
     match = _CONDITION_PATTERN.fullmatch(text)
     if match is None:
-        advice = "write for example success_rate>=0.99 and p95(robot_time_s)<20"
+        advice = "write for example success>=0.99 and p95(robot_time_s)<20"
         raise InputError(f'"{text.strip()}" is no comparison of a metric with a number; {advice}')
     metric, column = match[1], match[2] or ""
     if metric not in (STATISTICS if column else METRICS):

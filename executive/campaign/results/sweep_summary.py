@@ -77,7 +77,7 @@ class VariantSummary:
 
     Attributes:
         variant: Values of the varied params and keys of the cell, by name.
-        success_rate: Proportion of the successful runs.
+        success: Proportion of the successful runs.
         correct_objects: Proportion of objects in a permitted bin; the denominator is 0 without ground truth.
         agreement: Proportion of the runs in which the audit confirms the ledger.
         objects_per_hour: Placed objects per hour of robot time.
@@ -89,7 +89,7 @@ class VariantSummary:
     """
 
     variant: Mapping[str, str]
-    success_rate: Estimate
+    success: Estimate
     correct_objects: Estimate
     agreement: Estimate
     objects_per_hour: Estimate
@@ -145,7 +145,7 @@ def _summarize_variant(
     hours = [run.robot_time_s / SECONDS_PER_HOUR for run in runs]
     return VariantSummary(
         variant=runs[0].variant,
-        success_rate=estimate_proportion(sum(run.is_success for run in runs), len(runs)),
+        success=estimate_proportion(sum(run.is_success for run in runs), len(runs)),
         correct_objects=estimate_proportion(sum(audit.right for audit in audits), object_count),
         agreement=estimate_proportion(sum(audit.agrees for audit in audits), len(audits)),
         objects_per_hour=estimate_ratio([run.items.placed for run in runs], hours),

@@ -24,8 +24,8 @@ def find_unmet(text: str, *runs: RunRow) -> list[str]:
 @pytest.mark.parametrize(
     ("text", "unmet"),
     [
-        ("success_rate>=1 and robot_time_s", None),
-        ("success_rate >= 1.0 and p95(robot_time_s)<10", []),
+        ("success>=1 and robot_time_s", None),
+        ("success >= 1.0 and p95(robot_time_s)<10", []),
         (
             "median(robot_time_s)<5 and max(robot_time_s)<=9",
             ["median(robot_time_s)<5 is not met: the value is 5"],
@@ -50,8 +50,8 @@ def test_each_comparison_is_met_or_explained(text: str, unmet: list[str] | None)
 
 def test_every_variant_must_meet_the_requirement() -> None:
     runs = (run(1, "a"), run(2, "b", status="FAILURE", audit=Audit(agrees=False)))
-    assert find_unmet("success_rate>0.5", *runs) == ["success_rate>0.5 is not met with v=b: the value is 0"]
-    assert find_unmet("success_rate>0.5") == ["no run has ended"]
+    assert find_unmet("success>0.5", *runs) == ["success>0.5 is not met with v=b: the value is 0"]
+    assert find_unmet("success>0.5") == ["no run has ended"]
 
 
 @pytest.mark.parametrize(
@@ -59,16 +59,16 @@ def test_every_variant_must_meet_the_requirement() -> None:
     [
         (
             "",
-            r'"" is no comparison of a metric with a number; write for example success_rate>=0.99 and p95\(',
+            r'"" is no comparison of a metric with a number; write for example success>=0.99 and p95\(',
         ),
-        ("success_rate=1", '"success_rate=1" is no comparison'),
-        ("success_rate>1 or success_rate<2", '"success_rate>1 or success_rate<2" is no comparison'),
-        ("success_rate>1 and", '"" is no comparison'),
-        ("success_rate>one", '"success_rate>one" is no comparison'),
+        ("success=1", '"success=1" is no comparison'),
+        ("success>1 or success<2", '"success>1 or success<2" is no comparison'),
+        ("success>1 and", '"" is no comparison'),
+        ("success>one", '"success>one" is no comparison'),
         ("__import__('os')>1", "is no comparison"),
         (
             "speed>1",
-            r'there is no metric "speed"; the metrics are success_rate, agreement, objects_per_hour, mean\(',
+            r'there is no metric "speed"; the metrics are success, agreement, objects_per_hour, mean\(',
         ),
         ("p98(ticks)>1", r'there is no metric "p98"; .*, p95\(COLUMN\), p99\(COLUMN\), max\(COLUMN\)$'),
         (

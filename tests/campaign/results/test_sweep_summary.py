@@ -37,7 +37,7 @@ def test_the_summary_counts_objects_and_groups_problems() -> None:
     (summary,) = summarize_runs(runs, [], repeat)
     assert [
         (share.numerator, share.denominator, share.value)
-        for share in (summary.success_rate, summary.correct_objects, summary.agreement)
+        for share in (summary.success, summary.correct_objects, summary.agreement)
     ] == [(2, 5, 0.4), (17, 19, 17 / 19), (4, 5, 0.8)]
     assert summary.objects_per_hour.value == pytest.approx(18 * 3600 / 160)
     assert summary.robot_time_s == SummaryStatistics(30.0, 32.0, 32.0, 34.0)
