@@ -97,11 +97,17 @@ class Snapshots(StopAtFirstTick):
 
 
 def measure(
-    subject: MissionUnderTest, runs: Path, reports: int, others: int, films: int, truncations: int, kills: int
+    subject: MissionUnderTest,
+    runs_folder: Path,
+    reports: int,
+    others: int,
+    films: int,
+    truncations: int,
+    kills: int,
 ) -> Figures:
     """Damage records of a run of MISSION, and read, replay, resume and film them."""
-    runs.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(prefix=".damaged-", dir=runs) as folder:
+    runs_folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(prefix=".damaged-", dir=runs_folder) as folder:
         base = Path(folder).resolve()  # The children have another working directory.
         snapshots, problem = ForkRunner(RESUME_TIMEOUT).call(lambda: _record_whole(subject, base / "whole"))
         if snapshots is None:

@@ -19,14 +19,14 @@ MAX_PERCENT = 3.0
 """Limit of the journal's share of the wall time of a simulated run."""
 
 
-def measure(subject: MissionUnderTest, runs: Path) -> Figures:
+def measure(subject: MissionUnderTest, runs_folder: Path) -> Figures:
     """Measure the journal's share of a run of MISSION; the record is made below `--runs` and removed."""
-    runs.mkdir(parents=True, exist_ok=True)
+    runs_folder.mkdir(parents=True, exist_ok=True)
     times: list[float] = []
     began = time.perf_counter()
     options = RunOptions(subject.seed, subject.requests, make_cell=subject.make_cell)
     run = assemble(subject.loaded, options)
-    with closing(run), tempfile.TemporaryDirectory(prefix=".journal-", dir=runs) as folder:
+    with closing(run), tempfile.TemporaryDirectory(prefix=".journal-", dir=runs_folder) as folder:
         with closing(Recorder(RunDirectory(Path(folder)), saves_pictures=False)) as recorder:
 
             def record(event: Event) -> None:

@@ -45,9 +45,11 @@ CHANGES = ("moved", "removed", "dropped")
 """Changes of the world: an object on the table is moved or taken away, or the tool lets go."""
 
 
-def measure(subject: MissionUnderTest, runs: Path, kills: int = 20, changed: int | None = None) -> Figures:
+def measure(
+    subject: MissionUnderTest, runs_folder: Path, kills: int = 20, changed: int | None = None
+) -> Figures:
     """Kill MISSION at random moments and resume it each time; runs with a problem stay in `runs/kills`."""
-    random, runs = np.random.default_rng(subject.seed), runs / "kills"
+    random, runs = np.random.default_rng(subject.seed), runs_folder / "kills"
     changed = kills // 4 if changed is None else changed
     began = time.monotonic()
     os.waitpid(begin_run(subject, subject.seed, runs / "whole"), 0)

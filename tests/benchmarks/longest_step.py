@@ -77,7 +77,7 @@ class StepTimer:
         self._start, self._excluded = now, (0.0, 0.0)
 
 
-def measure(subject: MissionUnderTest, runs: Path, run_count: int) -> Figures:
+def measure(subject: MissionUnderTest, runs_folder: Path, run_count: int) -> Figures:
     """Measure the control steps of `--count` runs of MISSION, which are recorded below `--runs`."""
     rows = []
     for seed in show_progress(range(subject.seed, subject.seed + run_count), "runs"):
@@ -89,7 +89,7 @@ def measure(subject: MissionUnderTest, runs: Path, run_count: int) -> Figures:
             return workcell
 
         options = RunOptions(seed, subject.requests, make_cell=make_cell)
-        record_run(subject.loaded, options, runs, RecordOptions([timer]))
+        record_run(subject.loaded, options, runs_folder, RecordOptions([timer]))
         walls, cpus = zip(*timer.steps, strict=True)
         row = {
             "seed": seed,

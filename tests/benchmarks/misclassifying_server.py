@@ -124,7 +124,7 @@ def measure(
     first_seed: int,
     wall_time_limit: float,
     workers: int,
-    runs: Path,
+    runs_folder: Path,
     out: Path,
 ) -> Figures:
     """Sort with two detectors, one of which gives every object of a class the name of another class.
@@ -133,7 +133,8 @@ def measure(
     """
     misnaming = Server(server, true_class, given_class)
     jobs = [
-        Job(mission, seed, misnaming, runs, wall_time_limit) for seed in range(first_seed, first_seed + seeds)
+        Job(mission, seed, misnaming, runs_folder, wall_time_limit)
+        for seed in range(first_seed, first_seed + seeds)
     ]
     with show_progress("misclassifying server") as progress:
         results = run_jobs(jobs, run_job, _describe_broken, JobOptions(workers, progress, print_halt))

@@ -73,7 +73,7 @@ def measure(
     first_seed: int,
     wall_time_limit: float,
     workers: int,
-    runs: Path,
+    runs_folder: Path,
     out: Path,
 ) -> Figures:
     """Run missions in scenes outside of what the cell files declare, with unchanged cell files.
@@ -93,7 +93,9 @@ def measure(
             scene = write_scene(case, Path(folder))
             first = first_seed + SEEDS_PER_CASE * case.number
             count = declared_runs if case.group == DECLARED else runs_per_scene
-            jobs += [Job(case, seed, scene, runs, wall_time_limit) for seed in range(first, first + count)]
+            jobs += [
+                Job(case, seed, scene, runs_folder, wall_time_limit) for seed in range(first, first + count)
+            ]
         with show_progress("outside the envelope") as progress:
             results = run_jobs(jobs, run_job, _describe_broken, JobOptions(workers, progress, print_halt))
     done = [result for result in results if result is not None and result.run.status != HALTED]
