@@ -79,12 +79,12 @@ def run_sweep(
         run_jobs_on_cluster(jobs, cluster, options, store)
 
 
-def read_results(database: ResultsDatabase, name: str) -> SweepResults:
-    """Return the results of all stored runs of a sweep; `name` is `A` or `B` in a comparison, else ""."""
+def read_results(database: ResultsDatabase, side: str = "") -> SweepResults:
+    """Return the results of all stored runs of a sweep; `side` is `A` or `B` in a comparison, else ""."""
     settings, runs, skills = database.settings, database.read(RUNS), database.read(SKILLS)
     summaries = summarize_runs(runs, skills, functools.partial(make_repeat_command, settings))
     planned_run_count = len(list_jobs(settings, database.path.parent))
-    return SweepResults(name, settings, runs, database.read(ITEMS), summaries, planned_run_count)
+    return SweepResults(side, settings, runs, database.read(ITEMS), summaries, planned_run_count)
 
 
 def run_job(job: SweepJob) -> RunRecord:

@@ -25,7 +25,7 @@ from executive.exit_codes import ExitCode
 @click.pass_context
 def command(
     ctx: click.Context, missions: tuple[str, ...], seeds: range | None, overrides_a: dict[str, str],
-    overrides_b: dict[str, str], resume: Path | None, workers: int, cluster: str | None, save_frames: bool,
+    overrides_b: dict[str, str], resume: Path | None, workers: int, cluster: str | None, save_images: bool,
     overrides: dict[str, str], scene: Path | None, runs_folder: Path, as_json: bool,
 ) -> int:  # fmt: skip
     """Run the missions A and B once for every seed, and estimate the differences.
@@ -38,9 +38,9 @@ def command(
     options.check_resume(
         ctx, has_missions_and_seeds=len(missions) in (1, 2) and seeds is not None,
         required_arguments="one or two missions and --seeds, or --resume FOLDER",
-        resumed_settings="missions, seeds and settings from the comparison",
+        resumed_settings_text="missions, seeds and settings from the comparison",
     )  # fmt: skip
-    options.check_distinct(overrides, "--set-a or --set-b", {**overrides_a, **overrides_b})
+    options.check_disjoint(overrides, "--set-a or --set-b", {**overrides_a, **overrides_b})
     with keep_stdout_clean():
         from executive.campaign.results.differences import compute_differences, pair_runs
         from executive.campaign.results.results_page import write_missing_reports, write_page
@@ -56,16 +56,16 @@ def command(
         else:
             assert seeds is not None
             settings = [
-                make_settings(mission, seeds, {**overrides, **own_overrides}, {}, scene, save_frames)
+                make_settings(mission, seeds, {**overrides, **own_overrides}, {}, scene, save_images)
                 for mission, own_overrides in ((missions[0], overrides_a), (missions[-1], overrides_b))
             ]
             databases = create_comparison(settings, runs_folder)
         sweeps: list[SweepResults] = []
-        for name, database in zip("AB", databases, strict=True):
+        for side, database in zip("AB", databases, strict=True):
             with closing(database):
                 if not any(sweep.is_incomplete for sweep in sweeps):
-                    execute_missing_runs(database, name, workers, cluster)
-                sweeps.append(read_results(database, name))
+                    execute_missing_runs(database, workers, cluster, side)
+                sweeps.append(read_results(database, side))
         pairs = pair_runs(sweeps[0].runs, sweeps[1].runs)
         differences, changed_pairs = compute_differences(pairs), [pair for pair in pairs if pair.is_changed]
         write_missing_reports(changed_pairs)

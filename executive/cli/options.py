@@ -33,7 +33,7 @@ def _parse_overrides(ctx: click.Context, param: click.Parameter, values: tuple[s
 def _parse_variations(
     ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
 ) -> dict[str, tuple[str, ...]]:
-    """Return the values of options `--vary KEY=[VALUE, ...]` by key, each as text for `--set`."""
+    """Return the values of options `--vary KEY=[VALUE, ...]` by key, as texts for `--set`."""
     import yaml  # Imported here, because other commands start faster without it.
 
     variations: dict[str, tuple[str, ...]] = {}
@@ -53,7 +53,7 @@ def _parse_variations(
 
 
 def _parse_seed_range(text: str) -> range:
-    """Return the seeds for `A:B` (without B), `A-B` (with B), or `A`."""
+    """Return the seeds for `FIRST:END` (without END), `FIRST-LAST` (with LAST), or `FIRST`."""
     match = re.fullmatch(r"(\d{1,10})(?:([-:])(\d{1,10}))?", text)
     if match is None:
         raise click.BadParameter(f'"{text}" is not a range of seeds, for example 0:100 or 0-99')
@@ -121,12 +121,12 @@ scene_option = click.option(
 workers_option = click.option("--workers", type=COUNT, default=2, help="Number of parallel processes.")
 oracle_option = click.option(
     "--oracle", is_flag=True,
-    help="Take detections from the simulated world instead of images; sorting then takes about two seconds.",
+    help="Take detections from the simulated world instead of images; a run then takes about two seconds.",
 )  # fmt: skip
 _SWEEP_OPTIONS = (
     click.option(
-        "--seeds", type=_parse_seed_range, metavar="A:B",
-        help="Seeds from A to B; A:B excludes B, A-B includes B.",
+        "--seeds", type=_parse_seed_range, metavar="FIRST:END",
+        help="Seeds of the runs; FIRST:END excludes END, FIRST-LAST includes LAST.",
     ),
     workers_option,
     click.option(
@@ -134,14 +134,14 @@ _SWEEP_OPTIONS = (
         help="Run on the workers of a dask scheduler, for example tcp://scheduler:8786 (extra: cluster).",
     ),
     click.option(
-        "--frames", "save_frames", is_flag=True,
+        "--frames", "save_images", is_flag=True,
         help="Save the camera images on which decisions are based.",
     ),
     overrides_option, scene_option, runs_option, json_option,
 )  # fmt: skip
 """Options that the commands `sweep` and `compare` share."""
 _SWEEP_SETTINGS = {
-    "mission", "missions", "seeds", "save_frames", "scene",
+    "mission", "missions", "seeds", "save_images", "scene",
     "variations", "overrides", "overrides_a", "overrides_b",
 }  # fmt: skip
 """Parameters of `sweep` and `compare` whose values `--resume` reads from the results."""
@@ -154,14 +154,14 @@ def add_sweep_options(command: CommandT) -> CommandT:
     return command
 
 
-def check_distinct(overrides: Mapping[str, str], options: str, values: Mapping[str, object]) -> None:
+def check_disjoint(overrides: Mapping[str, str], options: str, values: Mapping[str, object]) -> None:
     """Raise a usage error if a key is in both mappings; `options` names the options of the second mapping."""
     for key in overrides.keys() & values.keys():
         raise click.UsageError(f"{key} is set with --set and also with {options}; omit one of them")
 
 
 def check_resume(
-    ctx: click.Context, *, has_missions_and_seeds: bool, required_arguments: str, resumed_settings: str
+    ctx: click.Context, *, has_missions_and_seeds: bool, required_arguments: str, resumed_settings_text: str
 ) -> None:
     """Check that the command line gives either missions and seeds, or `--resume`, but not both.
 
@@ -169,11 +169,11 @@ def check_resume(
         ctx: Context of the command.
         has_missions_and_seeds: True if the command line gives missions and seeds.
         required_arguments: Arguments that the command needs, for the message.
-        resumed_settings: Settings that `--resume` reads, and their source, for the message.
+        resumed_settings_text: Settings that `--resume` reads, and their source, for the message.
     """
     is_resume, names = ctx.params["resume"] is not None, ctx.params.keys() & _SWEEP_SETTINGS
     has_settings = any(ctx.get_parameter_source(name) is not ParameterSource.DEFAULT for name in names)
     check_usage(
         (not is_resume and not has_missions_and_seeds, f"give {required_arguments}"),
-        (is_resume and has_settings, f"--resume takes {resumed_settings}; omit them"),
+        (is_resume and has_settings, f"--resume takes {resumed_settings_text}; omit them"),
     )

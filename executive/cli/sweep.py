@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 @options.add_sweep_options
 @click.option(
     "--require", metavar="EXPR",
-    help='Exit with code 1 if the runs do not meet EXPR: "success>=0.99 and p95(robot_time_s)<20".',
+    help='Exit with code 1 if the runs do not meet EXPR, such as "success>=0.99 and p95(robot_time_s)<20".',
 )  # fmt: skip
 @click.option("--junit", type=options.FILE, help="Write a report in the JUnit XML format to this file.")
 @click.option("--export", type=options.FOLDER, help="Write the tables of runs, items and skills as Parquet.")
 @click.pass_context
 def command(
     ctx: click.Context, mission: str | None, seeds: range | None, variations: dict[str, tuple[str, ...]],
-    resume: Path | None, workers: int, cluster: str | None, save_frames: bool, overrides: dict[str, str],
+    resume: Path | None, workers: int, cluster: str | None, save_images: bool, overrides: dict[str, str],
     scene: Path | None, runs_folder: Path, require: str | None, junit: Path | None, export: Path | None,
     as_json: bool,
 ) -> int:  # fmt: skip
@@ -42,16 +42,16 @@ def command(
 
     MISSION is a file or the name of a shipped mission. A new folder below --runs contains results.sqlite, the
     page results.html, and the run directories. A run gets a report if it did not succeed or if the audit
-    contradicts the ledger; `executive report` writes the report of another run. Exit code 1 if --require is
+    contradicts the ledger; `executive report` writes the report of any other run. Exit code 1 if --require is
     not met. Ctrl-C ends the current runs; then the results of the complete runs are printed. A second Ctrl-C
     quits immediately.
     """
     options.check_resume(
         ctx, has_missions_and_seeds=None not in (mission, seeds),
         required_arguments="a MISSION and --seeds, or --resume SWEEP",
-        resumed_settings="mission, seeds and settings from the sweep",
+        resumed_settings_text="mission, seeds and settings from the sweep",
     )  # fmt: skip
-    options.check_distinct(overrides, "--vary", variations)
+    options.check_disjoint(overrides, "--vary", variations)
     with keep_stdout_clean():
         from executive.campaign.results.export import check_pyarrow_installed, export_tables
         from executive.campaign.results.junit import write_junit
@@ -70,12 +70,12 @@ def command(
             database = open_sweep(resume)
         else:
             assert mission is not None and seeds is not None
-            settings = make_settings(mission, seeds, overrides, variations, scene, save_frames)
+            settings = make_settings(mission, seeds, overrides, variations, scene, save_images)
             database = create_sweep(settings, runs_folder)
         with closing(database):
             click.echo(f"results: {database.path}", err=True)
-            execute_missing_runs(database, "", workers, cluster)
-            results = read_results(database, "")
+            execute_missing_runs(database, workers, cluster)
+            results = read_results(database)
             print_report(render_summary(results.summaries, results.planned_run_count))
             page = write_page(database.path.parent, [results])
             click.echo(f"page: {page}", err=True)
@@ -96,14 +96,16 @@ def command(
     return ExitCode.HALTED if results.is_incomplete else ExitCode(int(bool(unmet_conditions)))
 
 
-def execute_missing_runs(database: ResultsDatabase, name: str, workers: int, cluster: str | None) -> None:
+def execute_missing_runs(
+    database: ResultsDatabase, workers: int, cluster: str | None, side: str = ""
+) -> None:
     """Execute the missing runs of a sweep, and store their results.
 
     Args:
         database: Database of the sweep.
-        name: `A` or `B` in a comparison, else "".
         workers: Number of worker processes.
         cluster: Address of a dask scheduler, whose workers execute the runs, or None.
+        side: `A` or `B` in a comparison, else "".
     """
     from executive.campaign.pool import JobOptions
     from executive.campaign.results.tables import RUNS
@@ -113,6 +115,6 @@ def execute_missing_runs(database: ResultsDatabase, name: str, workers: int, clu
     mission, jobs = database.settings.mission, list_jobs(database.settings, database.path.parent)
     stored_indices = {run.run_index for run in database.read(RUNS)}
     missing_jobs = [job for job in jobs if job.index not in stored_indices]
-    with show_progress(f"{name}: {mission}" if name else mission, print_lines=True) as progress:
+    with show_progress(f"{side}: {mission}" if side else mission, print_lines=True) as progress:
         on_halt = print_halt if cluster is None else print_cancellation
         run_sweep(missing_jobs, database, JobOptions(workers, progress, on_halt), cluster)

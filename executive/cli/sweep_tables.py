@@ -57,17 +57,18 @@ def _format_metrics(summary: VariantSummary) -> dict[str, str]:
     texts = {
         "success rate": _format_percentage(summary.success),
         "objects in the right bin": _format_percentage(objects),
-        "count in the right bin": f"{objects.numerator} of {objects.denominator}",
+        "number in the right bin": f"{objects.numerator} of {objects.denominator}",
         "ledger and audit agree": _format_percentage(summary.agreement),
         "objects per hour": _format_estimate(summary.objects_per_hour),
-        "robot time, median [s]": f"{robot_time.median:.1f} ({robot_time.min:.1f} to {robot_time.max:.1f})",
+        "robot time, median [s]": f"{robot_time.median:.1f}",
+        "robot time, range [s]": f"{robot_time.min:.1f} to {robot_time.max:.1f}",
         "wall time, median [s]": f"{summary.wall_time_s.median:.1f}",
         "motions planned ahead": f"{planning.ahead} of {planning.motions}",
-        "waited for plans [s]": f"{planning.waited_s:.1f}",
+        "waits for plans, sum [s]": f"{planning.waited_s:.1f}",
     }
     for skill in summary.skills:
         failures = f"{skill.failed_activations} of {skill.activations} failed"
-        texts[f"{skill.skill}, mean [s]"] = f"{skill.mean_robot_time_s:.2f} ({failures})"
+        texts[f"{skill.skill}, per run [s]"] = f"{skill.mean_robot_time_s:.2f} ({failures})"
     return texts
 
 

@@ -60,7 +60,7 @@ class Planner:
 
         Raises:
             Unreachable: The goal has no joint solution inside the limits.
-            Blocked: Each candidate comes too close to an obstacle; the message describes the first candidate.
+            Blocked: Each motion comes too close to an obstacle; the message describes the first one.
         """
         start = np.asarray(q_start, dtype=float)
         end = goal if isinstance(goal, Goal) else np.asarray(goal, dtype=float)
@@ -79,7 +79,7 @@ class Planner:
     def describe_unreachable(self, goal: Goal) -> str:
         """Return a sentence if no configuration reaches a goal and the start of its descent, else "".
 
-        The answer is computed once per goal, because a guard may ask in every control step.
+        The answer is computed once per goal, because a `guard` of the tree may ask in every control step.
         """
         if goal not in self._reach_problems:
             try:
@@ -116,7 +116,7 @@ class Planner:
         """
         qs = motion.sample_within_limits(self.limits).q
         has_guarded_part = motion.guarded_start_time < math.inf
-        # The first state belongs to the free part, even if the tool starts in the guarded part.
+        # The first state always belongs to the free part, which therefore is never empty.
         free_qs = qs[: max(1, math.ceil(motion.guarded_start_time / STEP))] if has_guarded_part else qs
         search.require_clearance(free_qs)
         if self._check_collision is not None:
@@ -127,6 +127,6 @@ class Planner:
 
 
 def _treat_target_as_obstacle(task: Task) -> Task:
-    """Return the task before the guarded part, the end of a motion: the target counts as an obstacle."""
+    """Return the task of the part before the guarded part, in which the target counts as an obstacle."""
     targets = () if task.target is None else (task.target,)
     return replace(task, obstacles=(*task.obstacles, *targets), target=None)

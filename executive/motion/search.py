@@ -52,7 +52,7 @@ class MotionSearch:
     """Search for a motion between two joint configurations, or from a joint configuration to a goal.
 
     A motion consists of an optional straight departure upwards, a free part (joint motion), and an optional
-    straight arrival (approach) downwards.
+    straight arrival downwards.
 
     Args:
         config: Content of the cell file.
@@ -87,7 +87,7 @@ class MotionSearch:
         tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, self._locate_free_part_end(), strict=True))
         self._clearance = ClearanceModel(config, task.obstacles, tcps[:, :2], discs)
         self._clearance.relax_end_margins(tcps, axes)
-        # All candidates share the rises.
+        # The motion up to a via point is the same for all candidates, and is planned once per height.
         self._get_rise = functools.cache(self._plan_rise)
         self._departure = departure = self._plan_departure(start, float(tcps[0, 2]))
         self._start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
@@ -143,7 +143,7 @@ class MotionSearch:
             else:
                 deferred_optimizers.append((candidate, optimizer))
             motions = sorted([*motions, *detours], key=itemgetter(0))
-            # A detour may take longer than the cost of its optimizer; then the next detour is refined first.
+            # A detour may take longer than estimated by its optimizer; then the next detour is refined first.
             while motions and motions[0][0] <= MAX_DURATION_FACTOR * next_cost:
                 yield motions.pop(0)[1]
         yield from (motion for _, motion in motions)
@@ -155,8 +155,8 @@ class MotionSearch:
     ) -> Iterator[tuple[float, Trajectory]]:
         """Yield a detour as a pair `(duration [s], motion)`, unless it exceeds a joint limit.
 
-        The detour passes the states of the optimizer with the timing of the optimizer or in minimum time. The
-        duration includes the slowdown for the load; the motion is not slowed down.
+        With `keeps_timing`, the detour passes the states of the optimizer at the times of the optimizer, else
+        in minimum time. The duration includes the slowdown for the load; the motion is not slowed down.
         """
         with contextlib.suppress(JointLimitError):
             motion = self._build_motion(candidate, *optimizer.connect_states(keeps_timing=keeps_timing))
@@ -210,7 +210,7 @@ class MotionSearch:
         return (self._departure.duration if self._departure else 0.0) + candidate.arrival_duration
 
     def _build_motion(self, candidate: Candidate, *free_part: MotionPiece) -> Trajectory:
-        """Return the motion that consists of departure, free part, and arrival."""
+        """Return the motion of departure, free part and arrival, with the start time of the guarded part."""
         motion = Trajectory([piece for piece in (self._departure, *free_part, candidate.arrival) if piece])
         if not isinstance(self._end, Goal) or self._end.guarded_length == 0:
             return motion
@@ -282,8 +282,8 @@ class MotionSearch:
     def _plan_departure(self, start: Array, height: float) -> CartesianLine | None:
         """Return the straight motion upwards from the start, or None if the free part begins at the start.
 
-        The cell file may require a straight departure. If the seal limits the acceleration of a load, the
-        load also departs straight, because contact with the support could break the seal.
+        The cell file may require a straight departure. If the seal of a load permits less acceleration than
+        the joints, the load also departs straight, because contact with the support could break the seal.
         """
         length = self._straight_part_length or (LIFT_OFF_DISTANCE if self._payload else 0.0)
         if not length or height + length > self._travel_height:

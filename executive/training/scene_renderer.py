@@ -40,7 +40,7 @@ MAX_HEAVILY_OCCLUDED_FRACTION = 1 / 6
 """Maximum fraction of heavily occluded objects in a scene; one such object is always allowed."""
 MAX_ATTEMPTS = 50
 """Maximum number of random scenes that are drawn for an image before an error is raised."""
-UNVARIED_SCENE_FRACTION = 0.2
+NOMINAL_SCENE_FRACTION = 0.2
 """Fraction of the random scenes with table, light, camera and noise as in the cell file."""
 MIN_CONTRAST = 5
 """Minimum contrast between a labelled object and its surroundings, in standard deviations of the noise."""
@@ -61,7 +61,7 @@ class SceneRenderer:
 
     def __init__(self, config: CellConfig, scene: SceneConfig | None = None) -> None:
         self._scene = scene
-        self._camera_name, self._declared_camera = next(iter(config.cameras.items()))
+        self._camera_name, self._nominal_camera = next(iter(config.cameras.items()))
         self._world = build_world(config, scene or DECLARED_SCENE)
         self._config = self._world.config
         self._camera = self._config.cameras[self._camera_name]
@@ -77,8 +77,8 @@ class SceneRenderer:
         * `part`: the region of the camera image that the image shows [pixel]
         * `labels`, `visible_fraction`: class and visible fraction (0 to 1) of each labelled object
         * `centres`: centres of the bounding boxes of the labelled objects in the world `(N, 3)` [m]
-        * `positions`: positions `(N, 3)` [m] from a localization without errors: the points at which the rays
-          through the centres of the unclipped boxes reach the heights of the object centres
+        * `positions`: result of a localization without errors `(N, 3)` [m]: intersection of the ray through the
+          centre of each unclipped box with the horizontal plane through the object centre
 
         Raises:
             InputError: In all `MAX_ATTEMPTS` scenes, the workspace has no room for the objects, or too many
@@ -111,7 +111,7 @@ class SceneRenderer:
         is_holding = arrangements.move_arm_randomly(world, self._camera, rng)
         matrix, X_WC = self._camera_matrix, get_camera_pose(world, self._camera)
         (colour, texture), light, noise = ((1.0, 1.0, 1.0), WOOD_TEXTURE), CELL_LIGHT, self._camera.noise
-        if rng.random() >= UNVARIED_SCENE_FRACTION:
+        if rng.random() >= NOMINAL_SCENE_FRACTION:
             matrix, X_WC = variations.draw_camera(self._camera, matrix, X_WC, rng)
             (colour, texture), light = variations.draw_table_appearance(rng), variations.draw_light(rng)
             noise = variations.draw_noise(noise, rng)
@@ -141,8 +141,8 @@ class SceneRenderer:
         X_WC = get_camera_pose(world, camera)
         # A run uses the declared matrix and pose, even if the scene has calibration errors.
         whole_image = (0, 0, camera.width, camera.height)
-        declared_X_WC = get_camera_pose(world, self._declared_camera).to_rounded_list(9)
-        declared_matrix, _ = compute_calibration(self._declared_camera)
+        declared_X_WC = get_camera_pose(world, self._nominal_camera).to_rounded_list(9)
+        declared_matrix, _ = compute_calibration(self._nominal_camera)
         declared_calibration = {"part": whole_image, "matrix": declared_matrix, "X_WC": declared_X_WC}
         objects = {
             body: SceneObject(label, world.models[body], world.get_object_pose(body))
@@ -157,7 +157,7 @@ class SceneRenderer:
         view_image, segmentation = rendered.image[pixels], rendered.segmentation[pixels]
         view = replace(rendered, image=view_image, segmentation=segmentation, region=region)
         # The minimum contrast depends on the declared noise, so that more noise does not reduce the labels.
-        labelled = self._label_image(view, MIN_CONTRAST * self._declared_camera.noise.read, objects)
+        labelled = self._label_image(view, MIN_CONTRAST * self._nominal_camera.noise.read, objects)
         return labelled and replace(
             labelled, image=image, truth={**labelled.truth, **declared_calibration}, region=region,
             depth=depth, repeated_image=repeated_image,
@@ -178,7 +178,7 @@ class SceneRenderer:
             min_contrast: Contrast below which objects are ignored [grey level].
             objects: The objects by body.
             origin: Position in the camera image at which the boxes have the coordinates (0, 0) [pixel].
-            scale: Pixels of the boxes per pixel of the camera image.
+            scale: Factor from pixels of the camera image to pixels of the boxes.
         """
         labels, boxes, fractions, positions, centres = [], list[Box](), [], [], []
         ignored_boxes, heavily_occluded_count = list[Box](), 0
@@ -225,7 +225,8 @@ class SceneRenderer:
 def _measure_contrast(image: Image, mask: NDArray[np.bool_]) -> float:
     """Return the contrast between an object and a ring of two pixels around the object [grey level].
 
-    The contrast of a pixel is the maximum difference from the median of the ring over the three channels.
+    The contrast of a pixel is the maximum, over the three channels, of the difference from the median of
+    the ring.
     The result is the median contrast of the object's pixels, or 0 if the ring is empty.
 
     Args:

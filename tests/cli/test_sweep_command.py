@@ -79,8 +79,8 @@ def test_the_summary_shows_every_variant_and_how_to_repeat_a_failure(sweep):
     said = " ".join(shown.stderr.split())
     assert "3 of 4 runs succeeded" in said
     assert "success rate 100.00% (34.2 to 100.0) 50.00% (9.5 to 90.5)" in said
-    assert "count in the right bin 4 of 4 4 of 4" in said
-    assert "Grasp, mean [s] 0.50 (2 of 4 failed) 0.50 (2 of 4 failed)" in said
+    assert "number in the right bin 4 of 4 4 of 4" in said
+    assert "Grasp, per run [s] 0.50 (2 of 4 failed) 0.50 (2 of 4 failed)" in said
     assert (
         "with cell.table.objects=[2, 2]: 1 run: FAULT Grasp.missed at tree/Grasp: no seal seeds 3; repeat"
         in said

@@ -66,7 +66,7 @@ class ResultsDatabase:
         try:
             fcntl.flock(self._lock_descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            advice = "wait until that process has ended; runs would be executed twice"
+            advice = "wait until that process has ended; otherwise, runs would be executed twice"
             raise InputError(f'another process executes the sweep "{self.path}"; {advice}') from error
 
     def append(self, record: RunRecord) -> None:

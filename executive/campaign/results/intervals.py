@@ -14,7 +14,7 @@ FloatArray = NDArray[np.float64]
 RESAMPLE_COUNT = 2000
 """Number of bootstrap resamples."""
 BOOTSTRAP_SEED = 0
-"""Seed of the bootstrap resamples, so that a summary can be repeated exactly."""
+"""Seed of the bootstrap resamples; a fixed seed makes a summary reproducible."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def compute_bootstrap_interval(
     because it is not defined for equal values; the percentile method returns [x, x] for equal values x.
 
     Args:
-        compute_statistic: Function of the resampled samples and of the keyword `axis`.
+        compute_statistic: Function that returns the statistic of resamples along the axis `axis`.
         samples: Samples of equal length.
     """
     if len(samples[0]) < 2:

@@ -72,7 +72,7 @@ def parse_requirement(text: str) -> tuple[Condition, ...]:
     """Parse conditions that are separated by `and`.
 
     Raises:
-        InputError: The text contains something else, or an unknown metric, statistic or column.
+        InputError: A part is no condition, or has an unknown metric, statistic or column.
     """
     return tuple(map(_parse_condition, re.split(r"\band\b", text)))
 
@@ -105,5 +105,5 @@ def _parse_condition(text: str) -> Condition:
         raise InputError(f'there is no metric "{metric}"; the metrics are {", ".join(METRICS)}, {statistics}')
     if column and column not in _COLUMN_INDICES:
         columns = ", ".join(_COLUMN_INDICES)
-        raise InputError(f'runs have no column "{column}" with numbers; they have {columns}')
+        raise InputError(f'"{column}" is no numeric column of the runs; these are {columns}')
     return Condition(metric, column, match[3], float(match[4]))

@@ -28,11 +28,11 @@ MAX_LISTED_RUNS = 500
 
 
 @dataclass(frozen=True)
-class Group:
+class VariantRuns:
     """Runs of one variant of a sweep; each table of the page has one column per group.
 
     Attributes:
-        label: Name of the sweep (`A` or `B` in a comparison) and values of the variant; `all runs` if both
+        label: Side of the comparison (`A` or `B`) and values of the variant; `all runs` if both
             are empty.
         summary: Summary of the runs.
         robot_times: Duration of each run [s].
@@ -92,7 +92,7 @@ def write_page(
         changed_pairs=changed_pairs,
         problems=problems,
         limit=MAX_LISTED_RUNS,
-        link=lambda run: _make_link(run, folder),
+        link=lambda run_directory: _make_link(run_directory, folder),
         describe_variant=describe_variant,
     )
     with convert_os_errors(f'write the page "{path}"', "free some space, or make the folder writable"):
@@ -100,15 +100,15 @@ def write_page(
     return path
 
 
-def _list_groups(sweep: SweepResults) -> list[Group]:
+def _list_groups(sweep: SweepResults) -> list[VariantRuns]:
     """Return one group for each variant of a sweep."""
     groups = []
     for summary in sweep.summaries:
         runs = {run.run_index: run for run in sweep.runs if run.variant == summary.variant}
         items = [item for item in sweep.items if item.run_index in runs and item.state == "placed"]
-        label = " ".join(filter(None, (sweep.name, describe_variant(summary.variant)))) or "all runs"
+        label = " ".join(filter(None, (sweep.side, describe_variant(summary.variant)))) or "all runs"
         times = [run.robot_time_s for run in runs.values()]
-        groups.append(Group(label, summary, times, [item.robot_time_s for item in items]))
+        groups.append(VariantRuns(label, summary, times, [item.robot_time_s for item in items]))
     return groups
 
 
@@ -127,7 +127,7 @@ def _make_histograms(values_by_label: Mapping[str, Sequence[float]]) -> list[His
 
 
 def _make_link(run_directory: str, folder: Path) -> str:
-    """Return the address of the report in `run_directory`, relative to `folder`; "" without a report."""
+    """Return the URL of the report in `run_directory`, relative to `folder`; "" without a report."""
     report = RunDirectory(Path(run_directory)).report
     return quote(os.path.relpath(report, folder)) if run_directory and report.is_file() else ""
 

@@ -60,7 +60,7 @@ class SweepSettings(Row):
 
 @dataclass(frozen=True, kw_only=True)
 class RunRow(Row):
-    """A run; a repetition of the run changes only `wall_time_s`, `run_directory` and `crashes`."""
+    """A run. All columns except `wall_time_s`, `run_directory` and `crashes` are reproducible."""
 
     run_index: int
     """Index of the run in the sweep, from 0: variant by variant, and seed by seed."""
@@ -114,7 +114,7 @@ class RunRow(Row):
     def explanation(self) -> str:
         """Message about the end of the run.
 
-        If there is none, a description of the disagreement between audit and ledger; "" if they agree.
+        Without a message, the value is a description of the disagreement between audit and ledger, or "".
         """
         return self.message or describe_disagreement(self.audit, self.items)
 

@@ -1,4 +1,4 @@
-"""Folders of sweeps and comparisons: creation with valid inputs, and opening with unchanged inputs."""
+"""Creation of the folders of sweeps and comparisons from valid inputs, and resumption with equal inputs."""
 
 from __future__ import annotations
 

@@ -81,8 +81,7 @@ class VariantSummary:
         correct_objects: Proportion of objects in a permitted bin; the denominator is 0 without ground truth.
         agreement: Proportion of the runs in which the audit confirms the ledger.
         objects_per_hour: Placed objects per hour of robot time.
-        robot_time_s, wall_time_s: Duration of a run in run time (simulated in simulation) and in wall
-            time [s].
+        robot_time_s, wall_time_s: Duration of a run on the clock of the run, and on a wall clock [s].
         planning: Statistics of motion planning, summed over the runs.
         skills: The skills, by decreasing time.
         failure_groups: Groups of runs with the same problem, by decreasing number of runs.
@@ -105,14 +104,14 @@ class SweepResults:
     """Results of a sweep.
 
     Attributes:
-        name: `A` or `B` in a comparison, else "".
+        side: `A` or `B` in a comparison, else "".
         settings: Settings of the sweep.
         runs, items: Rows of the runs and of the items.
         summaries: Summary of each variant.
         planned_run_count: Number of runs of a complete sweep.
     """
 
-    name: str
+    side: str
     settings: SweepSettings
     runs: Sequence[RunRow]
     items: Sequence[ItemRow]

@@ -24,8 +24,8 @@ class Column:
         path: Name of the field; for a nested dataclass, followed by the name of the inner field.
         sql_type: Type in SQLite.
         is_json: True if the column stores a mapping or a sequence as JSON text.
-        comment: Description of the field; in a nested dataclass, the description of the outer field on the
-            first column, "" on the others.
+        comment: Description of the field. Of the columns of a nested dataclass, only the first one has a
+            comment: the description of the outer field.
     """
 
     path: tuple[str, ...]
@@ -120,7 +120,7 @@ def _get_value(values: Mapping[str, object], column: Column) -> SqlValue:
         value = value[name] if isinstance(value, Mapping) else None
     if column.is_json:
         return json.dumps(value, ensure_ascii=False)
-    # SQLite has no Boolean type, and the Parquet files get the same types.
+    # SQLite has no Boolean type; the Parquet files have the column types of SQLite.
     return int(value) if isinstance(value, bool) else value  # type: ignore[return-value]
 
 

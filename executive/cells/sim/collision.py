@@ -27,28 +27,30 @@ ROUNDING_ERROR = 1e-5
 SEARCH_DISTANCE = 0.1
 """Distances that exceed the margin by more than this value are not computed [m]."""
 SUPPORT_TOLERANCE = 0.001
-"""A contact this close to a bin's floor supports the load; on the table, as in a bin at z = 0 [m]."""
+"""Maximum height above the table or the floor of a bin at which a contact supports the load [m]."""
 
 
 class BodyPair(NamedTuple):
     """Two bodies of which at least one moves with the arm.
 
     Attributes:
-        bodies: Indices of both bodies; for two links of the arm, followed by the indices of the links.
+        bodies: Indices of both bodies.
+        link_pair: Indices of two links of the arm, or () if all links of the bodies count.
         links: Links of the first body whose distances count.
         joints: Joints that change the distance.
-        body_name: Name of the second body in messages; "" for the pair of arm and load: messages name the
-            link that is nearest to the load.
+        body_name: Name of the second body in messages. If it is "" (arm and load), messages contain the name
+            of the link that is nearest to the load.
         load_name: Name of the load if it belongs to the pair, else "".
         support_height: Height up to which the first body may touch the second one [m].
     """
 
-    bodies: tuple[int, ...]
+    bodies: tuple[int, int]
     links: range
     joints: range
     body_name: str = ""
     load_name: str = ""
     support_height: float = -math.inf
+    link_pair: tuple[int, ...] = ()
 
 
 class ClosestApproach(NamedTuple):
@@ -66,7 +68,7 @@ class ClosestApproach(NamedTuple):
     min_distance: float
 
     @property
-    def clearance(self) -> float:
+    def slack(self) -> float:
         """Distance beyond the minimum distance [m], negative for a violation."""
         return self.distance - self.min_distance
 
@@ -126,7 +128,7 @@ class ClearanceChecker:
                 clear_until[i] = pair_movements[i][index] + distance - self._margin - ROUNDING_ERROR
                 for approach in approaches:
                     key = approach.part, approach.body
-                    closest[key] = min(closest.get(key, approach), approach, key=attrgetter("clearance"))
+                    closest[key] = min(closest.get(key, approach), approach, key=attrgetter("slack"))
             if index == 0:
                 start_distances = {key: approach.distance for key, approach in closest.items()}
             start_distances = {key: start_distances[key] for key in closest if key in start_distances}
@@ -161,10 +163,9 @@ class ClearanceChecker:
         pairs = [BodyPair((world.arm, body), links, joints, body_name=name) for name, body in bodies]
         for link_a, link_b in robot.self_collision_pairs:
             moving_joints = joints[min(link_a, link_b) + 1 : max(link_a, link_b) + 1]
-            bodies_and_links = (world.arm, world.arm, link_a, link_b)
-            pairs.append(
-                BodyPair(bodies_and_links, range(link_a, link_a + 1), moving_joints, world.name_link(link_b))
-            )
+            bodies, first_links = (world.arm, world.arm), range(link_a, link_a + 1)
+            name = world.name_link(link_b)
+            pairs.append(BodyPair(bodies, first_links, moving_joints, name, link_pair=(link_a, link_b)))
         if load is None:
             return pairs
         load_body, name = self._get_load_body(load), name_load(load.label)
@@ -181,13 +182,12 @@ class ClearanceChecker:
         return pairs
 
     def _measure_distance(self, pair: BodyPair) -> tuple[float, list[ClosestApproach]]:
-        """Return distance [m] and approaches of a pair.
+        """Return the distance of a pair [m], and an approach for each two points within the margin.
 
-        The distance is at most `SEARCH_DISTANCE` beyond the margin; the approaches are within the margin.
+        A distance beyond the margin plus `SEARCH_DISTANCE` is returned as this sum.
         """
-        body_a, body_b, *link_pair = pair.bodies
         max_distance = self._margin + SEARCH_DISTANCE
-        all_points = self._get_closest_points(body_a, body_b, max_distance, *link_pair)
+        all_points = self._get_closest_points(*pair.bodies, max_distance, *pair.link_pair)
         all_points = [points for points in all_points if points[LINK_A] in pair.links]
         approaches = [
             ClosestApproach(

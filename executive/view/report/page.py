@@ -69,11 +69,11 @@ class ReportData:
         path: Run directory.
         start: Event of the start of the run.
         result: Content of `result.json`; None if it is missing, damaged, or older than the last resumption.
-        outcome: Result; without a result, the event of the end of the run; None for an interrupted run.
+        outcome: The result if it exists, else the event `RunEnded`; None if the journal has no end.
         status: `SUCCESS`, `INCOMPLETE`, `FAILURE`, `FAULT`, `HALTED` or `INTERRUPTED`.
         nodes: Nodes of the tree.
         timeline: Timeline of the run.
-        item_states: Last change of each item that is not a phantom.
+        last_item_changes: Last change of each item that is not a phantom.
         activity_times: Time of the run by item and activity.
         pictures: Pictures of decisions and failures.
         requests: Requests of the operator, in order.
@@ -96,7 +96,7 @@ class ReportData:
         self.nodes = read_tree(directory.tree)
         self.timeline = Timeline.from_events(events)
         all_items = self.timeline.items.list_items()
-        self.item_states = [item for item in all_items if item.state != "phantom"]
+        self.last_item_changes = [item for item in all_items if item.state != "phantom"]
         self.activity_times = compute_activity_times(self.timeline, self.nodes)
         self.pictures = collect_pictures(directory.pictures, [item.item for item in all_items])
         self.requests = list_requests(self.timeline)

@@ -73,7 +73,7 @@ def test_every_variant_must_meet_the_requirement() -> None:
         ("p98(ticks)>1", r'there is no metric "p98"; .*, p95\(COLUMN\), p99\(COLUMN\), max\(COLUMN\)$'),
         (
             "p95(trace)>1",
-            'runs have no column "trace" with numbers; they have items_seen, .*, robot_time_s, wall',
+            '"trace" is no numeric column of the runs; these are items_seen, .*, robot_time_s, wall',
         ),
     ],
 )

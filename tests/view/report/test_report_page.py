@@ -72,8 +72,8 @@ def test_a_success_has_no_story_and_says_what_is_in_the_bins(done):
 def test_every_object_has_its_outcome_time_picture_and_problems(failed):
     found, facts = page(failed), ReportData(failed)
     text = found.texts["objects"]
-    assert all(f"{row.item} rejected" in text for row in facts.item_states)
-    assert [row.item for row in facts.item_states] == ["sphere-1", "sphere-2"]
+    assert all(f"{row.item} rejected" in text for row in facts.last_item_changes)
+    assert [row.item for row in facts.last_item_changes] == ["sphere-1", "sphere-2"]
     assert "2 seen, 0 placed, 2 rejected" in text
     assert "0.81 s Grasp.missed no seal on sphere-1" in text
     alts = [attributes["alt"] for tag, attributes in found.elements if tag == "img"]
