@@ -35,8 +35,10 @@ INITIAL_TRUST_RADIUS = 0.3
 """Maximum change of the accelerations in the first optimization step, as a fraction of their limits."""
 TRUST_RADIUS_FACTOR = 0.9
 """Factor on the maximum change of the accelerations after each optimization step."""
-INITIAL_DURATION_FRACTION = 0.8
-"""Duration of the initial motion as a fraction of the duration of the motion that stops at via points."""
+INITIAL_DURATION_FRACTIONS = (0.8, 1.0, 1.2)
+"""Durations of the initial motion, as fractions of the duration of the motion that stops at via points.
+
+The first one with a solution is used."""
 JOINT_RANGE_MARGIN = 0.01
 """Minimum distance from the position limits of the joints [rad]."""
 CONVERGENCE_TOLERANCE = 2e-3
@@ -124,8 +126,11 @@ class Optimizer:
     def __init__(self, problem: OptimizationProblem, initial_qs: Array, duration: float) -> None:
         self._problem = problem
         self._transcription = Transcription(problem.start, problem.end, problem.connector.limits)
-        motion = self._transcription.fit(INITIAL_DURATION_FRACTION * duration / STEP_COUNT, initial_qs)
-        if motion is None:
+        for fraction in INITIAL_DURATION_FRACTIONS:
+            motion = self._transcription.fit(fraction * duration / STEP_COUNT, initial_qs)
+            if motion is not None:
+                break
+        else:
             raise JointLimitError("no motion inside the limits approximates the motion with via points")
         self._best_motion, self._trust_radius = motion, INITIAL_TRUST_RADIUS
         self.cost = self._last_cost = math.inf

@@ -229,6 +229,13 @@ def test_the_wrist_folds_no_farther_than_links_5_and_7_keep_the_margin(planner, 
         planner.plan(home, Goal((0.3, 0.0, 0.7)))
 
 
+def test_the_arm_unfolds_although_its_slow_motion_would_fold_the_wrist_more(planner, home) -> None:
+    folded = np.radians((-20.59, 108.69, -99.08, -102.23, 106.75, 102.35, 4.85))
+    motion = planner.plan(folded, home)
+    assert motion.duration < 1.35
+    assert np.degrees(np.abs(motion.samples.q[:, 5])).max() < 102.4
+
+
 def test_joint_positions_out_of_range_are_refused(planner, home) -> None:
     with pytest.raises(Blocked, match=r"would take joint 4 to -12\d\.\d°; its limit is ±120°"):
         planner.plan(home, np.radians([0, 20, 0, -125, 0, 70, 0]))
