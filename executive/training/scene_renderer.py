@@ -77,8 +77,8 @@ class SceneRenderer:
         * `part`: the region of the camera image that the image shows [pixel]
         * `labels`, `visible_fraction`: class and visible fraction (0 to 1) of each labelled object
         * `centres`: centres of the bounding boxes of the labelled objects in the world `(N, 3)` [m]
-        * `positions`: result of a localization without errors `(N, 3)` [m]: intersection of the ray through the
-          centre of each unclipped box with the horizontal plane through the object centre
+        * `positions`: result of a localization without errors `(N, 3)` [m]: intersection of the ray through
+          the centre of each unclipped box with the horizontal plane through the object centre
 
         Raises:
             InputError: In all `MAX_ATTEMPTS` scenes, the workspace has no room for the objects, or too many

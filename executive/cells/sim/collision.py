@@ -163,9 +163,9 @@ class ClearanceChecker:
         pairs = [BodyPair((world.arm, body), links, joints, body_name=name) for name, body in bodies]
         for link_a, link_b in robot.self_collision_pairs:
             moving_joints = joints[min(link_a, link_b) + 1 : max(link_a, link_b) + 1]
-            bodies, first_links = (world.arm, world.arm), range(link_a, link_a + 1)
-            name = world.name_link(link_b)
-            pairs.append(BodyPair(bodies, first_links, moving_joints, name, link_pair=(link_a, link_b)))
+            first_links, second_name = range(link_a, link_a + 1), world.name_link(link_b)
+            pair = BodyPair((world.arm, world.arm), first_links, moving_joints, second_name)
+            pairs.append(pair._replace(link_pair=(link_a, link_b)))
         if load is None:
             return pairs
         load_body, name = self._get_load_body(load), name_load(load.label)

@@ -56,7 +56,7 @@ def test_the_schema_describes_every_table_and_column(tmp_path: Path) -> None:
     with closing(sqlite3.connect(tmp_path / "a")) as connection:
         (schema,) = connection.execute("SELECT sql FROM sqlite_master WHERE name = 'runs'").fetchone()
         names = [row[1] for row in connection.execute("PRAGMA table_info(runs)")]
-    assert schema.startswith("CREATE TABLE runs ( -- A run; ")
+    assert schema.startswith("CREATE TABLE runs ( -- A run. ")
     assert "  robot_time_s REAL, -- Duration on the run clock (simulated time in simulation" in schema
     assert "  audit_agrees INTEGER, -- Count of objects by ground-truth location, and whether" in schema
     assert {"run_index", "items_placed", "audit_right", "planning_waited_s", "crashes"} <= set(names)
