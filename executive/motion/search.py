@@ -33,7 +33,7 @@ MAX_CANDIDATES = 4
 """Maximum number of candidates for the end of a motion."""
 COMPARED_CANDIDATES = 2
 """Number of candidates in a group: their motions are compared; if all are blocked, the next group follows."""
-INITIAL_STEP_COUNT = 2
+INITIAL_STEP_COUNT = 4
 """Number of optimization steps for the detour to each candidate."""
 REFINEMENT_STEP_COUNT = 8
 """Number of further optimization steps for a detour before it is returned."""
