@@ -126,6 +126,6 @@ def test_the_page_is_readable_and_loads_nothing(compare, tmp_path: Path) -> None
         assert page.inner_text("h1") == "A: 10 of 10 runs succeeded; B: 5 of 10 runs succeeded"
         assert page.evaluate("document.documentElement.scrollWidth") <= 375
         assert page.locator("svg.histogram").count() == page.locator("svg.histogram > title").count() == 2
-        assert page.locator("#changed tbody tr").count() == 5
+        assert page.locator("#changed-pairs tbody tr").count() == 5
         assert (loaded, problems) == ([f"file://{page_file}"], [])
         browser.close()

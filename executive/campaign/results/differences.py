@@ -53,7 +53,7 @@ class Difference:
 def pair_runs(runs_a: Sequence[RunRow], runs_b: Sequence[RunRow]) -> list[RunPair]:
     """Return the pairs of runs with the same seed.
 
-    Runs with a seed that only one mission has are omitted.
+    A run is omitted if the other mission has no run with the same seed.
     """
     runs_by_seed = {run.seed: run for run in runs_b}
     return [RunPair(run.seed, run, runs_by_seed[run.seed]) for run in runs_a if run.seed in runs_by_seed]

@@ -29,7 +29,7 @@ MAX_LISTED_RUNS = 500
 
 @dataclass(frozen=True)
 class VariantRuns:
-    """Runs of one variant of a sweep; each table of the page has one column per group.
+    """Runs of one variant of a sweep; each table of the page has a column for each variant.
 
     Attributes:
         label: Side of the comparison (`A` or `B`) and values of the variant; `all runs` if both

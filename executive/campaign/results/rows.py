@@ -112,10 +112,7 @@ class RunRow(Row):
 
     @property
     def explanation(self) -> str:
-        """Message about the end of the run.
-
-        Without a message, the value is a description of the disagreement between audit and ledger, or "".
-        """
+        """The message; if it is empty, a description of the disagreement of audit and ledger, or ""."""
         return self.message or describe_disagreement(self.audit, self.items)
 
 

@@ -1,4 +1,7 @@
-"""Creation of the folders of sweeps and comparisons from valid inputs, and resumption with equal inputs."""
+"""Functions that create the folders of sweeps and comparisons, and open them to resume a sweep.
+
+A folder is only created if the inputs are valid, and only opened if they have not changed since.
+"""
 
 from __future__ import annotations
 
