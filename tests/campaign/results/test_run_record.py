@@ -39,25 +39,10 @@ def test_an_item_takes_the_time_from_its_selections_to_its_end() -> None:
         (8.0, change("cube-1", "rejected", attempts=3)),
         (9.0, RunEnded("INCOMPLETE", "", "", "", False, "", 9, 9.0)),
     )
+    shared = {"run_index": 4, "robot_time_s": 3.0}
     assert make_record(4, {}, RESULT, seen).items == (
-        ItemRow(
-            run_index=4,
-            item="cube-1",
-            label="cube",
-            state="rejected",
-            bin="",
-            failed_attempts=3,
-            robot_time_s=3.0,
-        ),
-        ItemRow(
-            run_index=4,
-            item="duck-1",
-            label="duck",
-            state="placed",
-            bin="right",
-            failed_attempts=0,
-            robot_time_s=3.0,
-        ),
+        ItemRow(item="cube-1", label="cube", state="rejected", bin="", failed_attempts=3, **shared),
+        ItemRow(item="duck-1", label="duck", state="placed", bin="right", failed_attempts=0, **shared),
     )
 
 
