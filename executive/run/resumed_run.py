@@ -20,8 +20,8 @@ from executive.run.run_control import RunControl
 from executive.run.scene_recovery import recover_scene
 from executive.run.versions import list_versions
 from executive.tree.halting import halt
-from executive.tree.node import TreeNode
 from executive.tree.skill_leaf import SkillLeaf
+from executive.tree.tree_node import TreeNode
 
 
 class ResumedRun(Run):

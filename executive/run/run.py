@@ -19,7 +19,7 @@ from executive.run.run_context import RunContext, brake_arm
 from executive.run.run_control import RunControl
 from executive.run.signals import halt_on_signals
 from executive.tree.halting import halt
-from executive.tree.node import TreeNode
+from executive.tree.tree_node import TreeNode
 
 
 class Run:

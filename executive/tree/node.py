@@ -1,4 +1,4 @@
-"""Base classes of the nodes of a tree.
+"""Base class of the control nodes of a tree.
 
 A control node is a class that an entry point registers. The class declares its keys in the
 mission file, and implements `start` and `step` for the run, `compute_flow` and `min_time` for the checker,
@@ -8,18 +8,14 @@ and `explain` for the diagnosis.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import ClassVar, cast
+from typing import ClassVar
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from pydantic import ValidationError
 
-from executive.cell.ledger import Ledger
-from executive.cell.protocols import Clock
 from executive.errors import Fault, InputError
-from executive.events import BranchChosen, Emit, Event, NodeEnded, NodeStarted, discard_event
-from executive.tree.blackboard import Blackboard
+from executive.events import BranchChosen, NodeEnded, NodeStarted
 from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.halting import halt
@@ -32,76 +28,7 @@ from executive.tree.inspection import (
     PropagatedFailure,
 )
 from executive.tree.keys import Child, KeyKind, KeyOwner, KeySection
-
-
-@dataclass(frozen=True)
-class NodeContext:
-    """Path and label of a node, and the parts of the run that the node uses.
-
-    Attributes:
-        path: Unique path from the root of the tree.
-        clock: Clock of the run.
-        ledger: Ledger of the run.
-        blackboard: Variables of the run.
-        label: Label of the node in the mission, or "".
-        emit: Function that emits the events of the node.
-    """
-
-    path: str
-    clock: Clock
-    ledger: Ledger
-    blackboard: Blackboard
-    label: str = ""
-    emit: Emit = discard_event
-
-
-def make_inspection_context(path: str = "", label: str = "") -> NodeContext:
-    """Return a context without a run, for a node that is inspected but never executed."""
-    return NodeContext(path, cast("Clock", None), cast("Ledger", None), Blackboard(), label)
-
-
-class TreeNode(Behaviour):
-    """Base class of control nodes and skill leaves: a py_trees behaviour with a method `tick_once`.
-
-    Attributes:
-        path: Unique path from the root of the tree.
-        label: Label of the node in the mission, or "".
-        blackboard: Variables of the run.
-        subtree_names: Names of the subtrees with this node as root, the outermost first.
-    """
-
-    subtree_names: tuple[str, ...] = ()
-
-    def __init__(self, context: NodeContext, name: str) -> None:
-        super().__init__(context.label or name)
-        self.path, self.label, self.blackboard = context.path, context.label, context.blackboard
-        self._failure: Failure | None = None
-        self._emit_without_parent = context.emit
-
-    @property
-    def failure(self) -> Failure | None:
-        """The failure while the status is FAILURE; else None. `feedback_message` contains its text."""
-        return self._failure
-
-    @failure.setter
-    def failure(self, failure: Failure | None) -> None:
-        self._failure = failure
-        self.feedback_message = f"{failure}: {failure.message}" if failure else ""
-
-    def emit(self, event: Event) -> None:
-        """Emit an event of this node or of a node below, through all ancestors."""
-        emit = self.parent.emit if isinstance(self.parent, TreeNode) else self._emit_without_parent
-        emit(event)
-
-    def update(self) -> Status:
-        """Continue by one tick and return the status."""
-        self.tick_once()
-        return self.status
-
-    def tick(self) -> Iterator[Behaviour]:
-        """Continue by one tick, then yield this node for visitors of py_trees."""
-        self.tick_once()
-        yield self
+from executive.tree.tree_node import NodeContext, TreeNode
 
 
 class ControlNode(KeyOwner, TreeNode):

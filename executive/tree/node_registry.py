@@ -9,7 +9,8 @@ from typing import TypeAlias
 
 from executive.errors import InputError
 from executive.plugins import PluginEntry, list_entries
-from executive.tree.node import ControlNode, make_inspection_context
+from executive.tree.node import ControlNode
+from executive.tree.tree_node import make_inspection_context
 
 ENTRY_POINT_GROUP = "executive.control_nodes"
 """Group of the entry points of control nodes."""

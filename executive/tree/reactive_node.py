@@ -6,7 +6,8 @@ from py_trees.common import Status
 
 from executive.events import Event
 from executive.tree.keys import Child
-from executive.tree.node import ControlNode, NodeContext
+from executive.tree.node import ControlNode
+from executive.tree.tree_node import NodeContext
 
 _COMPARED_ATTRIBUTES = ("node", "status", "reason", "choice", "item", "outputs")
 """Attributes of events by which two runs of a child are compared; the numbers in messages may differ."""

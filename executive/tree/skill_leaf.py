@@ -15,8 +15,8 @@ from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.skill import Skill, SkillFailed
 from executive.tree.failure import Failure
-from executive.tree.node import NodeContext, TreeNode
 from executive.tree.skill_run import SkillRun
+from executive.tree.tree_node import NodeContext, TreeNode
 
 
 @dataclass(frozen=True)

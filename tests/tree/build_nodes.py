@@ -17,13 +17,13 @@ from executive.tree.fallback import Fallback
 from executive.tree.for_each import ForEach
 from executive.tree.invert import Invert
 from executive.tree.keys import VariableName
-from executive.tree.node import NodeContext
 from executive.tree.parallel import Parallel
 from executive.tree.repeat import CounterLimits, Repeat
 from executive.tree.retry import Backoff, Retry
 from executive.tree.sequence import Sequence as SequenceNode
 from executive.tree.succeed import Succeed
 from executive.tree.timeout import Timeout
+from executive.tree.tree_node import NodeContext
 from executive.tree.try_catch import Catch, TryCatch
 from executive.tree.while_loop import While
 

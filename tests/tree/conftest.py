@@ -13,7 +13,7 @@ from scripted_leaf import Leaf
 
 from executive.events import Event
 from executive.tree.blackboard import Blackboard
-from executive.tree.node import NodeContext
+from executive.tree.tree_node import NodeContext
 
 LEDGER: Any = None
 """The nodes of these tests read no items."""

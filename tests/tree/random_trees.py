@@ -30,7 +30,7 @@ from scripted_leaf import Leaf
 
 from executive.events import BranchChosen, Event, NodeEnded, NodeStarted
 from executive.tree.blackboard import Blackboard
-from executive.tree.node import NodeContext
+from executive.tree.tree_node import NodeContext
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from executive.mission.load import load_mission
 from executive.mission.model.nodes import InnerNode, Node
 from executive.skill import Skill
 from executive.tree.blackboard import Blackboard
-from executive.tree.node import TreeNode
 from executive.tree.node_registry import load_control_nodes
+from executive.tree.tree_node import TreeNode
 
 NODE_CLASSES = load_control_nodes()
 TICK_PERIOD = 0.1

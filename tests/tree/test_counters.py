@@ -11,7 +11,7 @@ import pytest
 from build_nodes import repeat
 
 from executive.events import BranchChosen
-from executive.tree.node import NodeContext
+from executive.tree.tree_node import NodeContext
 
 
 @pytest.fixture

@@ -14,7 +14,8 @@ from executive.mission.model.conversion import ValueProblem, convert_constant
 from executive.mission.model.nodes import InnerNode, KeyedValues, KeyValue, Node, NodeSection, list_nodes
 from executive.mission.model.values import Literal, LocatedName, LocatedReason, Reference
 from executive.tree.keys import Child, Key, KeyKind, VariableName
-from executive.tree.node import ControlNode, NodeContext, make_inspection_context
+from executive.tree.node import ControlNode
+from executive.tree.tree_node import NodeContext, make_inspection_context
 
 BuildChild = Callable[[Node], Child]
 """Function that returns the child of a control node for a mission node."""

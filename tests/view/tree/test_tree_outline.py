@@ -10,10 +10,10 @@ from py_trees.behaviour import Behaviour
 from executive.mission.outline import Connection, OutlineNode, list_child_indices, make_outline
 from executive.skill import In, Metres, Out, Skill, param, port
 from executive.tree.failure import Reason
-from executive.tree.node import NodeContext, make_inspection_context
 from executive.tree.retry import Retry
 from executive.tree.sequence import Sequence
 from executive.tree.skill_leaf import SkillLeaf, Wiring
+from executive.tree.tree_node import NodeContext, make_inspection_context
 from executive.tree.try_catch import Catch, TryCatch
 from executive.view.tree.tree_text import MAX_LINE_LENGTH, draw_text, fold_subtrees
 

@@ -1,0 +1,86 @@
+"""Base class of all nodes of a tree, and the context with which a node is built."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import cast
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.cell.ledger import Ledger
+from executive.cell.protocols import Clock
+from executive.events import Emit, Event, discard_event
+from executive.tree.blackboard import Blackboard
+from executive.tree.failure import Failure
+
+
+@dataclass(frozen=True)
+class NodeContext:
+    """Path and label of a node, and the parts of the run that the node uses.
+
+    Attributes:
+        path: Unique path from the root of the tree.
+        clock: Clock of the run.
+        ledger: Ledger of the run.
+        blackboard: Variables of the run.
+        label: Label of the node in the mission, or "".
+        emit: Function that emits the events of the node.
+    """
+
+    path: str
+    clock: Clock
+    ledger: Ledger
+    blackboard: Blackboard
+    label: str = ""
+    emit: Emit = discard_event
+
+
+def make_inspection_context(path: str = "", label: str = "") -> NodeContext:
+    """Return a context without a run, for a node that is inspected but never executed."""
+    return NodeContext(path, cast("Clock", None), cast("Ledger", None), Blackboard(), label)
+
+
+class TreeNode(Behaviour):
+    """Base class of control nodes and skill leaves: a py_trees behaviour with a method `tick_once`.
+
+    Attributes:
+        path: Unique path from the root of the tree.
+        label: Label of the node in the mission, or "".
+        blackboard: Variables of the run.
+        subtree_names: Names of the subtrees with this node as root, the outermost first.
+    """
+
+    subtree_names: tuple[str, ...] = ()
+
+    def __init__(self, context: NodeContext, name: str) -> None:
+        super().__init__(context.label or name)
+        self.path, self.label, self.blackboard = context.path, context.label, context.blackboard
+        self._failure: Failure | None = None
+        self._emit_without_parent = context.emit
+
+    @property
+    def failure(self) -> Failure | None:
+        """The failure while the status is FAILURE; else None. `feedback_message` contains its text."""
+        return self._failure
+
+    @failure.setter
+    def failure(self, failure: Failure | None) -> None:
+        self._failure = failure
+        self.feedback_message = f"{failure}: {failure.message}" if failure else ""
+
+    def emit(self, event: Event) -> None:
+        """Emit an event of this node or of a node below, through all ancestors."""
+        emit = self.parent.emit if isinstance(self.parent, TreeNode) else self._emit_without_parent
+        emit(event)
+
+    def update(self) -> Status:
+        """Continue by one tick and return the status."""
+        self.tick_once()
+        return self.status
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Continue by one tick, then yield this node for visitors of py_trees."""
+        self.tick_once()
+        yield self
