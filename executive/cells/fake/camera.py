@@ -55,12 +55,14 @@ class FakeCamera(MountedCamera):
 
     def describe_displacement(self, frame: Frame) -> str:
         """Return the value of `displacement_message`."""
+        del frame
         return self.displacement_message
 
     def _capture_images(self) -> tuple[NDArray[np.uint8], None]:
         return np.zeros((self.config.height, self.config.width, 3), dtype=np.uint8), None
 
     def _compute_visibility_mask(self, X_WC: Pose) -> NDArray[np.bool_]:
+        del X_WC
         mask = np.ones((self.config.height, self.config.width), dtype=bool)
         for left, top, right, bottom in self.occluded_regions:
             mask[int(top) : int(bottom), int(left) : int(right)] = False

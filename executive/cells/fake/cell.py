@@ -42,6 +42,7 @@ class SilentOperator:
 
     def ask(self, choices: Sequence[str]) -> str | None:
         """Return the next class of the list, or None at the end of the list."""
+        del choices
         return self._requests.pop(0) if self._requests else None
 
 
@@ -123,6 +124,7 @@ class FakeCell(CellWithoutHardware):
     @staticmethod
     def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
         """Return key and message for an unsupported arm, each place out of reach, and a lack of room."""
+        del cell_folder
         if arm_errors := tuple(find_arm_errors(config)):
             return arm_errors
         room_error = describe_lack_of_room(config, config.table.objects[1])
@@ -132,6 +134,7 @@ class FakeCell(CellWithoutHardware):
     @staticmethod
     def labels(config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
         """Return None for every detector: a fake detector knows all classes."""
+        del cell_folder
         return dict.fromkeys(config.detectors)
 
     @staticmethod

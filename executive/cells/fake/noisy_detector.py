@@ -62,6 +62,7 @@ class NoisyDetector:
     @staticmethod
     def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each invalid option, with a message."""
+        del base
         invalid_options = list(NoisyOptions.find_errors(config))
         yield from invalid_options
         if not invalid_options and config.options["of"] not in all_configs:

@@ -20,8 +20,10 @@ class EmbeddedDetector(RfdetrDetector):
     @staticmethod
     def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each option in the cell file with an error message: this kind of detector has no options."""
+        del base, all_configs
         yield from DetectorOptions.find_errors(config)
 
     @staticmethod
     def _read_options(config: DetectorConfig) -> RfdetrOptions:
+        del config
         return RfdetrOptions(model_path=str(MODEL_PATH), labels=str(LABELS_PATH))

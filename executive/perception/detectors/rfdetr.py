@@ -73,6 +73,7 @@ class RfdetrDetector(ThreadedDetector):
     @staticmethod
     def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each missing, unknown or invalid option, with an error message; load no model."""
+        del all_configs
         errors = list(RfdetrOptions.find_errors(config))
         yield from errors
         if errors:

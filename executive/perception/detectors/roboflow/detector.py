@@ -52,11 +52,13 @@ class RoboflowDetector(ThreadedDetector):
     @staticmethod
     def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each invalid option, with a message."""
+        del base, all_configs
         yield from RoboflowOptions.find_errors(config)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
         """Return the class names of the cell that the model can find; None if the options list none."""
+        del base
         try:
             options = RoboflowOptions.read(config)
         except InputError:
