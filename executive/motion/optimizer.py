@@ -51,8 +51,8 @@ class OptimizationProblem:
     """The optimization problem between two states.
 
     The slack of a state is the smallest of these margins: each clearance minus the required clearance [m],
-    the remaining tilt of the tool as an equivalent distance [m], and the distance of each joint from its
-    range limits [rad].
+    the maximum tilt of the tool minus its tilt as an equivalent distance [m], and the distance of each joint
+    from its range limits [rad].
 
     Attributes:
         start, end: States at the start and at the end of the motion.
@@ -74,8 +74,9 @@ class OptimizationProblem:
         return self.find_nearest_pairs(qs, math.inf).slack
 
     def find_nearest_pairs(self, qs: Array, max_slack: float = MAX_SLACK) -> NearestPairs:
-        """Return slack and nearest pairs of disc and prism at joint positions `(N, n)` [rad].
+        """Return slack and nearest pairs at joint positions `(N, n)` [rad].
 
+        A pair consists of a disc, a part of tool or load, and of a prism, an obstacle.
         A slack up to `max_slack` is exact; a larger slack is an upper bound.
         """
         tcps, axes = self.kinematics.compute_tcps_and_axes(qs)
@@ -175,8 +176,9 @@ class Optimizer:
         """Return the best motion as point-to-point motions between its states.
 
         Args:
-            keeps_timing: True for the states at all half steps, with the timing of the best motion; False for
-                the states at all steps, in minimum time on a slightly different path.
+            keeps_timing: True to connect the states at the ends and in the middle of the steps with the
+                timing of the best motion. False to connect the states at the ends of the steps in minimum
+                time; the path then differs slightly.
 
         Raises:
             JointLimitError: No motion connects two of the states.
@@ -192,7 +194,7 @@ class Optimizer:
 def _limit_velocity(state: JointState, limits: JointLimits) -> JointState:
     """Return the state with its velocity clipped, so that a motion through it keeps the velocity limits.
 
-    While an acceleration `a` falls to 0 with the maximum jerk `j`, it changes the velocity by `a² / 2 j`.
+    While an acceleration `a` falls to 0 with the maximum jerk `j`, it changes the velocity by `a² / (2 j)`.
     """
     max_velocity = limits.velocity - state.qdd**2 / (2 * limits.jerk)
     return state._replace(qd=np.clip(state.qd, -max_velocity, max_velocity))

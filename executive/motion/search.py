@@ -155,8 +155,9 @@ class MotionSearch:
     ) -> Iterator[tuple[float, Trajectory]]:
         """Yield a detour as a pair `(duration [s], motion)`, unless it exceeds a joint limit.
 
-        With `keeps_timing`, the detour passes the states of the optimizer at the times of the optimizer, else
-        in minimum time. The duration includes the slowdown for the load; the motion is not slowed down.
+        The detour connects the states of the best motion of the optimizer: at the times of this motion if
+        `keeps_timing` is True, in minimum time if `keeps_timing` is False. The returned duration is that of
+        the motion after its slowdown for the load; the returned motion is not slowed down yet.
         """
         with contextlib.suppress(JointLimitError):
             motion = self._build_motion(candidate, *optimizer.connect_states(keeps_timing=keeps_timing))

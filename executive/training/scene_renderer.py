@@ -39,7 +39,7 @@ MIN_LABELLED_VISIBLE_FRACTION = 0.5
 MAX_HEAVILY_OCCLUDED_FRACTION = 1 / 6
 """Maximum fraction of heavily occluded objects in a scene; one such object is always allowed."""
 MAX_ATTEMPTS = 50
-"""Maximum number of random scenes that are drawn for an image before an error is raised."""
+"""Maximum number of random scenes that are sampled for an image before an error is raised."""
 NOMINAL_SCENE_FRACTION = 0.2
 """Fraction of the random scenes with table, light, camera and noise as in the cell file."""
 MIN_CONTRAST = 5
@@ -68,7 +68,7 @@ class SceneRenderer:
         self._camera_matrix, _ = compute_calibration(self._camera)
 
     def render_image(self, seed: int, number: int) -> LabelledImage:
-        """Draw scenes from `seed` until few objects are heavily occluded, and return the labelled image.
+        """Sample scenes from `seed` until few objects are heavily occluded, and return the labelled image.
 
         Its file name contains the name of the camera and `number`, and has no suffix. Its `truth` contains:
 

@@ -17,7 +17,7 @@ from executive.motion.arm_model import Kinematics
 from executive.perception.camera_model import compute_hull_mask
 
 MAX_LOAD_OFFSET = 0.015
-"""Maximum distance of the centre of a held object from the axis of the cup [m]."""
+"""Maximum distance of the centre of a held object from the axis of the suction cup [m]."""
 TOOL_SPHERE_RADIUS = 0.02
 """Radius of the spheres that enclose the tool, including tube and fittings [m]."""
 SPHERES_PER_SEGMENT = 9

@@ -38,10 +38,10 @@ class BodyPair(NamedTuple):
         link_pair: Indices of two links of the arm, or () if all links of the bodies count.
         links: Links of the first body whose distances count.
         joints: Joints that change the distance.
-        body_name: Name of the second body in messages. If it is "" (arm and load), messages contain the name
-            of the link that is nearest to the load.
+        body_name: Name of the second body in messages; "" for the pair of arm and load, whose messages name
+            the load first, and then the nearest link of the arm.
         load_name: Name of the load if it belongs to the pair, else "".
-        support_height: Height up to which the first body may touch the second one [m].
+        support_height: Height in the world up to which the second body supports the load [m].
     """
 
     bodies: tuple[int, int]
@@ -182,7 +182,7 @@ class ClearanceChecker:
         return pairs
 
     def _measure_distance(self, pair: BodyPair) -> tuple[float, list[ClosestApproach]]:
-        """Return the distance of a pair [m], and an approach for each two points within the margin.
+        """Return the distance of a pair [m], and a `ClosestApproach` for each pair of points in the margin.
 
         A distance beyond the margin plus `SEARCH_DISTANCE` is returned as this sum.
         """

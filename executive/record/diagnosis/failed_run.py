@@ -29,8 +29,8 @@ class FailurePathNode:
     Attributes:
         node: Node of the mission.
         subtree: Name of the subtree that contains the node, or "".
-        control_node: Control node built from `node` to explain its decision, without being run; None if
-            `node` is not a control node.
+        control_node: Instance that never runs and only explains the decision of `node`; None if `node` is not
+            a control node.
         failure: Failure that the node received from its child.
     """
 
