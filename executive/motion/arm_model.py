@@ -52,11 +52,11 @@ class Kinematics(Protocol):
     def find_branch(self, q: ArrayLike) -> BranchKey:
         """Return the branch of the joint positions `q` `(n,)` [rad]."""
 
-    def solve(self, X_WT: Pose, branch: BranchKey) -> Array:
-        """Return the joint positions `(n,)` [rad] of a tool pose in one branch, maybe outside `joint_range`.
+    def solve(self, poses: Sequence[Pose], branch: BranchKey) -> Array:
+        """Return the joint positions `(N, n)` [rad] of tool poses in one branch, maybe outside `joint_range`.
 
         Raises:
-            Unreachable: The pose is too near to the arm or too far from the arm.
+            Unreachable: A pose is too near to the arm or too far from the arm.
         """
 
     def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:

@@ -95,7 +95,7 @@ def solve_vertical_waypoints(kinematics: Kinematics, q: Array, length: float, br
 def _solve_waypoints(kinematics: Kinematics, X_WT: Pose, length: float, branch: BranchKey) -> Array:
     """Return continuous waypoints `(WAYPOINT_COUNT, n)` [rad] on a vertical line upwards from `X_WT`."""
     positions = X_WT.position + np.outer(np.linspace(0.0, length, WAYPOINT_COUNT), [0.0, 0.0, 1.0])
-    waypoints = np.array([kinematics.solve(Pose(X_WT.rotation, p), branch) for p in positions])
+    waypoints = kinematics.solve([Pose(X_WT.rotation, position) for position in positions], branch)
     waypoints[1:] = waypoints[0] + wrap_angles(waypoints[1:] - waypoints[0])
     return waypoints
 

@@ -14,6 +14,7 @@ be flipped, `(a, b, c) -> (a + π, -b, c + π)`. A branch is `(index of the flip
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -45,7 +46,6 @@ _FLIP_OFFSETS[:, [2, 4]] += (FLIPS[:, 1:2] < 0) * math.pi
 _FLIP_OFFSETS[:, [4, 6]] += (FLIPS[:, 2:] < 0) * math.pi
 _FLIP_SIGNS = np.ones((8, 7))
 _FLIP_SIGNS[:, [1, 3, 5]] = FLIPS
-_IS_Z_JOINT = (True, False, True, False, True, False, True)  # The other joints turn about y.
 _ROUNDING_ERROR = 1e-9  # [m]
 
 
@@ -95,17 +95,19 @@ class Iiwa14:
         The function transforms both vectors joint by joint from the wrist to the base, which takes a fifth of
         the time of complete frames. Joint 7 has no effect, because its axis is the tool axis.
         """
-        cosines, sines = np.cos(qs.T), np.sin(qs.T)
-        axis = np.array([cosines[4] * sines[5], sines[4] * sines[5], cosines[5]])
-        tcp = self._wrist_to_tool * axis
+        angles = np.ascontiguousarray(qs.T[:6])  # Operations on contiguous rows are faster.
+        cosines, sines = np.cos(angles), np.sin(angles)
+        vectors = np.empty((3, 2, len(qs)))
+        tcp, axis = vectors[:, 0], vectors[:, 1]
+        axis[0], axis[1], axis[2] = cosines[4] * sines[5], sines[4] * sines[5], cosines[5]
+        tcp[:] = self._wrist_to_tool * axis
         tcp[2] += FOREARM
-        tcp_and_axis = np.stack([tcp, axis], axis=1)  # (3, 2, N)
-        tcp_and_axis = _rotate(tcp_and_axis, cosines[3], -sines[3], _IS_Z_JOINT[3])
-        tcp_and_axis[2, 0] += UPPER_ARM
+        _rotate(vectors, cosines[3], -sines[3], 3)
+        tcp[2] += UPPER_ARM
         for joint in (2, 1, 0):
-            tcp_and_axis = _rotate(tcp_and_axis, cosines[joint], sines[joint], _IS_Z_JOINT[joint])
-        tcp_and_axis[2, 0] += SHOULDER_HEIGHT
-        return tcp_and_axis[:, 0].T, tcp_and_axis[:, 1].T
+            _rotate(vectors, cosines[joint], sines[joint], joint)
+        tcp[2] += SHOULDER_HEIGHT
+        return tcp.T, axis.T
 
     def find_branch(self, q: ArrayLike) -> BranchKey:
         """Return the branch of `q` `(7,)` [rad]: the index of the flip, and the redundancy angle [rad]."""
@@ -119,10 +121,10 @@ class Iiwa14:
         _, up, side = _compute_elbow_frame(wrist - shoulder)
         return math.atan2(float((elbow - shoulder) @ side), float((elbow - shoulder) @ up))
 
-    def solve(self, X_WT: Pose, branch: BranchKey) -> Array:
-        """Return the joint positions `(7,)` [rad] of a tool pose in one branch, or raise Unreachable."""
+    def solve(self, poses: Sequence[Pose], branch: BranchKey) -> Array:
+        """Return the joint positions `(N, 7)` [rad] of tool poses in one branch, or raise Unreachable."""
         flip, angle = branch
-        return self._solve_angles(X_WT, np.array([angle]))[int(flip), 0]
+        return self._solve_angles(poses, np.array([angle]))[:, int(flip), 0]
 
     def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
         """Return the solutions of a tool pose for all flips and evenly spaced redundancy angles.
@@ -131,39 +133,50 @@ class Iiwa14:
         """
         offsets = np.radians(np.arange(0.0, 360.0, math.degrees(angle_step)))
         angles = self.compute_redundancy_angle(q_seed) + offsets
-        solutions = self._solve_angles(X_WT, angles).reshape(-1, IIWA14_JOINT_COUNT)
+        solutions = self._solve_angles([X_WT], angles).reshape(-1, IIWA14_JOINT_COUNT)
         return Solutions(solutions, list(product(range(len(FLIPS)), angles.tolist())))
 
-    def _solve_angles(self, X_WT: Pose, angles: Array) -> Array:
-        """Return the solutions `(8, S, 7)` [rad] of a tool pose by flip and redundancy angle `(S,)` [rad].
+    def _solve_angles(self, poses: Sequence[Pose], angles: Array) -> Array:
+        """Return the solutions `(N, 8, S, 7)` [rad] of `N` tool poses, by flip and redundancy angle.
+
+        `angles` are the redundancy angles `(S,)` [rad].
 
         Raises:
             Unreachable: The wrist is too near to the shoulder or too far from the shoulder.
         """
+        elbow_frames, triangle_angles = zip(*map(self._solve_triangle, poses), strict=True)
+        # The vectors have the shape (N, 1, 3), the angles of the triangles have the shape (N, 1, 1).
+        wrist_direction, up, side = np.array(elbow_frames).swapaxes(0, 1)[:, :, None]
+        upper_arm_angle, q4 = np.array(triangle_angles).T[:, :, None, None]
+        cosines, sines = np.cos(angles)[:, None], np.sin(angles)[:, None]
+        elbow_direction = cosines * up + sines * side
+        # Frame 3: z along the upper arm, y normal to the triangle of shoulder, elbow and wrist.
+        z3 = np.cos(upper_arm_angle) * wrist_direction + np.sin(upper_arm_angle) * elbow_direction
+        y3 = cosines * side - sines * up
+        x3 = np.cos(upper_arm_angle) * elbow_direction - np.sin(upper_arm_angle) * wrist_direction
+        x4 = np.cos(q4) * x3 + np.sin(q4) * z3
+        z4 = -np.sin(q4) * x3 + np.cos(q4) * z3
+        R_47 = np.stack([x4, y3, z4], axis=-2) @ np.array([pose.rotation for pose in poses])[:, None]
+
+        unflipped_qs = np.empty((len(poses), 1, len(angles), IIWA14_JOINT_COUNT))
+        unflipped_qs[:, 0, :, :3] = _find_zyz_angles(x3, y3, z3)
+        unflipped_qs[..., 3] = q4
+        unflipped_qs[:, 0, :, 4:] = _find_zyz_angles(*np.moveaxis(R_47, -1, 0))
+        return wrap_angles(unflipped_qs * _FLIP_SIGNS[:, None] + _FLIP_OFFSETS[:, None])
+
+    def _solve_triangle(self, X_WT: Pose) -> tuple[tuple[Array, Array, Array], tuple[float, float]]:
+        """Return the frame of the elbow's circle, and the angles of upper arm and joint 4, of a tool pose.
+
+        The frame is that of `_compute_elbow_frame`. The angle of the upper arm is that to the line from
+        shoulder to wrist [rad].
+        """
         wrist = X_WT.position - self._wrist_to_tool * X_WT.rotation[:, 2]
         shoulder_to_wrist = wrist - (0.0, 0.0, SHOULDER_HEIGHT)
         distance = self._measure_wrist_distance(X_WT, shoulder_to_wrist)
-        wrist_direction, up, side = _compute_elbow_frame(shoulder_to_wrist)
         cos4 = (distance**2 - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
-        q4 = math.acos(min(1.0, max(-1.0, cos4)))
         cos_upper_arm_angle = (UPPER_ARM**2 + distance**2 - FOREARM**2) / (2 * UPPER_ARM * distance)
-        upper_arm_angle = math.acos(min(1.0, max(-1.0, cos_upper_arm_angle)))
-
-        elbow_direction = np.outer(np.cos(angles), up) + np.outer(np.sin(angles), side)
-        # Frame 3: z along the upper arm, y normal to the triangle of shoulder, elbow and wrist.
-        z3 = math.cos(upper_arm_angle) * wrist_direction + math.sin(upper_arm_angle) * elbow_direction
-        y3 = np.outer(np.cos(angles), side) - np.outer(np.sin(angles), up)
-        x3 = math.cos(upper_arm_angle) * elbow_direction - math.sin(upper_arm_angle) * wrist_direction
-        x4 = math.cos(q4) * x3 + math.sin(q4) * z3
-        z4 = -math.sin(q4) * x3 + math.cos(q4) * z3
-        R_47 = np.stack([x4, y3, z4], axis=-2) @ X_WT.rotation
-
-        unflipped_qs = np.empty((len(angles), IIWA14_JOINT_COUNT))
-        unflipped_qs[:, :3] = _find_zyz_angles(x3, y3, z3)
-        unflipped_qs[:, 3] = q4
-        x7, y7, z7 = R_47.transpose(2, 0, 1)
-        unflipped_qs[:, 4:] = _find_zyz_angles(x7, y7, z7)
-        return wrap_angles(unflipped_qs * _FLIP_SIGNS[:, None] + _FLIP_OFFSETS[:, None])
+        upper_arm_angle, q4 = (math.acos(min(1.0, max(-1.0, c))) for c in (cos_upper_arm_angle, cos4))
+        return _compute_elbow_frame(shoulder_to_wrist), (upper_arm_angle, q4)
 
     def _measure_wrist_distance(self, X_WT: Pose, shoulder_to_wrist: Array) -> float:
         """Return the length of the vector from shoulder to wrist `(3,)` [m], or raise Unreachable."""
@@ -188,32 +201,35 @@ class Iiwa14:
         R, p = np.eye(3), np.array([0.0, 0.0, SHOULDER_HEIGHT])
         lengths = {3: UPPER_ARM, 5: FOREARM}  # [m] before the joint with this index
         angles = np.asarray(q, dtype=float) * (1, 1, 1, -1, 1, 1, 1)
-        for joint, (c, s) in enumerate(zip(np.cos(angles), np.sin(angles), strict=True)):
+        cosines, sines = np.cos(angles), np.sin(angles)
+        joint_rotations = np.tile(np.eye(3), (len(angles), 1, 1))
+        for parity in (0, 1):
+            _rotate(
+                joint_rotations[parity::2].transpose(1, 2, 0), cosines[parity::2], sines[parity::2], parity
+            )
+        for joint, R_joint in enumerate(joint_rotations):
             p = p + lengths.get(joint, 0.0) * R[:, 2]
-            R = R @ _rotate(np.eye(3), c, s, _IS_Z_JOINT[joint])
+            R = R @ R_joint
             frames.append(Pose(R, p))
         return [*frames, Pose(R, p + self._wrist_to_tool * R[:, 2])]
 
 
-def _rotate(vectors: Array, c: ArrayLike, s: ArrayLike, is_about_z: bool) -> Array:
-    """Return vectors `(3, ...)` rotated about z, or about y, by angles with cosines `c` and sines `s`."""
-    x, y, z = vectors
-    if is_about_z:
-        return np.array([c * x - s * y, s * x + c * y, z])
-    return np.array([c * x + s * z, y, c * z - s * x])
+def _rotate(vectors: Array, cosines: Array, sines: Array, joint: int) -> None:
+    """Rotate vectors `(3, ...)` in place about z, if the index of the joint is even, or about y."""
+    turned = vectors[:2] if joint % 2 == 0 else vectors[::-2]  # x and y, or z and x
+    c_turned, s_turned = cosines * turned, sines * turned
+    turned[0] = c_turned[0] - s_turned[1]
+    turned[1] = s_turned[0] + c_turned[1]
 
 
 def _find_zyz_angles(x: Array, y: Array, z: Array) -> Array:
-    """Return `a`, `b >= 0`, `c` `(N, 3)` with `Rz(a) Ry(b) Rz(c) = [x y z]`, from columns `(N, 3)`."""
-    sine = np.hypot(z[:, 0], z[:, 1])
+    """Return `a`, `b >= 0`, `c` `(..., 3)` with `Rz(a) Ry(b) Rz(c) = [x y z]`, from columns `(..., 3)`."""
+    sine = np.hypot(z[..., 0], z[..., 1])
     is_singular = sine < 1e-9  # Only the sum or difference of a and c is defined: a is set to 0.
-    a = np.where(is_singular, 0.0, np.arctan2(z[:, 1], z[:, 0]))
-    c = np.where(
-        is_singular,
-        np.arctan2(x[:, 1], np.where(z[:, 2] > 0, x[:, 0], -x[:, 0])),
-        np.arctan2(y[:, 2], -x[:, 2]),
-    )
-    return np.column_stack([a, np.arctan2(sine, z[:, 2]), c])
+    a = np.where(is_singular, 0.0, np.arctan2(z[..., 1], z[..., 0]))
+    singular_c = np.arctan2(x[..., 1], np.where(z[..., 2] > 0, x[..., 0], -x[..., 0]))
+    c = np.where(is_singular, singular_c, np.arctan2(y[..., 2], -x[..., 2]))
+    return np.stack([a, np.arctan2(sine, z[..., 2]), c], axis=-1)
 
 
 def _compute_elbow_frame(shoulder_to_wrist: Array) -> tuple[Array, Array, Array]:
@@ -222,4 +238,5 @@ def _compute_elbow_frame(shoulder_to_wrist: Array) -> tuple[Array, Array, Array]
     up = np.array([0.0, 0.0, 1.0]) if abs(direction[2]) < 0.9999 else np.array([1.0, 0.0, 0.0])
     up = up - (up @ direction) * direction
     up /= np.linalg.norm(up)
-    return direction, up, np.cross(direction, up)
+    (x, y, z), (u, v, w) = direction.tolist(), up.tolist()
+    return direction, up, np.array([y * w - z * v, z * u - x * w, x * v - y * u])  # faster than np.cross

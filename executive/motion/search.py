@@ -276,7 +276,7 @@ class MotionSearch:
         self, position: tuple[float, float, float], branch: BranchKey, q_seed: Array
     ) -> JointState:
         """Return the state of rest at a via point [m], with the last joint as in `q_seed` `(n,)` [rad]."""
-        q = self._kinematics.solve(make_tool_down_pose(position), branch)
+        (q,) = self._kinematics.solve([make_tool_down_pose(position)], branch)
         q[-1] = q_seed[-1]
         return JointState.at_rest(q)
 

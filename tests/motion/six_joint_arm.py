@@ -6,6 +6,7 @@ R_WT = Rz(q1) Ry(q2) Ry(q3) Rz(q4) Ry(q5) Rz(q6)
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -58,9 +59,9 @@ class SixJointArm:
         solutions = self.solve_all(self.compute_tool_pose(q), q, 0.0)
         return solutions.branches[int(np.argmin(np.abs(wrap_angles(solutions.qs - q)).max(axis=1)))]
 
-    def solve(self, X_WT: Pose, branch: BranchKey) -> Array:
+    def solve(self, poses: Sequence[Pose], branch: BranchKey) -> Array:
         (index,) = branch
-        return self.solve_all(X_WT, np.zeros(6), 0.0).qs[int(index)]
+        return np.array([self.solve_all(X_WT, np.zeros(6), 0.0).qs[int(index)] for X_WT in poses])
 
     def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
         x, y, z = X_WT.position - self._wrist_to_tool * X_WT.rotation[:, 2] - (0.0, 0.0, HEIGHT)

@@ -36,7 +36,7 @@ def test_every_solution_of_a_reachable_pose_reaches_it(q) -> None:
 def test_the_configuration_of_a_posture_leads_back_to_it(q) -> None:
     if min(abs(math.sin(q[i])) for i in (1, 3, 5)) < 1e-3:
         return  # straight joints: the posture is not one of a few
-    found = ARM.solve(ARM.compute_tool_pose(q), ARM.find_branch(q))
+    found = ARM.solve([ARM.compute_tool_pose(q)], ARM.find_branch(q))
     assert np.abs(found - q).max() < 1e-5
 
 

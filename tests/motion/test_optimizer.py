@@ -32,7 +32,7 @@ def over_the_post(config, kinematics, connector):
         branch, _ = kinematics.find_branch(np.radians(config.arm.poses_deg["home"]))
 
         def state(x: float, y: float, z: float) -> JointState:
-            return JointState.at_rest(kinematics.solve(make_tool_down_pose((x, y, z)), (branch, 0.0)))
+            return JointState.at_rest(kinematics.solve([make_tool_down_pose((x, y, z))], (branch, 0.0))[0])
 
         corners = [state(*LEFT), state(*LEFT[:2], HIGH), state(*RIGHT[:2], HIGH), state(*RIGHT)]
         discs = make_tool_discs(config, load)

@@ -53,7 +53,7 @@ def test_the_kinematics_of_the_test_arm_are_consistent(arm: Kinematics) -> None:
         X_WT = arm.compute_tool_pose(q)
         assert np.allclose(tip, X_WT.position)
         assert np.allclose(axis, X_WT.rotation[:, 2])
-        assert np.allclose(arm.solve(X_WT, arm.find_branch(q)), q, atol=1e-6)
+        assert np.allclose(arm.solve([X_WT], arm.find_branch(q)), q, atol=1e-6)
         for solution in arm.solve_all(X_WT, q, 0.1).qs:
             assert np.allclose(arm.compute_tool_pose(solution).position, X_WT.position, atol=1e-9)
             assert np.allclose(arm.compute_tool_pose(solution).rotation, X_WT.rotation, atol=1e-9)
