@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,10 +41,6 @@ MIN_COSINE_UNLOADED = 0.5
 """Minimum cosine between the tool axis and straight down without a load."""
 MIN_COSINE_LOADED = 0.8
 """Minimum cosine between the tool axis and straight down with a load."""
-PrismIndices: TypeAlias = NDArray[np.intp] | slice
-"""Selection of prisms: indices, or a slice."""
-ALL_PRISMS = slice(None)
-"""Selection of all prisms."""
 
 
 class Discs(NamedTuple):
@@ -94,7 +90,7 @@ class Prisms(NamedTuple):
     is_support: NDArray[np.bool_]
     names: tuple[str, ...]
 
-    def select(self, indices: PrismIndices) -> Prisms:
+    def select(self, indices: NDArray[np.intp]) -> Prisms:
         """Return the fields of the prisms with the given indices; all names remain."""
         return Prisms._make([*(values[indices] for values in self[:-1]), self.names])
 
@@ -145,7 +141,8 @@ class ClearanceModel:
 
         `tcps` `(E, 3)` [m] and `axes` `(E, 3)` are the tool centre points and tool axes at the ends.
         """
-        end_distances = self._compute_all_distances(tcps, axes).min(axis=(0, 1))
+        all_prisms = np.arange(len(self._prisms.names))
+        end_distances = self._compute_all_distances(tcps, axes, all_prisms).min(axis=(1, 2))
         self._end_margins = np.minimum(end_distances, self._margin)
 
     def find_nearest_pairs(self, tcps: Array, axes: Array, max_slack: float = math.inf) -> NearestPairs:
@@ -158,12 +155,12 @@ class ClearanceModel:
         near_prisms = self._find_near_prisms(tcps, axes, max_slack)
         required_distances = self._find_required_distances(tcps, near_prisms)
         slack = self._compute_all_distances(tcps, axes, near_prisms) - required_distances[:, None]
-        flat_slack = slack.reshape(len(tcps), -1)
-        pairs = flat_slack.argmin(axis=1)
+        flat_slack = slack.reshape(-1, len(tcps))
+        pairs = flat_slack.argmin(axis=0)
         states = np.arange(len(tcps))
-        pair_slack, tilt_slack = flat_slack[states, pairs], self._compute_tilt_slack(axes)
-        discs, prisms = np.divmod(pairs, len(near_prisms))
-        distances = required_distances[states, prisms] + pair_slack
+        pair_slack, tilt_slack = flat_slack[pairs, states], self._compute_tilt_slack(axes)
+        prisms, discs = np.divmod(pairs, len(self._discs.radii))
+        distances = required_distances[prisms, states] + pair_slack
         min_slack = np.minimum(pair_slack, tilt_slack)
         return NearestPairs(min_slack, pair_slack, tilt_slack, distances, discs, near_prisms[prisms])
 
@@ -193,47 +190,51 @@ class ClearanceModel:
         if tilt_slack.min() < -MAX_EXTRA_TILT:
             tcp = tcps[np.argmin(tilt_slack)]
             raise Blocked(f"the motion would tilt the tool too far{_describe_tcp(tcp)}")
+        near_prisms = self._find_near_prisms(tcps, axes, 0.0)
         # Undetected objects need no margin. The load must not be pressed into the table or a floor.
-        tolerances = np.where(self._prisms.is_undetected, self._margin, POSITION_TOLERANCE + SAMPLING_MARGIN)
-        tolerances = np.where(self._prisms.is_support, MAX_PENETRATION, tolerances)
-        required_distances = self._find_required_distances(tcps)[:, None]
-        slack = self._compute_all_distances(tcps, axes) - required_distances + tolerances
-        slack = slack.min(axis=1)
+        prisms = self._prisms.select(near_prisms)
+        tolerances = np.where(prisms.is_undetected, self._margin, POSITION_TOLERANCE + SAMPLING_MARGIN)
+        tolerances = np.where(prisms.is_support, MAX_PENETRATION, tolerances)
+        required_distances = self._find_required_distances(tcps, near_prisms)
+        distances = self._compute_all_distances(tcps, axes, near_prisms).min(axis=1)
+        slack = (distances - required_distances + tolerances[:, None]).T
         state, prism = np.unravel_index(np.argmin(slack), slack.shape)
         if slack[state, prism] < 0:
             shortfall = (tolerances[prism] - slack[state, prism]) * 1000
             raise Blocked(
                 f"the motion would bring tool or load {shortfall:.0f} mm too near to "
-                f"{self._prisms.names[prism]}{_describe_tcp(tcps[state])}"
+                f"{prisms.names[near_prisms[prism]]}{_describe_tcp(tcps[state])}"
             )
 
     def _find_near_prisms(self, tcps: Array, axes: Array, max_slack: float) -> NDArray[np.intp]:
         """Return the indices of the prisms whose slack may be `max_slack` [m] or less in a state."""
         prisms = self._prisms
         max_distances = prisms.radii + (self._discs.radii.max() + self._margin + max_slack)
-        disc_centres = np.concatenate([tcps + offset * axes for offset in self._discs.offsets])[:, :2]
-        (x_min, y_min), (x_max, y_max) = disc_centres.min(axis=0), disc_centres.max(axis=0)
-        is_near_in_x = (prisms.min_x - max_distances < x_max) & (prisms.max_x + max_distances > x_min)
-        is_near_in_y = (prisms.min_y - max_distances < y_max) & (prisms.max_y + max_distances > y_min)
+        x, y = (tcps[:, i] + self._discs.offsets[:, None] * axes[:, i] for i in range(2))
+        is_near_in_x = (prisms.min_x - max_distances < x.max()) & (prisms.max_x + max_distances > x.min())
+        is_near_in_y = (prisms.min_y - max_distances < y.max()) & (prisms.max_y + max_distances > y.min())
         return np.flatnonzero(is_near_in_x & is_near_in_y)
 
-    def _find_required_distances(self, tcps: Array, prisms: PrismIndices = ALL_PRISMS) -> Array:
-        """Return the required distance of each state from each of `K` prisms `(N, K)` [m]."""
+    def _find_required_distances(self, tcps: Array, prisms: NDArray[np.intp]) -> Array:
+        """Return the required distance from each of `K` prisms in each state `(K, N)` [m]."""
         is_near_end = self._compute_end_distances(tcps[:, 0], tcps[:, 1]) < OBSERVED_RADIUS
-        return np.where(is_near_end[:, None], self._end_margins[prisms], self._margin)
+        return np.where(is_near_end, self._end_margins[prisms, None], self._margin)
 
     def _compute_end_distances(self, x: Array, y: Array) -> Array:
         """Return the horizontal distances of points from the nearest end of the motion [m]."""
         squares = [(x - end_x) ** 2 + (y - end_y) ** 2 for end_x, end_y in self._end_positions]
         return np.sqrt(functools.reduce(np.minimum, squares))
 
-    def _compute_all_distances(self, tcps: Array, axes: Array, prisms: PrismIndices = ALL_PRISMS) -> Array:
-        """Return the distance of each disc from each of `K` prisms in each state `(N, P, K)` [m]."""
-        all_discs = np.arange(len(self._discs.radii))[:, None]
-        return self._compute_distances(tcps[:, None, None], axes[:, None, None], all_discs, prisms)
+    def _compute_all_distances(self, tcps: Array, axes: Array, prisms: NDArray[np.intp]) -> Array:
+        """Return the distance of each disc from each of `K` prisms in each state `(K, P, N)` [m].
+
+        The states are the last axis, because operations on long rows are faster.
+        """
+        all_discs = np.arange(len(self._discs.radii))
+        return self._compute_distances(tcps, axes, all_discs[:, None], prisms[:, None, None])
 
     def _compute_distances(
-        self, tcps: Array, axes: Array, disc_indices: NDArray[np.intp], prism_indices: PrismIndices
+        self, tcps: Array, axes: Array, disc_indices: NDArray[np.intp], prism_indices: NDArray[np.intp]
     ) -> Array:
         """Return the distances between discs and prisms [m], negative inside; all arrays broadcast."""
         offsets, radii = self._discs.offsets[disc_indices], self._discs.radii[disc_indices]
