@@ -104,24 +104,32 @@ class Transcription:
     def __init__(self, start: JointState, end: JointState, limits: JointLimits) -> None:
         self._start, self._end = start, end
         self._grid = grid = _build_grid(limits.joint_count)
-        self._inner_count = limits.joint_count * (STEP_COUNT - 1)
         velocity_fraction, acceleration_fraction, jerk_fraction = USED_LIMIT_FRACTIONS
         max_velocity, max_jerk = velocity_fraction * limits.velocity, jerk_fraction * limits.jerk
         self._max_acceleration = acceleration_fraction * limits.acceleration
+        self._max_inner_accelerations = np.repeat(self._max_acceleration, STEP_COUNT - 1)
+        self._inner_count = len(self._max_inner_accelerations)
+        self._end_qdd = np.array([start.qdd, end.qdd])
         half_velocity, velocity_count = grid.half_velocity, len(grid.half_velocity)
         acceleration_count, jerk_count = self._inner_count, limits.joint_count * STEP_COUNT
         jerk_ends = np.zeros((limits.joint_count, STEP_COUNT))
-        jerk_ends[:, 0] -= start.qdd
-        jerk_ends[:, -1] += end.qdd
+        jerk_ends[:, 0], jerk_ends[:, -1] = -start.qdd, end.qdd
         velocity_ends = np.outer(start.qdd, half_velocity[:, 0]) + np.outer(end.qdd, half_velocity[:, -1])
-        # Each row limits the absolute value of `row y + linear h + quadratic h²` to
-        # `bound[0] h + bound[1] h² + bound[2] h³`. The rows limit accelerations, velocities, and jerks.
-        self._linear = np.pad(np.repeat(start.qd, velocity_count), (acceleration_count, jerk_count))
-        self._quadratic = np.pad(np.append(velocity_ends, jerk_ends), (acceleration_count, 0))
-        self._bound = np.zeros((3, len(self._linear)))
-        self._bound[1, :acceleration_count] = np.repeat(self._max_acceleration, STEP_COUNT - 1)
-        self._bound[0, acceleration_count:-jerk_count] = np.repeat(max_velocity, velocity_count)
-        self._bound[2, -jerk_count:] = np.repeat(max_jerk, STEP_COUNT)
+        linear = np.pad(np.repeat(start.qd, velocity_count), (acceleration_count, jerk_count))
+        quadratic = np.pad(np.append(velocity_ends, jerk_ends), (acceleration_count, 0))
+        bound = np.zeros((4, len(linear)))
+        bound[2, :acceleration_count] = self._max_inner_accelerations
+        bound[1, acceleration_count:-jerk_count] = np.repeat(max_velocity, velocity_count)
+        bound[3, -jerk_count:] = np.repeat(max_jerk, STEP_COUNT)
+        final_bound = np.zeros((4, 2 * limits.joint_count))
+        final_bound[0, limits.joint_count :] = end.q - start.q
+        last_rows = grid.velocity[-1], grid.position[-1]
+        final_quadratic = [(row[[0, -1], None] * self._end_qdd).sum(axis=0) for row in last_rows]
+        # Each row limits `row y + linear h + quadratic h²` to `bound @ (1, h, h², h³)`. The rows limit
+        # accelerations, velocities and jerks, then their negatives. The last rows fix the final state.
+        self._linear = np.concatenate([linear, -linear, start.qd - end.qd, STEP_COUNT * start.qd])
+        self._quadratic = np.concatenate([quadratic, -quadratic, *final_quadratic])
+        self._bound = np.hstack([bound, bound, final_bound])
 
     def compute_states(self, motion: DiscreteMotion) -> list[JointState]:
         """Return the states of a motion at all half steps, including the start and the end."""
@@ -136,15 +144,16 @@ class Transcription:
 
     def fit(self, step: float, qs: Array) -> DiscreteMotion | None:
         """Return the motion with time steps of `step` [s] that is nearest to `qs` `(M, n)` [rad], or None."""
-        program, inner_count = self._build_program(step), self._inner_count
+        hessian, inner_count = self._grid.hessian.copy(), self._inner_count
         position_map = self._grid.sample_position[:, 1:-1]
         residual = qs - self._start.q - self._compute_end_terms(step)
-        scale = program.scale[:inner_count]
+        scale = self._max_inner_accelerations * step**2
         squares = np.kron(np.eye(len(self._max_acceleration)), position_map.T @ position_map)
-        program.hessian[:inner_count, :inner_count] += scale[:, None] * squares * scale
-        program.gradient[:inner_count] = -(position_map.T @ residual).T.ravel() * scale
-        program.lower[inner_count] = program.upper[inner_count] = 1.0
-        return self._solve(step, program, np.empty((0, inner_count + 2)), np.empty(0))
+        hessian[:inner_count, :inner_count] += scale[:, None] * squares * scale
+        gradient = np.append(-(position_map.T @ residual).T.ravel() * scale, [0.0, 0.0])
+        bounds = np.tile([[-_UNBOUNDED], [_UNBOUNDED]], inner_count + 2)
+        bounds[:, inner_count], bounds[0, -1] = 1.0, 0.0
+        return self._solve(step, hessian, gradient, bounds, [])
 
     def shorten(
         self, last_motion: DiscreteMotion, constraints: Sequence[LinearizedConstraints], trust_radius: float
@@ -157,58 +166,26 @@ class Transcription:
             trust_radius: Maximum change of an acceleration as a fraction of its limit.
         """
         step, start, inner_count = last_motion.step, self._start, self._inner_count
-        program = self._build_program(step)
-        program.gradient[inner_count:] = STEP_COUNT * step, VIOLATION_COST * _VIOLATION_UNIT
+        gradient = np.append(np.zeros(inner_count), [STEP_COUNT * step, VIOLATION_COST * _VIOLATION_UNIT])
         last_values = (last_motion.accelerations[:, 1:-1] / self._max_acceleration[:, None]).ravel()
-        program.lower[:inner_count] = last_values - trust_radius
-        program.upper[:inner_count] = last_values + trust_radius
-        end_accelerations = np.stack([start.qdd, self._end.qdd])
-        row_groups, row_uppers = [], []
+        bounds = np.empty((2, inner_count + 2))
+        bounds[:, :inner_count] = last_values - trust_radius, last_values + trust_radius
+        bounds[:, inner_count:] = (MIN_STEP_FACTOR, 0.0), (MAX_STEP_FACTOR, _UNBOUNDED)
+        extra_rows = []
         # Axes of the arrays: r constraint, k sample, j joint, i inner value, e start or end.
         for group in constraints:
             position_map, gradients = self._grid.sample_position[group.samples], group.gradients
-            quadratic = np.einsum("rke,rkj,ej->r", position_map[:, :, [0, -1]], gradients, end_accelerations)
+            quadratic = np.einsum("rke,rkj,ej->r", position_map[:, :, [0, -1]], gradients, self._end_qdd)
             linear = np.einsum("rkj,j,rk->r", gradients, start.qd, self._grid.sample_times[group.samples])
             rows = np.empty((len(gradients), inner_count + 2))
             value_gradients = np.einsum("rkj,rki->rji", gradients, position_map[:, :, 1:-1])
             rows[:, :inner_count] = -value_gradients.reshape(-1, inner_count)
             rows[:, inner_count] = -linear - 2 * step * quadratic - group.step_derivatives
             rows[:, inner_count + 1] = -1.0
-            row_groups.append(rows)
             offset = np.einsum("rkj,rkj->r", gradients, start.q - last_motion.qs[group.samples])
             slack = group.slack - EXTRA_DISTANCE + offset
-            row_uppers.append(slack - step**2 * quadratic - step * group.step_derivatives)
-        return self._solve(step, program, np.concatenate(row_groups), np.concatenate(row_uppers))
-
-    def _build_program(self, step: float) -> _Program:
-        """Return the program without distance constraints, linearized about time steps of `step` [s]."""
-        grid, start, end, h_column = self._grid, self._start, self._end, self._inner_count
-        # The powers h, h², h³ are replaced by their tangents `slope h + offset`.
-        slopes, offsets = np.array([1.0, 2 * step, 3 * step**2]), np.array([0.0, -(step**2), -2 * step**3])
-        bound_slope, bound_offset = slopes @ self._bound, offsets @ self._bound
-        slope, offset = self._linear + 2 * step * self._quadratic, step**2 * self._quadratic
-        rows, limit_count, joint_count = grid.rows.copy(), len(bound_slope), len(start.q)
-        rows[:limit_count, h_column] = slope - bound_slope
-        rows[limit_count : 2 * limit_count, h_column] = -slope - bound_slope
-        end_accelerations = np.stack([start.qdd, end.qdd])
-        velocity_change = (grid.velocity[-1, [0, -1]][:, None] * end_accelerations).sum(axis=0)
-        position_change = (grid.position[-1, [0, -1]][:, None] * end_accelerations).sum(axis=0)
-        rows[2 * limit_count : -joint_count, h_column] = start.qd - end.qd + 2 * step * velocity_change
-        rows[-joint_count:, h_column] = STEP_COUNT * start.qd + 2 * step * position_change
-        row_lower = np.full(len(rows), -_UNBOUNDED)
-        row_upper = np.concatenate(
-            [
-                bound_offset + offset, bound_offset - offset, step**2 * velocity_change,
-                end.q - start.q + step**2 * position_change,
-            ]
-        )  # fmt: skip
-        row_lower[2 * limit_count :] = row_upper[2 * limit_count :]
-        lower, upper = np.full(h_column + 2, -_UNBOUNDED), np.full(h_column + 2, _UNBOUNDED)
-        lower[h_column:], upper[h_column] = (MIN_STEP_FACTOR, 0.0), MAX_STEP_FACTOR
-        scale = np.repeat(self._max_acceleration * step**2, STEP_COUNT - 1)
-        scale = np.append(scale, [step, _VIOLATION_UNIT])
-        hessian, gradient = SMOOTHNESS_WEIGHT * np.eye(h_column + 2), np.zeros(h_column + 2)
-        return _Program(scale, hessian, gradient, rows, lower, upper, row_lower, row_upper, 2 * joint_count)
+            extra_rows.append((rows, slack - step**2 * quadratic - step * group.step_derivatives))
+        return self._solve(step, self._grid.hessian, gradient, bounds, extra_rows)
 
     def _compute_end_terms(self, step: float) -> Array:
         """Return the terms of `v_0`, `y_0` and `y_N` in the sampled positions `(M, n)` [rad]."""
@@ -217,58 +194,49 @@ class Transcription:
         return np.outer(self._grid.sample_times, start.qd * step) + step**2 * quadratic
 
     def _solve(
-        self, step: float, program: _Program, extra_rows: Array, extra_upper: Array
+        self,
+        step: float,
+        hessian: Array,
+        gradient: Array,
+        bounds: Array,
+        extra: Sequence[tuple[Array, Array]],
     ) -> DiscreteMotion | None:
-        """Return the motion that solves a program with extra rows, or None if there is no solution."""
-        solution = program.solve(extra_rows, extra_upper)
-        if solution is None:
+        """Return the motion that solves a program linearized about time steps of `step` [s], or None.
+
+        The program minimizes `x hessian x / 2 + gradient x` for `V` variables `x` in their units.
+
+        Args:
+            step: Duration of a time step in the last motion [s].
+            hessian: Quadratic cost `(V, V)`.
+            gradient: Linear cost `(V,)`.
+            bounds: Smallest and largest values of the variables `(2, V)`.
+            extra: Groups of `R` constraints besides the limits and the final state: coefficients `(R, V)` of
+                the variables in SI units, and upper bounds `(R,)`.
+        """
+        rows = np.concatenate([*(rows for rows, _ in extra), self._grid.rows])
+        # The powers h, h², h³ are replaced by their tangents `slope h + offset`.
+        slopes = np.array([0.0, 1.0, 2 * step, 3 * step**2])
+        offsets = np.array([1.0, 0.0, -(step**2), -2 * step**3])
+        step_column = self._linear + 2 * step * self._quadratic - slopes @ self._bound
+        rows[-len(step_column) :, self._inner_count] = step_column
+        scale = np.concatenate([self._max_inner_accelerations * step**2, [step, _VIOLATION_UNIT]])
+        rows *= scale
+        row_upper = step**2 * self._quadratic + offsets @ self._bound
+        upper = np.concatenate([bounds[1], *(extra_upper for _, extra_upper in extra), row_upper])
+        lower, constraint_types = np.full(len(upper), -_UNBOUNDED), np.zeros(len(upper), dtype=np.int32)
+        lower[: len(scale)] = bounds[0]
+        equality_rows = slice(-2 * len(self._max_acceleration), None)
+        lower[equality_rows], constraint_types[equality_rows] = upper[equality_rows], _EQUALITY_CONSTRAINT
+        solution, _, status, _ = daqp.solve(hessian, gradient, rows, upper, lower, constraint_types)
+        if status != _STATUS_SOLVED:
             return None
         h = step * float(solution[self._inner_count])
-        inner_values = (solution * program.scale)[: self._inner_count].reshape(-1, STEP_COUNT - 1)
-        y = np.column_stack([self._start.qdd * h**2, inner_values, self._end.qdd * h**2])
+        inner_values = (solution * scale)[: self._inner_count].reshape(-1, STEP_COUNT - 1)
+        end_values = (self._end_qdd * h**2)[:, :, None]
+        y = np.concatenate([end_values[0], inner_values, end_values[1]], axis=1)
         grid = self._grid
         qs = self._start.q + np.outer(grid.sample_times, self._start.qd * h) + grid.sample_position @ y.T
         return DiscreteMotion(h, y / h**2, qs)
-
-
-class _Program(NamedTuple):
-    """A quadratic program with `V` variables and `R` rows: minimize `x hessian x / 2 + gradient x`.
-
-    The constraints are `lower <= x <= upper` and `row_lower <= rows (scale x) <= row_upper`.
-
-    Attributes:
-        scale: Units of the variables `x` `(V,)`.
-        hessian: Quadratic cost `(V, V)`.
-        gradient: Linear cost `(V,)`.
-        rows: Coefficients of the constraints `(R, V)`.
-        lower, upper: Bounds of the variables `(V,)`.
-        row_lower, row_upper: Bounds of the rows `(R,)`.
-        equality_count: Number of equality constraints, which are the last rows.
-    """
-
-    scale: Array
-    hessian: Array
-    gradient: Array
-    rows: Array
-    lower: Array
-    upper: Array
-    row_lower: Array
-    row_upper: Array
-    equality_count: int
-
-    def solve(self, extra_rows: Array, extra_upper: Array) -> Array | None:
-        """Return the solution `(V,)` with `extra_rows (scale x) <= extra_upper`, or None if there is none."""
-        rows = np.concatenate([extra_rows, self.rows])
-        row_lower = np.concatenate([np.full(len(extra_upper), -_UNBOUNDED), self.row_lower])
-        row_upper = np.concatenate([extra_upper, self.row_upper])
-        constraint_types = np.zeros(len(self.lower) + len(rows), dtype=np.int32)
-        constraint_types[-self.equality_count :] = _EQUALITY_CONSTRAINT
-        solution, _, status, _ = daqp.solve(
-            self.hessian, self.gradient, np.ascontiguousarray(rows * self.scale),
-            np.concatenate([self.upper, row_upper]), np.concatenate([self.lower, row_lower]),
-            constraint_types,
-        )  # fmt: skip
-        return np.asarray(solution) if status == _STATUS_SOLVED else None
 
 
 class _Grid(NamedTuple):
@@ -282,6 +250,7 @@ class _Grid(NamedTuple):
         sample_times: Times of the samples [steps] `(M,)`.
         rows: Rows for all limits, for the negated limits, and for the final state; the last two columns, for
             step and violation, are 0.
+        hessian: Quadratic cost of the accelerations in the units of the variables.
     """
 
     velocity: Array
@@ -290,6 +259,7 @@ class _Grid(NamedTuple):
     sample_position: Array
     sample_times: Array
     rows: Array
+    hessian: Array
 
 
 @lru_cache(maxsize=4)
@@ -322,4 +292,5 @@ def _build_grid(joint_count: int) -> _Grid:
     final_state = [np.kron(joints, row[-1, 1:-1]) for row in (velocity, position)]
     rows = np.concatenate([*limits, *(-limit for limit in limits), *final_state])
     rows = np.pad(rows, ((0, 0), (0, 2)))
-    return _Grid(velocity, position, half_velocity, sample_position, sample_times, rows)
+    hessian = SMOOTHNESS_WEIGHT * np.eye(rows.shape[1])
+    return _Grid(velocity, position, half_velocity, sample_position, sample_times, rows, hessian)
