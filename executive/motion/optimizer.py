@@ -95,13 +95,13 @@ class OptimizationProblem:
         new_tcps, new_axes = (values.reshape(-1, joint_count, 3) for values in displaced)
         changes = self.clearance.compute_slack_changes(pairs, new_tcps, new_axes)
         gradients = changes / _FINITE_DIFFERENCE_STEP
-        range_slack = self._compute_range_slack(qs)
         # If a range limit determines the slack, the slack changes only with the joint at the limit.
-        states = np.flatnonzero(range_slack.min(axis=1) <= pairs.slack)
-        joints = np.argmin(range_slack[states], axis=1)
-        middle = (self.kinematics.joint_range.lower + self.kinematics.joint_range.upper) / 2
-        gradients[states] = 0.0
-        gradients[states, joints] = -np.sign((qs - middle)[states, joints])
+        states = np.flatnonzero(pairs.slack < np.minimum(pairs.pair_slack, pairs.tilt_slack))
+        if len(states):
+            joints = np.argmin(self._compute_range_slack(qs[states]), axis=1)
+            middle = (self.kinematics.joint_range.lower + self.kinematics.joint_range.upper) / 2
+            gradients[states] = 0.0
+            gradients[states, joints] = -np.sign((qs - middle)[states, joints])
         return gradients
 
     def _compute_range_slack(self, qs: Array) -> Array:

@@ -92,10 +92,7 @@ def _find_max_speeds(profile: Profile) -> Array:
     """
     max_speeds = []
     for joint in profile.profiles[0]:
-        extreme_speeds = [
-            v - a * a / (2 * j)
-            for v, a, next_a, j in zip(joint.v, joint.a, joint.a[1:], joint.j, strict=False)
-            if a * next_a < 0
-        ]
+        phases = zip(joint.v, joint.a, joint.a[1:], joint.j, strict=False)
+        extreme_speeds = [v - a * a / (2 * j) for v, a, next_a, j in phases if a * next_a < 0]
         max_speeds.append(max(map(abs, [*joint.v, *extreme_speeds])))
     return np.array(max_speeds)

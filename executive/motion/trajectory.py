@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import accumulate, pairwise
+from itertools import accumulate
 from typing import Protocol
 
 import numpy as np
@@ -55,13 +55,20 @@ class Trajectory:
         self._pieces = tuple(pieces)
         self._end_times = tuple(accumulate(piece.duration for piece in pieces))
         self.duration = self._end_times[-1]
-        start_state, self._end_state = pieces[0].state_at(0.0), pieces[-1].state_at(pieces[-1].duration)
-        self.start, self.end = start_state.q, self._end_state.q
-        for number, (piece, next_piece) in enumerate(pairwise(pieces), start=1):
-            states = piece.state_at(piece.duration), next_piece.state_at(0.0)
-            _require_equal(*states, f"pieces {number} and {number + 1} do not meet")
-        for state, end_name in ((start_state, "start"), (self._end_state, "end")):
-            _require_equal(state, JointState.at_rest(state.q), f"the {end_name} is not at rest")
+        starts = [piece.state_at(0.0) for piece in pieces]
+        ends = [piece.state_at(piece.duration) for piece in pieces]
+        self.start, self.end, self._end_state = starts[0].q, ends[-1].q, ends[-1]
+        rest_at_start, rest_at_end = JointState.at_rest(self.start), JointState.at_rest(self.end)
+        # One operation for all pairs of states that must be equal: each piece starts where the last one ends.
+        differences = np.abs(np.subtract([rest_at_start, *ends], [*starts, rest_at_end])).max(axis=2)
+        pair, quantity = np.unravel_index(np.argmax(differences), differences.shape)
+        if differences[pair, quantity] > _ROUNDING_ERROR:
+            problems = {0: "the start is not at rest", len(pieces): "the end is not at rest"}
+            problem = problems.get(int(pair), f"pieces {pair} and {pair + 1} do not meet")
+            difference = (
+                f"{('position', 'velocity', 'acceleration')[quantity]} differs by {differences.max():.2g}"
+            )
+            raise Fault(f"invalid trajectory: {problem}; the joint {difference}")
 
     def make_slower_copy(self, speed_factor: float) -> Trajectory:
         """Return a copy of the motion whose velocities are multiplied by `speed_factor`, 0 to 1."""
@@ -164,11 +171,3 @@ def sample_pieces(pieces: Sequence[MotionPiece], times: Array) -> JointState:
             states.append(piece.sample(piece_times))
         start_time = end_time
     return JointState(*map(np.concatenate, zip(*states, strict=True)))
-
-
-def _require_equal(state: JointState, next_state: JointState, problem: str) -> None:
-    """Raise Fault with `problem` if two states differ by more than the rounding error."""
-    for name, left, right in zip(("position", "velocity", "acceleration"), state, next_state, strict=True):
-        difference = float(np.max(np.abs(left - right)))
-        if difference > _ROUNDING_ERROR:
-            raise Fault(f"invalid trajectory: {problem}; the joint {name} differs by {difference:.2g}")
