@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.polynomial import polynomial
 from ruckig import InputParameter, Ruckig
 from ruckig import Trajectory as Profile
 
@@ -57,10 +56,13 @@ class CartesianLine:
         starts_in_motion: bool = False,
         ends_in_motion: bool = False,
     ) -> None:
-        degree, distances = len(waypoints) - 1, np.linspace(0.0, length, len(waypoints))
-        coefficients = polynomial.polyfit(distances, waypoints, degree)
-        self._coefficients = [polynomial.polyder(coefficients, order) for order in range(4)]
-        """Coefficients `(degree + 1 - k, n)` of the `k`-th derivative of the joint path."""
+        distances = np.linspace(0.0, length, len(waypoints))
+        coefficients = np.linalg.solve(np.vander(distances, increasing=True), waypoints)
+        self._coefficients = [coefficients]
+        """Coefficients `(N - k, n)` of the `k`-th derivative of the joint path, those of low powers first."""
+        for _ in range(3):
+            coefficients = coefficients[1:] * np.arange(1, len(coefficients))[:, None]
+            self._coefficients.append(coefficients)
         speed, acceleration, jerk = self._compute_tool_limits(limits, max_speed, length)
         self.max_acceleration = acceleration = min(max_acceleration, acceleration)
         end_speed = _find_max_end_speed(length, speed, acceleration, jerk)
@@ -88,7 +90,8 @@ class CartesianLine:
 
     def _compute_derivatives(self, distances: Array | float, order: int) -> Array:
         """Return a derivative of the joint path, of order 0 to 3, at `(M,)` distances [m] as `(M, n)`."""
-        return np.asarray(polynomial.polyval(distances, self._coefficients[order]).T)
+        coefficients = self._coefficients[order]
+        return np.asarray(distances)[..., None] ** np.arange(len(coefficients)) @ coefficients
 
     def _compute_tool_limits(
         self, limits: JointLimits, max_speed: float, length: float
