@@ -118,8 +118,9 @@ class Detections(Answer):
 
     def compute_searched_mask(self, points: Array) -> NDArray[np.bool_]:
         """Return a mask `(N,)` of the world points `(N, 3)` [m] that are searched and unoccluded."""
-        in_area_mask = self.frame.compute_area_mask(points, self.area)
-        return in_area_mask & self.frame.compute_unoccluded_mask(points)
+        mask = self.frame.compute_area_mask(points, self.area)
+        mask[mask] = self.frame.compute_unoccluded_mask(points[mask])
+        return mask
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,18 +61,19 @@ class Frame:
             area: Region of the image [pixel].
             margin: Minimum distance of a projection from the border of the region [pixel].
         """
-        pixels, is_in_front = self._project(points)
+        x, y, is_in_front = self._project(points)
         left, top, right, bottom = area
-        is_inside = (pixels >= (left + margin, top + margin)) & (pixels < (right - margin, bottom - margin))
-        return np.asarray(is_in_front & is_inside.all(axis=1))
+        is_inside_x = (left + margin <= x) & (x < right - margin)
+        is_inside_y = (top + margin <= y) & (y < bottom - margin)
+        return np.asarray(is_in_front & is_inside_x & is_inside_y)
 
     def compute_unoccluded_mask(self, points: Array) -> NDArray[np.bool_]:
         """Return a mask `(N,)` of the world points `(N, 3)` [m] where the arm hides no part of an object."""
         mask = np.ones(len(points), dtype=bool)
         height, width = self.visible.shape
         for offset in TYPICAL_OBJECT_POINTS:
-            pixels, is_in_front = self._project(points + offset)
-            columns, rows = pixels.astype(int).clip(0, (width - 1, height - 1)).T
+            x, y, is_in_front = self._project(points + offset)
+            columns, rows = x.astype(int).clip(0, width - 1), y.astype(int).clip(0, height - 1)
             mask &= is_in_front & self.visible[rows, columns]
         return mask
 
@@ -91,12 +92,13 @@ class Frame:
         X_CW = self.X_WC.inverse()
         return matrix, X_CW.rotation_vector, X_CW.position
 
-    def _project(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the pixels `(N, 2)` of points `(N, 3)` [m], and a mask of points in front of the camera."""
-        projected = self.X_WC.inverse().apply(points) @ self.matrix.T
-        depth = projected[:, 2:]
+    def _project(self, points: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return x, y `(N,)` [pixel] of points `(N, 3)` [m], and a mask of points in front of the camera."""
+        X_CW = self.X_WC.inverse()
+        x, y, depth = self.matrix @ X_CW.rotation @ points.T + (self.matrix @ X_CW.position)[:, None]
         # A division by infinity avoids warnings for points behind the camera.
-        return projected[:, :2] / np.where(depth > 0, depth, np.inf), depth[:, 0] > 0
+        divisor = np.where(depth > 0, depth, np.inf)
+        return x / divisor, y / divisor, depth > 0
 
 
 @dataclass(frozen=True)

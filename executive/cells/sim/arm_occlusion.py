@@ -84,15 +84,14 @@ def _compute_occlusion_mask(
     mask = np.zeros((size[1], size[0]), dtype=np.uint8)
     for points, radius in parts:
         for start, end in itertools.pairwise(points):
-            for fraction in np.linspace(0.0, 1.0, SPHERES_PER_SEGMENT):
-                x, y, z = X_WC.inverse().apply(start + fraction * (end - start))
+            centres = X_WC.inverse().apply(np.linspace(start, end, SPHERES_PER_SEGMENT))
+            for x, y, z in (centres @ matrix.T).tolist():
                 # A sphere behind the camera is invisible. The link that carries a wrist camera has a sphere
                 # around the camera, which would occlude the whole image.
                 if z <= radius:
                     continue
-                column, row, _ = matrix @ np.array([x / z, y / z, 1.0])
+                column, row = round(x / z), round(y / z)
                 # OpenCV cannot draw circles with very large coordinates.
-                if abs(column) > 4 * size[0] or abs(row) > 4 * size[1]:
-                    continue
-                cv2.circle(mask, (round(column), round(row)), max(1, round(matrix[0, 0] * radius / z)), 1, -1)
+                if abs(column) <= 4 * size[0] and abs(row) <= 4 * size[1]:
+                    cv2.circle(mask, (column, row), max(1, round(matrix[0, 0] * radius / z)), 1, -1)
     return mask.astype(bool)
