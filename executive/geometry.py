@@ -38,7 +38,8 @@ class Pose:
     @staticmethod
     def of(position: ArrayLike, quaternion: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Pose:
         """Return the pose with a position `(3,)` [m] and a quaternion `(x, y, z, w)` of any norm."""
-        x, y, z, w = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
+        components = np.asarray(quaternion, dtype=float)
+        x, y, z, w = components / math.hypot(*components)
         x_row = [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)]
         y_row = [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)]
         z_row = [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]

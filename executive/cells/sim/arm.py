@@ -214,8 +214,8 @@ class SimArm:
 
     def _check_positions(self, q: Array, tolerance: float, description: str) -> None:
         """Store a fault message with `description` if a joint is over `tolerance` [rad] away from `q`."""
-        errors = np.abs(self.q - q)
-        joint = int(np.argmax(errors))
+        errors = np.abs(self.q - q).tolist()
+        joint = errors.index(max(errors))
         if errors[joint] > tolerance:
             self._fault_message = (
                 f"{description} is {math.degrees(errors[joint]):.2f}° away from the position of joint "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -104,7 +105,7 @@ class SuctionTool:
     @property
     def pull(self) -> float:
         """Filtered pull on the seal [N], 0 while the tool holds nothing; ground truth, not for skills."""
-        return 0.0 if self._grip is None else float(np.linalg.norm(self._grip.pull))
+        return 0.0 if self._grip is None else math.hypot(*self._grip.pull)
 
     def close(self) -> None:
         """Switch the vacuum on, and hold a body within reach if the seal is strong enough."""
