@@ -152,12 +152,15 @@ def _resume(
 
 def _make_terminal_view(has_keyboard: bool) -> LineView | TerminalView:
     """Return a view that redraws the terminal; if stderr is no terminal, return a view that prints lines."""
-    from rich.console import Console
-
     from executive.view.terminal.lines import LineView
-    from executive.view.terminal.screen import TerminalView
 
-    console = Console(file=open_unescaped_stderr())
-    if not console.is_terminal or console.is_dumb_terminal:
-        return LineView(sys.stderr)
-    return TerminalView(console, sys.stdin.fileno() if has_keyboard else None)
+    if sys.stderr.isatty():
+        # The import of `rich` takes 0.06 s, and only a terminal needs `rich`.
+        from rich.console import Console
+
+        from executive.view.terminal.screen import TerminalView
+
+        console = Console(file=open_unescaped_stderr())
+        if not console.is_dumb_terminal:
+            return TerminalView(console, sys.stdin.fileno() if has_keyboard else None)
+    return LineView(sys.stderr)
