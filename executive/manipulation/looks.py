@@ -32,9 +32,10 @@ class LookingSkill(Skill):
             SkillFailed: `camera_moved`, `crowded` or `unavailable`.
         """
         frame = cell.camera.capture()
+        request = cell.detectors[self.detector or next(iter(cell.detectors))].request(frame, self.view)
+        # The detector works meanwhile.
         if displacement := cell.camera.describe_displacement(frame):
             raise self.failure("camera_moved", displacement)
-        request = cell.detectors[self.detector or next(iter(cell.detectors))].request(frame, self.view)
         while not request.ready:
             yield
         try:
