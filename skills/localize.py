@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from executive.cell.detection import Detections
 from executive.cell.objects import Target
-from executive.cell.protocols import Cell
+from executive.cell.protocols import Cell, Steps
 from executive.errors import NoDepth
 from executive.skill import In, Out, Skill, port
 
@@ -22,8 +22,12 @@ class Localize(Skill):
     targets: Out[list[Target]] = port(doc="a target per unsorted item with a known position, from any frame")
     reasons = ("stale", "no_depth")
 
-    def run(self, cell: Cell) -> None:
-        """Localize every detection, then update the ledger."""
+    def run(self, cell: Cell) -> Steps:
+        """Localize every detection, then update the ledger.
+
+        Localization and update are in different control steps, and the next skill starts after them, because
+        together they would compute longer than a control step.
+        """
         frame = self.detections.frame
         if not cell.ledger.is_current(frame):
             message = f"the robot may have moved objects after frame {frame.id} was captured; look again"
@@ -32,4 +36,6 @@ class Localize(Skill):
             observations = cell.localizer.localize(self.detections)
         except NoDepth as error:
             raise self.failure("no_depth", str(error)) from error
+        yield
         self.targets = list(cell.ledger.observe(self.detections, observations))
+        yield

@@ -37,6 +37,7 @@ def plan(
     Raises:
         SkillFailed: No motion was found; the reason is `unreachable` or `blocked`.
     """
+    yield  # The control step in which the skill starts has already much to compute.
     yield from wait_for_rest(arm)
     for _ in range(MAX_PLANNING_ATTEMPTS):
         goal, task = find_goal_and_task()

@@ -27,10 +27,11 @@ class LookaheadPlanner:
         self._cell = cell
         self._item_and_bin: tuple[Item, str] | None = None
         """Last selected target and its bin."""
-        self._may_plan_transit = False
-        """True from the command to grip until the transit is planned."""
-        self._may_plan_approach = False
-        """True if new detections or a new motion may have made the planned approach obsolete."""
+        self._grip_tick: int | None = None
+        """Control step of the command to grip until the transit is planned; else None."""
+        self._change_tick: int | None = None
+        """Control step of the last detections or motion, which may have made the planned approach obsolete;
+        None after the approach is planned."""
 
     def on_event(self, timed: TimedEvent) -> None:
         """Update the expected motions from an event of the run."""
@@ -41,19 +42,24 @@ class LookaheadPlanner:
             items = {target.item for target in self._cell.ledger.find_targets()}
             self._item_and_bin = (item, bin) if bin in self._cell.bins and item in items else None
         elif isinstance(event, ToolCommanded):
-            self._may_plan_transit = event.action == "close"
+            self._grip_tick = timed.tick if event.action == "close" else None
         elif isinstance(event, FrameSearched | MotionPlanned):
-            self._may_plan_approach = True
+            self._change_tick = timed.tick
 
-    def plan_next_motion(self) -> None:
-        """Plan the next motion if the events of the run make it predictable; called after each tick."""
+    def plan_next_motion(self, tick: int) -> None:
+        """Plan the next motion if the events of the run make it predictable; called after each tick.
+
+        A motion is planned only after the control step `tick` in which it becomes predictable, because skills
+        compute most in the control steps with new detections, a new motion, or a command to the tool.
+        """
         cell, held_item = self._cell, self._cell.ledger.find_held_item()
-        if self._may_plan_transit and self._item_and_bin and held_item is None and cell.tool.holding:
-            self._may_plan_transit = False
+        may_hold = self._grip_tick not in (None, tick) and held_item is None
+        if may_hold and self._item_and_bin and cell.tool.holding:
+            self._grip_tick = None
             item, bin = self._item_and_bin
             cell.arm.plan_ahead(make_bin_goal(cell, bin, item), make_transport_task(cell, item))
-        elif self._may_plan_approach and held_item is not None and self._is_moving_to_bin():
-            self._may_plan_approach = False
+        elif self._change_tick not in (None, tick) and held_item is not None and self._is_moving_to_bin():
+            self._change_tick = None
             pickable_targets = sort_pickable_targets(cell, cell.ledger.find_targets())
             if targets := sort_by_tour(cell, pickable_targets):
                 cell.arm.plan_ahead(*make_approach(cell, targets[0]))

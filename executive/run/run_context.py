@@ -82,7 +82,7 @@ class RunContext:
     def plan_ahead(self) -> None:
         """Let the planner plan the probable next motion."""
         if self.planner is not None:
-            self.planner.plan_next_motion()
+            self.planner.plan_next_motion(self.tick)
 
 
 def brake_arm(cell: Cell, advance: Callable[[], None]) -> None:

@@ -112,7 +112,7 @@ def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Pat
     done = again(path, edited(path, stock, "  - {MoveToScan: {pose: aside}}\n" + stock))
     assert (done.replayed.event.node, done.replayed.event.status) == ("MoveToScan", "INVALID")
     assert done.difference.endswith(
-        "reason fault: the replay reads plan.ready in step 0, but the journal has no earlier value; "
+        "reason fault: the replay reads plan.ready in step 1, but the journal has no earlier value; "
         "only a new run can show the consequences of this difference"
     )
 

@@ -142,7 +142,7 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         f'because tool_state_after_failure has no "halt". {TOOL}',
     ]),
     ("leaves_arm_at_rest", faulty.RunsOnWhenHalted, [
-        f"{EMPTY} it was halted at tick 25, and the arm still moves. {REST}",
+        f"{EMPTY} it was halted at tick 26, and the arm still moves. {REST}",
     ]),
     ("halts_in_one_tick", faulty.WaitsInFinally, [
         f"{EMPTY} at tick 1 it yielded while it was halted; \"finally\" must not contain a yield. {FINALLY}",
