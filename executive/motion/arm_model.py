@@ -38,7 +38,7 @@ class Kinematics(Protocol):
 
     @property
     def joint_range(self) -> JointRange:
-        """Range in which no joint limit is exceeded and no link touches the next link."""
+        """Range in which each joint is within its limits, and the links at the wrist do not touch."""
 
     def compute_tool_pose(self, q: ArrayLike) -> Pose:
         """Return the tool pose `X_WT` at the joint positions `q` `(n,)` [rad]."""

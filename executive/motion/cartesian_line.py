@@ -1,8 +1,8 @@
 """Straight motion of the tool, up or down, in one branch of the inverse kinematics.
 
 The joint path `q(s)` is a polynomial through inverse-kinematics solutions; its parameter `s` is the distance
-that the tool has moved. `q_s`, `q_ss` and `q_sss` are the derivatives of `q` by `s`. With speed `v`,
-acceleration `a` and jerk `j` of the tool, the chain rule gives velocity, acceleration and jerk of the joints:
+that the tool has moved. `q_s`, `q_ss` and `q_sss` are the derivatives of `q` with respect to `s`. With speed
+`v`, acceleration `a` and jerk `j` of the tool, the chain rule gives those of the joints:
 
     q' = q_s v,  q'' = q_s a + q_ss v²,  q''' = q_s j + 3 q_ss v a + q_sss v³.
 
@@ -29,7 +29,8 @@ _MIN_DIVISOR = 1e-9  # [rad/m], [rad/m²], [rad/m³]: avoids a division by 0 for
 class CartesianLine:
     """A straight motion of the tool; implements `executive.motion.trajectory.MotionPiece`.
 
-    At an end where the tool moves, its speed is the highest from which the tool can stop on the line.
+    At an end where the tool moves, its speed is the highest from which the tool could stop on the line, or
+    to which it can accelerate from rest on the line.
 
     Args:
         waypoints: Joint positions `(N, n)` [rad] at `N` evenly spaced points of the line; the degree of the

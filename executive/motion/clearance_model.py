@@ -91,7 +91,7 @@ class Prisms(NamedTuple):
     names: tuple[str, ...]
 
     def select(self, indices: NDArray[np.intp]) -> Prisms:
-        """Return the fields of the prisms with the given indices; all names remain."""
+        """Return the prisms with the given indices; `names` keeps all names, in the original order."""
         return Prisms._make([*(values[indices] for values in self[:-1]), self.names])
 
 
@@ -99,19 +99,20 @@ class NearestPairs(NamedTuple):
     """For each of `N` states, the pair of disc and prism with the smallest slack.
 
     Attributes:
-        slack: Smallest slack of the state, of all pairs, of the tilt, and of the joint range `(N,)`.
+        slack: Minimum of `pair_slack` and `tilt_slack` `(N,)` [m]; in the optimizer, also of the slack of the
+            joint range.
         pair_slack: Slack of the pair `(N,)` [m].
         tilt_slack: Slack of the tilt of the tool `(N,)` [m].
         distances: Distance between disc and prism of the pair `(N,)` [m], negative for a penetration.
-        discs, prisms: Indices of the pair `(N,)`.
+        disc_indices, prism_indices: Indices of the pair `(N,)`.
     """
 
     slack: Array
     pair_slack: Array
     tilt_slack: Array
     distances: Array
-    discs: NDArray[np.intp]
-    prisms: NDArray[np.intp]
+    disc_indices: NDArray[np.intp]
+    prism_indices: NDArray[np.intp]
 
     def select(self, indices: NDArray[np.intp]) -> NearestPairs:
         """Return the values of the states with the given indices."""
@@ -174,7 +175,7 @@ class ClearanceModel:
             displaced_tcps: Displaced tool centre points `(N, M, 3)` [m].
             displaced_axes: Displaced tool axes `(N, M, 3)`.
         """
-        discs, prisms = pairs.discs[:, None], pairs.prisms[:, None]
+        discs, prisms = pairs.disc_indices[:, None], pairs.prism_indices[:, None]
         new_distances = self._compute_distances(displaced_tcps, displaced_axes, discs, prisms)
         slack_change = new_distances - pairs.distances[:, None]
         tilt_change = self._compute_tilt_slack(displaced_axes) - pairs.tilt_slack[:, None]
@@ -215,23 +216,23 @@ class ClearanceModel:
         is_near_in_y = (prisms.min_y - max_distances < y.max()) & (prisms.max_y + max_distances > y.min())
         return np.flatnonzero(is_near_in_x & is_near_in_y)
 
-    def _find_required_distances(self, tcps: Array, prisms: NDArray[np.intp]) -> Array:
+    def _find_required_distances(self, tcps: Array, prism_indices: NDArray[np.intp]) -> Array:
         """Return the required distance from each of `K` prisms in each state `(K, N)` [m]."""
         is_near_end = self._compute_end_distances(tcps[:, 0], tcps[:, 1]) < OBSERVED_RADIUS
-        return np.where(is_near_end, self._end_margins[prisms, None], self._margin)
+        return np.where(is_near_end, self._end_margins[prism_indices, None], self._margin)
 
     def _compute_end_distances(self, x: Array, y: Array) -> Array:
         """Return the horizontal distances of points from the nearest end of the motion [m]."""
         squares = [(x - end_x) ** 2 + (y - end_y) ** 2 for end_x, end_y in self._end_positions]
         return np.sqrt(functools.reduce(np.minimum, squares))
 
-    def _compute_all_distances(self, tcps: Array, axes: Array, prisms: NDArray[np.intp]) -> Array:
+    def _compute_all_distances(self, tcps: Array, axes: Array, prism_indices: NDArray[np.intp]) -> Array:
         """Return the distance of each disc from each of `K` prisms in each state `(K, P, N)` [m].
 
         The states are the last axis, because operations on long rows are faster.
         """
         all_discs = np.arange(len(self._discs.radii))
-        return self._compute_distances(tcps, axes, all_discs[:, None], prisms[:, None, None])
+        return self._compute_distances(tcps, axes, all_discs[:, None], prism_indices[:, None, None])
 
     def _compute_distances(
         self, tcps: Array, axes: Array, disc_indices: NDArray[np.intp], prism_indices: NDArray[np.intp]
@@ -253,7 +254,7 @@ class ClearanceModel:
         return np.where(outside > 0, outside, np.maximum(horizontal, vertical))
 
     def _compute_tilt_slack(self, axes: Array) -> Array:
-        """Return the distance from the limit of the tilt for tool axes `(..., 3)`, as an equivalent [m]."""
+        """Return the slack of the tilt for tool axes `(..., 3)` as a distance [m]; negative: too tilted."""
         return DISTANCE_PER_COSINE * (-axes[..., 2] - self._discs.min_cosine)
 
 

@@ -101,11 +101,11 @@ def _solve_waypoints(kinematics: Kinematics, X_WT: Pose, length: float, branch: 
 
 
 def _turn_last_joint(
-    upper_qs: Array, lower_qs: Array, joint_range: JointRange, yaw: float | None, q_start: float
+    upper_qs: Array, lower_qs: Array, joint_range: JointRange, yaw: float | None, last_joint_start: float
 ) -> None:
     """Turn the last joint of pairs `(N, n)` [rad] in place, from the yaw 0 of the tool to `yaw` [rad].
 
-    If `yaw` is None, the last joint gets the position in its range that is nearest to `q_start` [rad].
+    If `yaw` is None, the last joint gets the position in its range nearest to `last_joint_start` [rad].
     """
     change = wrap_angles(upper_qs[:, -1] - lower_qs[:, -1])
     if yaw is not None:
@@ -114,14 +114,17 @@ def _turn_last_joint(
         # Both ends of the line must be in the range.
         smallest = joint_range.lower[-1] - np.minimum(change, 0.0)
         largest = joint_range.upper[-1] - np.maximum(change, 0.0)
-        lower_qs[:, -1] = np.clip(q_start, smallest, largest)
+        lower_qs[:, -1] = np.clip(last_joint_start, smallest, largest)
     upper_qs[:, -1] = lower_qs[:, -1] + change
 
 
 def _make_unreachable_error(
     kinematics: Kinematics, poses: list[Pose], end_solutions: tuple[Solutions, Solutions]
 ) -> Unreachable:
-    """Return the error for the first pose without a solution in the joint range, or for both poses."""
+    """Return the error for the first pose without a solution in the joint range.
+
+    If each pose has a solution, the error states that no branch contains solutions of both poses.
+    """
     for pose, solutions in zip(poses, end_solutions, strict=True):
         if not np.any(kinematics.joint_range.contains(solutions.qs)):
             return _make_range_error(kinematics, pose, solutions.qs)

@@ -37,7 +37,8 @@ FLIPS = np.array([[s, e, w] for s in (1, -1) for e in (1, -1) for w in (1, -1)])
 """Signs of joints 2, 4 and 6 in the eight solutions of one redundancy angle `(8, 3)`."""
 
 _JOINT_6_ANGLES = 120.0, 115.0, 110.0, 105.0, 100.0, 95.0, 90.0  # [degree]
-_LINK_DISTANCES = -0.0132, -0.0059, 0.0012, 0.0079, 0.0141, 0.0195, 0.0237  # [m] at `_JOINT_6_ANGLES`
+_LINK_DISTANCES = -0.0132, -0.0059, 0.0012, 0.0079, 0.0141, 0.0195, 0.0237
+"""Distances between links 5 and 7 at `_JOINT_6_ANGLES` [m], negative if the links overlap."""
 
 # A flip changes the unflipped joint positions `q` to `_FLIP_SIGNS * q + _FLIP_OFFSETS`.
 _FLIP_OFFSETS = np.zeros((8, 7))
@@ -53,7 +54,8 @@ def interpolate_max_joint_6_angle(min_link_distance: float) -> float:
     """Return the maximum angle of joint 6 [rad] at which links 5 and 7 keep a minimum distance [m].
 
     Only joint 6 changes the distance of links 5 and 7, apart from an error of up to 0.3 mm. The distances
-    were measured on the collision shapes of pybullet_data kuka_iiwa/model.urdf. 90° is always allowed.
+    were measured on the collision shapes of pybullet_data kuka_iiwa/model.urdf. If no angle down
+    to 90° keeps the distance, the result is 90°.
     """
     return math.radians(float(np.interp(min_link_distance, _LINK_DISTANCES, _JOINT_6_ANGLES)))
 
@@ -63,7 +65,7 @@ class Iiwa14:
 
     Args:
         tool_length: Distance from the flange to the tool centre point [m].
-        joint_range: Range according to the data sheet, `n` = 7, before the limit of joint 6 is applied.
+        joint_range: Range according to the data sheet, `n` = 7; `min_link_distance` makes it narrower.
         min_link_distance: Minimum distance between links 5 and 7 [m], which limits joint 6, or None.
     """
 
@@ -165,25 +167,25 @@ class Iiwa14:
         return wrap_angles(unflipped_qs * _FLIP_SIGNS[:, None] + _FLIP_OFFSETS[:, None])
 
     def _solve_triangle(self, X_WT: Pose) -> tuple[tuple[Array, Array, Array], tuple[float, float]]:
-        """Return the frame of the elbow's circle, and the angles of upper arm and joint 4, of a tool pose.
+        """Return the frame of `_compute_elbow_frame`, the angle at the shoulder, and the angle of joint 4.
 
-        The frame is that of `_compute_elbow_frame`. The angle of the upper arm is that to the line from
-        shoulder to wrist [rad].
+        The function solves the triangle of shoulder, elbow and wrist for a tool pose. The angle at the
+        shoulder leads from the line to the wrist to the upper arm [rad].
         """
         wrist = X_WT.position - self._wrist_to_tool * X_WT.rotation[:, 2]
         shoulder_to_wrist = wrist - (0.0, 0.0, SHOULDER_HEIGHT)
-        distance = self._measure_wrist_distance(X_WT, shoulder_to_wrist)
+        distance = self._require_reachable_wrist(X_WT, shoulder_to_wrist)
         cos4 = (distance**2 - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
         cos_upper_arm_angle = (UPPER_ARM**2 + distance**2 - FOREARM**2) / (2 * UPPER_ARM * distance)
         upper_arm_angle, q4 = (math.acos(min(1.0, max(-1.0, c))) for c in (cos_upper_arm_angle, cos4))
         return _compute_elbow_frame(shoulder_to_wrist), (upper_arm_angle, q4)
 
-    def _measure_wrist_distance(self, X_WT: Pose, shoulder_to_wrist: Array) -> float:
+    def _require_reachable_wrist(self, X_WT: Pose, shoulder_to_wrist: Array) -> float:
         """Return the length of the vector from shoulder to wrist `(3,)` [m], or raise Unreachable."""
         distance = float(np.linalg.norm(shoulder_to_wrist))
         if distance > self._max_wrist_distance + _ROUNDING_ERROR:
             excess = distance - self._max_wrist_distance
-            cause = f"{excess:.3f} m farther than the arm is long ({self._max_wrist_distance:.2f} m)"
+            cause = f"{excess:.3f} m beyond the reach of the arm ({self._max_wrist_distance:.2f} m)"
         elif distance < self._min_wrist_distance - _ROUNDING_ERROR:
             shortfall = self._min_wrist_distance - distance
             cause = f"{shortfall:.3f} m nearer than joint 4 permits ({self._min_wrist_distance:.2f} m)"

@@ -76,7 +76,7 @@ class OptimizationProblem:
     def find_nearest_pairs(self, qs: Array, max_slack: float = MAX_SLACK) -> NearestPairs:
         """Return slack and nearest pairs at joint positions `(N, n)` [rad].
 
-        A pair consists of a disc, a part of tool or load, and of a prism, an obstacle.
+        A pair is a disc (a part of tool or load) and a prism (an obstacle).
         A slack up to `max_slack` is exact; a larger slack is an upper bound.
         """
         tcps, axes = self.kinematics.compute_tcps_and_axes(qs)
@@ -151,7 +151,7 @@ class Optimizer:
                 pairs.slack, samples[:, None], gradients[:, None], np.zeros(len(samples))
             )
             constraints = [distance_constraints, *self._payload_constraints]
-            motion = self._transcription.shorten(self._iterate, constraints, self._trust_radius)
+            motion = self._transcription.solve_subproblem(self._iterate, constraints, self._trust_radius)
             if motion is None:
                 return
             self._trust_radius *= TRUST_RADIUS_FACTOR
@@ -162,7 +162,7 @@ class Optimizer:
         self._iterate, self._nearest_pairs = motion, self._problem.find_nearest_pairs(motion.qs)
         violations = [-float(self._nearest_pairs.slack.min())]
         if self._problem.payload is not None:
-            sample_time = motion.step / SAMPLES_PER_STEP
+            sample_time = motion.step_duration / SAMPLES_PER_STEP
             constraints = self._problem.payload.linearize(motion.qs, sample_time, MAX_SLACK)
             violations.append(-float(constraints.slack.min(initial=MAX_SLACK)))
             self._payload_constraints = [constraints]
@@ -183,7 +183,7 @@ class Optimizer:
         Raises:
             JointLimitError: No motion connects two of the states.
         """
-        min_duration = self._best_motion.step / 2 if keeps_timing else None
+        min_duration = self._best_motion.step_duration / 2 if keeps_timing else None
         states = [
             _limit_velocity(state, self._problem.connector.limits)
             for state in self._transcription.compute_states(self._best_motion)[:: 1 if keeps_timing else 2]

@@ -114,7 +114,7 @@ class Planner:
             Blocked: The motion comes too near to an obstacle.
             Unreachable, JointLimitError: The motion exceeds the range or another limit of a joint.
         """
-        qs = motion.sample_within_limits(self.limits).q
+        qs = motion.require_limits(self.limits).q
         has_guarded_part = motion.guarded_start_time < math.inf
         # The first state always belongs to the free part, which therefore is never empty.
         free_qs = qs[: max(1, math.ceil(motion.guarded_start_time / STEP))] if has_guarded_part else qs

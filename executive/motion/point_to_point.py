@@ -77,10 +77,10 @@ class Connector:
             if result not in (Result.Working, Result.Finished):
                 cause = str(result)
             elif np.any(_find_max_speeds(profile) > (1 + _RELATIVE_TOLERANCE) * self.limits.velocity):
-                cause = "its profile exceeds a velocity limit"
+                cause = "the profile exceeds a velocity limit"
         if cause is not None:
             states = f"from {start.q.round(4)} to {end.q.round(4)} rad"
-            raise JointLimitError(f"ruckig finds no profile {states}: {cause}")
+            raise JointLimitError(f"ruckig finds no valid profile {states}: {cause}")
         return PointToPoint(profile)
 
 

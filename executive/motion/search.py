@@ -52,7 +52,7 @@ class MotionSearch:
     """Search for a motion between two joint configurations, or from a joint configuration to a goal.
 
     A motion consists of an optional straight departure upwards, a free part (joint motion), and an optional
-    straight arrival downwards.
+    straight approach downwards.
 
     Args:
         config: Content of the cell file.
@@ -80,7 +80,7 @@ class MotionSearch:
         self._straight_part_length = config.motion.straight
         discs = make_tool_discs(config, task.load)
         if not isinstance(end, Goal) and task.load is None:
-            # Without a load, the tool may tilt: the arm must reach named poses from any configuration.
+            # A motion to joint positions, i.e. to a named pose, must be possible from any configuration.
             discs = discs._replace(min_cosine=-1.0)
         self._payload = PayloadLimit(task.load, kinematics) if task.load else None
         start_tcp_and_axis = kinematics.compute_tcps_and_axes(start[None])

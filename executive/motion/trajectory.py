@@ -62,7 +62,7 @@ class Trajectory:
         # One operation for all pairs of states that must be equal: each piece starts where the last one ends.
         differences = np.abs(np.subtract([rest_at_start, *ends], [*starts, rest_at_end])).max(axis=2)
         pair, quantity = np.unravel_index(np.argmax(differences), differences.shape)
-        if differences[pair, quantity] > _ROUNDING_ERROR:
+        if not differences[pair, quantity] <= _ROUNDING_ERROR:  # Also true for NaN.
             problems = {0: "the start is not at rest", len(pieces): "the end is not at rest"}
             problem = problems.get(int(pair), f"pieces {pair} and {pair + 1} do not meet")
             difference = (
@@ -93,7 +93,7 @@ class Trajectory:
         states = sample_pieces(self._pieces, np.arange(0.0, self.duration, STEP, dtype=np.float64))
         return JointState(*map(np.vstack, zip(states, self._end_state, strict=True)))
 
-    def sample_within_limits(self, limits: JointLimits) -> JointState:
+    def require_limits(self, limits: JointLimits) -> JointState:
         """Check the limits of every joint, and return the checked states (`samples`).
 
         Raises:

@@ -87,7 +87,7 @@ CASES = {
     ),
     "a bin out of reach": Case(
         """
-        cells/overhead.yaml:LINE:13: error[robot]: the bin "red_bin" is out of reach: the tool cannot reach (1.480, -0.580, 0.160) m: its wrist would be 1.590 m from the shoulder, 0.770 m farther than the arm is long (0.82 m)
+        cells/overhead.yaml:LINE:13: error[robot]: the bin "red_bin" is out of reach: the tool cannot reach (1.480, -0.580, 0.160) m: its wrist would be 1.590 m from the shoulder, 0.770 m beyond the reach of the arm (0.82 m)
         LINE |   red_bin: {position: [1.54, -0.48, 0.0], size: [0.24, 0.30, 0.06], colour: [0.75, 0.15, 0.15]}
              |             ^^^^^^^^
         """,

@@ -70,7 +70,7 @@ def test_it_is_clear_and_much_faster_than_the_way_that_stops_at_every_corner(ove
         flown = Trajectory(optimizer.connect_states(keeps_timing=exactly))
         assert direct.duration < flown.duration < 0.8 * stopping
         assert not exactly or flown.duration == pytest.approx(optimizer.cost, abs=0.01)
-        qs = flown.sample_within_limits(LIMITS).q
+        qs = flown.require_limits(LIMITS).q
         assert problem.compute_slack(qs).min() > -1e-3
         assert max(peaks(passed(flown), LIMITS)) <= 1 + 1e-6
         assert np.array_equal(flown.start, problem.start.q)

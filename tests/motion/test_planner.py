@@ -223,7 +223,7 @@ def test_the_wrist_folds_no_farther_than_links_5_and_7_keep_the_margin(planner, 
     most = interpolate_max_joint_6_angle(config.motion.margin)
     motion = planner.plan(home, Goal((0.3, 0.0, 0.6)))
     assert math.radians(95) < np.abs(motion.samples.q[:, 5]).max() <= most < limits.position.upper[5]
-    with pytest.raises(Unreachable, match=r"0\.900, 0\.000, 0\.160\) m: .* 0\.081 m farther than the arm"):
+    with pytest.raises(Unreachable, match=r"0\.900, 0\.000, 0\.160\) m: .* 0\.081 m beyond the reach"):
         planner.require_reachable(Goal((0.9, 0.0, 0.114)))
     with pytest.raises(Unreachable, match=r"leaves joint 6 \d\.\d° outside ±106°"):
         planner.plan(home, Goal((0.3, 0.0, 0.7)))

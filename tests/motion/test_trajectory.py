@@ -83,7 +83,7 @@ def test_a_motion_to_where_the_arm_is_takes_no_time() -> None:
     assert trajectory.duration == 0
     assert np.array_equal(Trajectory([SampledMotion(trajectory.samples, 0.0)]).state_at(1.0).q, A)
     assert np.array_equal(trajectory.state_at(0.5).q, A)
-    assert np.array_equal(trajectory.sample_within_limits(LIMITS).q, [A])
+    assert np.array_equal(trajectory.require_limits(LIMITS).q, [A])
 
 
 @given(st.integers(0, 6), st.floats(0.3, 0.9))
@@ -98,20 +98,20 @@ def test_leaving_a_joints_range_between_two_states_inside_it_is_seen(joint: int,
     trajectory = Trajectory([CONNECTOR.connect(edge, leaving), back])
     limit = round(np.degrees(LIMITS.position.upper[joint]))
     with pytest.raises(Unreachable, match=rf"take joint {joint + 1} to -\d+\.\d°; its limit is ±{limit}°"):
-        trajectory.sample_within_limits(LIMITS)
+        trajectory.require_limits(LIMITS)
 
 
 @pytest.mark.parametrize("limit", ["velocity", "acceleration", "jerk"])
 def test_a_motion_outside_a_limit_cannot_be_flown_and_the_text_names_the_joint(limit: str) -> None:
     motion = by_way_of(MOVING)
-    assert np.array_equal(motion.sample_within_limits(LIMITS).q, motion.samples.q)
+    assert np.array_equal(motion.require_limits(LIMITS).q, motion.samples.q)
     most = compute_peak_fractions(motion.samples, LIMITS)[
         ("velocity", "acceleration", "jerk").index(limit), 4
     ]
     less = getattr(LIMITS, limit).copy()
     less[4] *= most / 1.01
     with pytest.raises(JointLimitError, match=rf"the {limit} of joint 5 would be 1\.010 times its limit"):
-        motion.sample_within_limits(replace(LIMITS, **{limit: less}))
+        motion.require_limits(replace(LIMITS, **{limit: less}))
 
 
 @given(positions, st.floats(0.01, 0.2))

@@ -69,7 +69,7 @@ def fitted(start: JointState, end: JointState, slower: float = 1.6) -> tuple[Tra
 def shortened(program: Transcription, course: DiscreteMotion, times: int = 12) -> DiscreteMotion:
     """What remains of a course after so many steps with nothing in the way."""
     for _ in range(times):
-        found = program.shorten(course, NOTHING, WIDE)
+        found = program.solve_subproblem(course, NOTHING, WIDE)
         assert found is not None
         course = found
     return course
@@ -77,7 +77,7 @@ def shortened(program: Transcription, course: DiscreteMotion, times: int = 12) -
 
 def flown(start: JointState, course: DiscreteMotion, fine: int = FINE) -> JointState:
     """States on a course, by adding up its accelerations, each array of shape `(N, 7)`."""
-    dt = course.step / fine
+    dt = course.step_duration / fine
     q, qd, states = start.q, start.qd, []
     for before, after in zip(course.accelerations.T, course.accelerations.T[1:], strict=False):
         for k in range(fine):
@@ -93,10 +93,10 @@ def flown(start: JointState, course: DiscreteMotion, fine: int = FINE) -> JointS
 @settings(max_examples=20)
 def test_a_course_begins_and_ends_in_the_given_states(move) -> None:
     program, course = fitted(*move)
-    last = program.shorten(course, NOTHING, WIDE)
+    last = program.solve_subproblem(course, NOTHING, WIDE)
     assert last is not None
     # The squares of the step are tangents: what they miss is its change squared.
-    missed = (last.step - course.step) ** 2 * LIMITS.acceleration.max() / last.step
+    missed = (last.step_duration - course.step_duration) ** 2 * LIMITS.acceleration.max() / last.step_duration
     for found, miss in ((course, 0.0), (last, missed)):
         states = flown(move[0], found)
         for values, first in zip(states, move[0], strict=True):
@@ -113,12 +113,12 @@ def test_a_course_keeps_the_limits(move) -> None:
     program, course = fitted(*move)
     for found in (course, shortened(program, course, 6)):
         states = flown(move[0], found)
-        jerk = np.abs(np.diff(found.accelerations, axis=1).T) / found.step
+        jerk = np.abs(np.diff(found.accelerations, axis=1).T) / found.step_duration
         assert np.max(jerk / LIMITS.jerk) <= 1
         assert np.max(np.abs(states.qdd) / LIMITS.acceleration) <= 1
         # Velocities are looked at every half step; between those they may be higher by what jerk makes of it.
         assert np.max(np.abs(states.qd[:: FINE // 2]) / LIMITS.velocity) <= 1
-        bulge = jerk.max(axis=0) * (found.step / 2) ** 2 / 8
+        bulge = jerk.max(axis=0) * (found.step_duration / 2) ** 2 / 8
         assert np.all(np.abs(states.qd) <= LIMITS.velocity + bulge)
 
 
@@ -141,10 +141,10 @@ def test_a_step_meets_what_is_demanded_of_three_positions_together_and_of_its_le
     program, course = fitted(*move)
     rows, weights = np.array([[20, 24, 28], [60, 64, 68]]), np.array([0.2, -0.3, 0.1])
     slopes = np.tile(weights[:, None] * share, (2, 1, 1))
-    lack = 0.2 * growth * course.step
+    lack = 0.2 * growth * course.step_duration
     demand = LinearizedConstraints(np.full(2, -lack), rows, slopes, np.full(2, growth))
     wall = clear_of(np.arange(50, 78), 0.1, share)
-    found = program.shorten(course, [wall, demand], WIDE)
+    found = program.solve_subproblem(course, [wall, demand], WIDE)
     assert found is not None
     moved = np.einsum("rkj,rkj->r", slopes, found.qs[rows] - course.qs[rows])
-    assert np.all(demand.slack + moved + growth * (found.step - course.step) > 0)
+    assert np.all(demand.slack + moved + growth * (found.step_duration - course.step_duration) > 0)

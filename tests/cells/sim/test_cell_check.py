@@ -153,7 +153,7 @@ def test_limits_of_another_number_of_joints_are_a_finding(overhead: CellConfig) 
 @pytest.mark.parametrize(
     ("position", "why"),
     [
-        ((0.6, -0.6, 0.0), "farther than the arm is long (0.82 m)"),
+        ((0.6, -0.6, 0.0), "beyond the reach of the arm (0.82 m)"),
         ((0.24, -0.25, 0.0), "nearer than joint 4 permits (0.41 m)"),
     ],
 )
