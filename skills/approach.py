@@ -85,6 +85,7 @@ class Approach(Skill):
         if contradiction and not is_near_top:
             cell.ledger.record_failed_pick(item)
             raise self.failure("no_contact", f"the top of {item} {expectation}; {contradiction}")
+        yield  # The control step of the contact already has a high computational load.
 
 
 def _proves_absence(goal: Goal, target: Target, object_class: ObjectClass) -> bool:

@@ -23,7 +23,6 @@ class Grasp(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Close the tool, wait, and read the vacuum sensor."""
-        yield  # The control step of the contact has already much to compute.
         cell.tool.close()
         is_sealed = False
         try:

@@ -14,28 +14,30 @@ class Localize(Skill):
 
     The skill uses the camera pose stored with the frame, because the camera may have moved since the capture.
     The ledger assigns each detection to an item. A detection is doubtful if the size of its box does not fit
-    its class, or if the height of its top in the depth image is impossible for its class, both on the table
-    and on another object.
+    its class, or if the depth image shows its top at a height that its class has neither on the table nor on
+    another object.
     """
 
     detections: In[Detections] = port(doc="the detections and their frame")
-    targets: Out[list[Target]] = port(doc="a target per unsorted item with a known position, from any frame")
+    targets: Out[list[Target]] = port(
+        doc="a target per unsorted item whose position is known from this or an earlier frame"
+    )
     reasons = ("stale", "no_depth")
 
     def run(self, cell: Cell) -> Steps:
         """Localize every detection, then update the ledger.
 
-        Localization and update are in different control steps, and the next skill starts after them, because
-        together they would compute longer than a control step.
+        Localization, update and the next skill run in separate control steps, because their total computation
+        time exceeds a control period.
         """
         frame = self.detections.frame
-        if not cell.ledger.is_current(frame):
-            message = f"the robot may have moved objects after frame {frame.id} was captured; look again"
-            raise self.failure("stale", message)
         try:
             observations = cell.localizer.localize(self.detections)
         except NoDepth as error:
             raise self.failure("no_depth", str(error)) from error
         yield
+        if not cell.ledger.is_current(frame):
+            message = f"the robot may have moved objects after frame {frame.id} was captured; look again"
+            raise self.failure("stale", message)
         self.targets = list(cell.ledger.observe(self.detections, observations))
         yield

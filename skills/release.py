@@ -29,7 +29,7 @@ class Release(Skill):
         item, bin = self.held, self.bin
         if cell.ledger.find_held_item() == item:
             yield from release(self, cell, item, self.settle, lambda: cell.ledger.record_placement(item, bin))
-            yield  # The selection of the next target computes long enough to need its own control step.
+            yield  # The next selection of a target needs most of a control period.
         elif cell.ledger.describe(item).state != "placed":
             raise self.failure("dropped", f"{item} is not in the tool any more")
         # A skill that is started again after a halt may find its item already placed.

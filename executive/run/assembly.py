@@ -34,7 +34,7 @@ class RunOptions:
     Attributes:
         seed: Seed of all random numbers.
         requests: Requests of the operator, or None if a person gives requests at the terminal or in a view.
-        has_keyboard: True if a person can type at the terminal.
+        has_keyboard: True if requests of the operator come from standard input.
         gui: True to show the simulated world in a window.
         is_realtime: True to execute the run at the speed of the wall clock.
         make_cell: Factory of the work cell, or None for the kind of cell that the cell file names.

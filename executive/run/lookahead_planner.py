@@ -28,10 +28,9 @@ class LookaheadPlanner:
         self._item_and_bin: tuple[Item, str] | None = None
         """Last selected target and its bin."""
         self._grip_tick: int | None = None
-        """Control step of the command to grip until the transit is planned; else None."""
+        """Control step of the last command to close the tool; None after the plan of the transit."""
         self._change_tick: int | None = None
-        """Control step of the last detections or motion, which may have made the planned approach obsolete;
-        None after the approach is planned."""
+        """Control step of the last detections or motion; None if the approach has been planned since then."""
 
     def on_event(self, timed: TimedEvent) -> None:
         """Update the expected motions from an event of the run."""
@@ -49,8 +48,8 @@ class LookaheadPlanner:
     def plan_next_motion(self, tick: int) -> None:
         """Plan the next motion if the events of the run make it predictable; called after each tick.
 
-        A motion is planned only after the control step `tick` in which it becomes predictable, because skills
-        compute most in the control steps with new detections, a new motion, or a command to the tool.
+        `tick` is the current control step. Nothing is planned in a control step with new detections, a new
+        motion or a command to grip, because such a control step already has a high computational load.
         """
         cell, held_item = self._cell, self._cell.ledger.find_held_item()
         may_hold = self._grip_tick not in (None, tick) and held_item is None

@@ -49,7 +49,7 @@ class TerminalOperator:
     Args:
         emit: Function that emits an event.
         control: Control of the run, which also passes requests from other sources, such as a browser.
-        has_keyboard: True if a person can type at the terminal; otherwise all requests come from `control`.
+        has_keyboard: True if requests come from standard input; otherwise all requests come from `control`.
     """
 
     def __init__(self, emit: Emit, control: RunControl, *, has_keyboard: bool = True) -> None:

@@ -26,7 +26,8 @@ class RunContext:
     Attributes:
         tick: Number of the current control step.
         workcell: Work cell of the run.
-        cell: Cell for skills with recorded inputs; its clock shows the start of the control step.
+        cell: Cell for the skills, which records each value that a skill reads; its clock shows the start of
+            the control step.
         planner: Planner of the probable next motion, or None.
     """
 

@@ -115,9 +115,11 @@ CASES = [(name, after, 1) for name in MISSIONS for after in (1, 333, 700, 1100)]
     *(("sort_overhead", *cut) for cut in WITHIN_A_STEP),
     *(("sort_and_verify", after, 1) for after in (900, 1500, 2100)),
     ("sort_two_halves", 900, 1),
+    # Between the localization and the update of the ledger, and after the update.
+    *(("two_detectors", after, 1) for after in (713, 714)),
     # During a transit with a guard, during a weighing, and during the transit of a weighed object.
-    ("sort_guarded", 638, 1),
-    *(("weigh_and_sort", after, 1) for after in (724, 874)),
+    ("sort_guarded", 700, 1),
+    *(("weigh_and_sort", after, 1) for after in (740, 900)),
 ]
 QUICK = ("sort_overhead", 700, 1)
 

@@ -12,7 +12,7 @@ import pytest
 from executive.cell.arm import Goal
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
-from executive.events import MotionPlanned, TargetSelected, TimedEvent
+from executive.events import FrameSearched, MotionPlanned, TargetSelected, TimedEvent
 from executive.manipulation.tool_goals import sort_pickable_targets
 from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.run_context import RunContext
@@ -167,6 +167,37 @@ def planned(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> list[Goal]:
     return planned
 
 
+def test_the_transit_is_planned_in_the_control_step_after_the_command_to_grip(
+    bench: Bench, planned: list[Goal]
+) -> None:
+    selected = bench.run(SelectTarget(targets=bench.look()))
+    bench.run(Approach(target=selected.target))
+    bench.context.cell.tool.close()
+    bench.context.plan_ahead()
+    assert planned == []
+    bench.context.advance()
+    bench.context.plan_ahead()
+    assert len(planned) == 1
+
+
+def test_a_look_during_a_transit_lets_the_planner_plan_in_the_next_control_step(
+    bench: Bench, planned: list[Goal]
+) -> None:
+    bench.fake.world.put("duck", 0.6, 0.15)
+    targets = bench.look()
+    counts: list[int] = []
+
+    def look_again() -> None:
+        bench.look()
+        bench.context.emit(FrameSearched(9, "overhead", "embedded", "table", [], [], []))
+        counts.append(len(planned))
+        bench.context.plan_ahead()
+        counts.append(len(planned))
+
+    bench.carry(targets[:1], meanwhile=look_again)
+    assert counts[0] == counts[1] < len(planned)
+
+
 def test_while_the_arm_does_not_carry_into_a_bin_no_approach_is_planned(
     bench: Bench, planned: list[Goal]
 ) -> None:
@@ -201,6 +232,7 @@ def test_nothing_is_planned_without_a_planner(bench: Bench) -> None:
     selected = bench.run(SelectTarget(targets=bench.look()))
     bench.run(Approach(target=selected.target))
     bench.context.cell.tool.close()
+    bench.context.advance()
     planner, bench.context.planner = bench.context.planner, None
     bench.context.plan_ahead()
     bench.context.planner = planner

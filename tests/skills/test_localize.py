@@ -10,6 +10,7 @@ from executive.cell.frame import Frame
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.errors import NoDepth
+from executive.skill import SkillFailed
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
 from skills.localize import Localize
@@ -34,6 +35,26 @@ def test_a_frame_from_before_a_missed_grasp_is_stale(fake: FakeCell, look) -> No
         "stale",
         "the robot may have moved objects after frame 2 was captured; look again",
     )
+
+
+def test_objects_that_move_between_localization_and_update_make_the_frame_stale(fake: FakeCell) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    skill = Localize(detections=run_skill(Detect(), fake).outputs["detections"])
+    steps = skill.run(fake.cell)
+    next(steps)
+    assert fake.ledger.find_targets() == [], "the update is in the next control step"
+    fake.ledger.invalidate_positions()
+    with pytest.raises(SkillFailed, match="the robot may have moved objects after frame 1"):
+        next(steps)
+    assert fake.ledger.find_targets() == []
+
+
+def test_a_halt_after_the_update_counts_the_look_once(fake: FakeCell) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    skill = Localize(detections=run_skill(Detect(), fake).outputs["detections"])
+    assert run_skill(skill, fake, halt_at=2).status == "HALTED"
+    assert run_skill(skill, fake).ticks == 2
+    assert [change.looks for change in fake.ledger.list_items()] == [1]
 
 
 def test_a_frame_stays_good_after_a_pick_elsewhere(fake: FakeCell, look) -> None:
