@@ -73,7 +73,7 @@ class Detection:
 
 @dataclass(frozen=True)
 class Answer:
-    """Result of a detector for one frame: its detections, divided by their certainty.
+    """Result of a detector for one frame: its detections, grouped by certainty.
 
     A detector puts all detections into `confident`. Before a skill reads the answer, the function
     `executive.perception.detectors.screening.screen_answer` moves detections to `doubtful` and `unknown`.
@@ -94,11 +94,12 @@ class Answer:
     unknown: tuple[Detection, ...] = ()
 
     def describe_doubt(self, detection: Detection) -> str:
-        """Return the message for an answer whose best detection, `detection`, is doubtful."""
+        """Return the message that no detection is confident; `detection` is the best doubtful detection."""
         confidence, threshold = detection.confidence, self.error_rates.threshold
         is_low = confidence < threshold
-        doubt = f"< {threshold:.2f}" if is_low else f"with another class at {detection.second_confidence:.2f}"
-        best_object = f"a {detection.label} at {confidence:.2f} {doubt}"
+        second = f"and {detection.second_confidence:.2f} for another class"
+        doubt = f"below the threshold {threshold:.2f}" if is_low else second
+        best_object = f"a {detection.label} with confidence {confidence:.2f}, {doubt}"
         return f"detector {self.detector} found nothing certain: at best {best_object}"
 
 

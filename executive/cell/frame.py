@@ -14,7 +14,7 @@ Box = tuple[float, float, float, float]
 """Left, top, right and bottom side [pixel] of a box in an image; pixel i covers [i, i + 1)."""
 
 TYPICAL_OBJECT_POINTS = 0.03 * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
-"""Centre of a typical object and four points of its outline, relative to the centre `(5, 3)` [m]."""
+"""Points `(5, 3)` [m] of a typical object relative to its centre: the centre and four outline points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,10 @@ class Frame:
         return np.asarray(is_in_front & is_inside_x & is_inside_y)
 
     def compute_unoccluded_mask(self, points: Array) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the world points `(N, 3)` [m] where the arm hides no part of an object."""
+        """Return a mask `(N,)` of the points `(N, 3)` [m] where the arm would hide no part of an object.
+
+        A typical object is assumed at each point. A point outside the image counts as the nearest pixel.
+        """
         mask = np.ones(len(points), dtype=bool)
         height, width = self.visible.shape
         for offset in TYPICAL_OBJECT_POINTS:
@@ -103,7 +106,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class FrameCaptured(Event):
-    """A frame was captured; the journal omits this event with its image.
+    """A frame was captured. The journal does not contain this event, because the image is too large.
 
     Attributes:
         frame: The frame with its image.

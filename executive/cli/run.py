@@ -161,6 +161,6 @@ def _make_terminal_view(has_keyboard: bool) -> LineView | TerminalView:
         from executive.view.terminal.screen import TerminalView
 
         console = Console(file=open_unescaped_stderr())
-        if not console.is_dumb_terminal:
+        if console.is_terminal and not console.is_dumb_terminal:
             return TerminalView(console, sys.stdin.fileno() if has_keyboard else None)
     return LineView(sys.stderr)

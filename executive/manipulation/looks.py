@@ -33,7 +33,7 @@ class LookingSkill(Skill):
         """
         frame = cell.camera.capture()
         request = cell.detectors[self.detector or next(iter(cell.detectors))].request(frame, self.view)
-        # The detector works meanwhile.
+        # The detector searches the frame during this check.
         if displacement := cell.camera.describe_displacement(frame):
             raise self.failure("camera_moved", displacement)
         while not request.ready:

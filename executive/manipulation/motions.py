@@ -13,7 +13,7 @@ from executive.manipulation.obstacles import list_obstacles
 from executive.skill import Skill, SkillFailed
 
 MAX_PLANNING_ATTEMPTS = 3
-"""Maximum number of planning attempts for one motion; a look during an attempt may change goal or task."""
+"""Maximum number of planning attempts for one motion; an update of the ledger may change goal or task."""
 
 
 def wait_for_rest(arm: Arm) -> Steps:
@@ -37,7 +37,7 @@ def plan(
     Raises:
         SkillFailed: No motion was found; the reason is `unreachable` or `blocked`.
     """
-    yield  # The control step in which the skill starts has already much to compute.
+    yield  # The first control step of a skill already has a high computational load.
     yield from wait_for_rest(arm)
     for _ in range(MAX_PLANNING_ATTEMPTS):
         goal, task = find_goal_and_task()

@@ -49,9 +49,11 @@ def test_only_what_is_sure_is_found(
 @pytest.mark.parametrize(
     ("answer", "reason", "message"),
     [
-        ([WEAK], "unsure", "detector embedded found nothing certain: at best a duck at 0.40 < 0.50"),
+        ([WEAK], "unsure", "detector embedded found nothing certain: at best a duck with confidence "
+         "0.40, below the threshold 0.50"),
         ([TORN], "unsure",
-         "detector embedded found nothing certain: at best a cube at 0.62 with another class at 0.58"),
+         "detector embedded found nothing certain: at best a cube with confidence "
+         "0.62, and 0.58 for another class"),
         ("no answer within 1.0 s", "unavailable", "detector embedded: no answer within 1.0 s"),
         *(
             ([Detection("duck", 0.9, box)], "unavailable",

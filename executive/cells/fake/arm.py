@@ -96,7 +96,7 @@ class FakeArm:
         self._joint_count = config.arm.joint_count
         self._obstacles = FakeObstacles(config)
         worker = ImmediateExecutor()
-        self._plans = PlanFactory(self._plan_motion, worker, clock, config.motion.planning_time, emit)
+        self._factory = PlanFactory(self._plan_motion, worker, clock, config.motion.planning_time, emit)
         self._path: list[Pose] = []
         self._half_pose_count = 0
 
@@ -129,11 +129,11 @@ class FakeArm:
         The plan raises Unreachable for a goal beyond `MAX_REACH` from the base, and Blocked if the tool tip
         or the load would enter the table or a bin, even on the guarded part of the motion.
         """
-        return self._plans.plan(self.destination, goal, task)
+        return self._factory.plan(self.destination, goal, task)
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
         """Plan the next motion, from the end of the running motion, before `plan` requests it."""
-        self._plans.plan_ahead(self.destination, goal, task)
+        self._factory.plan_ahead(self.destination, goal, task)
 
     def start(self, motion: Motion) -> None:
         """Begin to follow a motion.

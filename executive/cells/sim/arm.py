@@ -45,7 +45,7 @@ class SimArm:
         clock: Clock of the run.
         get_held_body: Returns the held body, or None; contacts of this body count as contacts of the arm.
         emit: Receives the events of the arm.
-        rebuilder: Rebuilder of the world of an interrupted run, whose motion the arm brakes; None: new run.
+        rebuilder: Rebuilder of the world of an interrupted run; the arm brakes on its motion. None: new run.
 
     Attributes:
         planner: Motion planner of the arm.
@@ -67,7 +67,7 @@ class SimArm:
         self._world = world
         self._poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
         self._worker = ThreadPoolExecutor(1, "planner")
-        self._plans = PlanFactory(self._plan_motion, self._worker, clock, config.motion.planning_time, emit)
+        self._factory = PlanFactory(self._plan_motion, self._worker, clock, config.motion.planning_time, emit)
         self._contact_monitor = ContactMonitor(world, get_held_body)
         self._motion: Trajectory | None = None
         self._motion_time = 0.0
@@ -112,7 +112,7 @@ class SimArm:
         Raises:
             Fault: The arm has left its commanded path since the last call.
         """
-        self._raise_fault()
+        self._raise_stored_fault()
         return self._motion is None
 
     def describe_unreachable(self, goal: Goal) -> str:
@@ -127,7 +127,7 @@ class SimArm:
         """
         self._require_rest("plan a motion")
         self._require_pose(goal)
-        return self._plans.plan(self._commanded_q, goal, task)
+        return self._factory.plan(self._commanded_q, goal, task)
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
         """Plan the next motion, from the end of the running motion, before `plan` requests it.
@@ -137,7 +137,7 @@ class SimArm:
         """
         self._require_pose(goal)
         if self._braking_times is None:  # a braking arm does not reach the end of the motion
-            self._plans.plan_ahead(self._end_q, goal, task)
+            self._factory.plan_ahead(self._end_q, goal, task)
 
     def start(self, motion: Motion) -> None:
         """Begin to follow a motion. The arm must be at rest at the start of the motion.
@@ -149,8 +149,8 @@ class SimArm:
         reject_generator(motion)
         if not isinstance(motion, Trajectory):
             raise Fault(f"the simulated arm follows its own planned motions, not a {type(motion).__name__}")
-        self._check_positions(motion.start, START_TOLERANCE, "the start of the motion")
-        self._raise_fault()
+        self._store_position_error(motion.start, START_TOLERANCE, "the start of the motion")
+        self._raise_stored_fault()
         self._motion, self._motion_time, self.collision = motion, 0.0, None
         self._contact_monitor.reset()
         self._world.log.append_motion(motion)
@@ -168,7 +168,7 @@ class SimArm:
             self.stop()
 
     def close(self) -> None:
-        """End the thread that plans motions after the running plan; cancel plans that have not started."""
+        """Cancel the plans that have not started, wait for the running plan, and end the planning thread."""
         self._worker.shutdown(cancel_futures=True)
 
     def send_command(self) -> None:
@@ -178,7 +178,7 @@ class SimArm:
     def advance(self) -> None:
         """Check for disturbances and collisions, and send the command for the next physics step."""
         if self._fault_message is None and self._braking_times is None:
-            self._check_positions(self._commanded_q, TRACKING_TOLERANCE, "the command")
+            self._store_position_error(self._commanded_q, TRACKING_TOLERANCE, "the command")
             if self._fault_message is not None:
                 self.stop()
         if self._motion is None:
@@ -212,7 +212,7 @@ class SimArm:
         if isinstance(goal, str) and goal not in self._poses:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
 
-    def _check_positions(self, q: Array, tolerance: float, description: str) -> None:
+    def _store_position_error(self, q: Array, tolerance: float, description: str) -> None:
         """Store a fault message with `description` if a joint is over `tolerance` [rad] away from `q`."""
         errors = np.abs(self.q - q).tolist()
         joint = errors.index(max(errors))
@@ -223,12 +223,12 @@ class SimArm:
             )
 
     def _require_rest(self, action: str) -> None:
-        self._raise_fault()
+        self._raise_stored_fault()
         if self._motion is not None:
             remaining = self._motion.duration - self._motion_time
             raise Fault(f"the arm cannot {action} while moving ({remaining:.2f} s to go); wait for `at_rest`")
 
-    def _raise_fault(self) -> None:
+    def _raise_stored_fault(self) -> None:
         """Raise and clear the stored fault, if any."""
         if self._fault_message is not None:
             message, self._fault_message = self._fault_message, None

@@ -20,8 +20,8 @@ TOUCH_DISTANCE = 0.001
 LIP_LENGTH = 0.002
 """Length of the lip at the end of the tool [m]. Contacts above the lip touch the shaft, and do not count."""
 PULL_SMOOTHING = 0.25
-"""Weight of the newest step in the low-pass filter of the pull on the seal: the time constant is 3.5 steps
-or 14 ms, because a seal breaks within milliseconds, but impact forces of the solver last a single step."""
+"""Weight of the newest step in the low-pass filter of the pull on the seal. The time constant of 14 ms (3.5
+steps) suppresses impact forces of the solver, which last a single step, and is short enough for a seal."""
 
 
 @dataclass
