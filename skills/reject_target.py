@@ -6,6 +6,9 @@ from executive.cell.objects import Item
 from executive.cell.protocols import Cell
 from executive.skill import In, Skill, param, port
 
+MIN_DROPS_OF_HEAVY_OBJECT = 3
+"""Number of drops from which the report calls an object too heavy or slippery."""
+
 
 class RejectTarget(Skill):
     """Reject an item: the robot leaves the item at its position, and the report lists it.
@@ -19,7 +22,10 @@ class RejectTarget(Skill):
 
     def run(self, cell: Cell) -> None:
         """Reject the item in the ledger."""
-        failures = cell.ledger.describe(self.item).attempts
-        if failures >= self.after:
-            reason = f"{self.why} ({failures} failed attempts)" if failures else self.why
-            cell.ledger.reject(self.item, reason)
+        known = cell.ledger.describe(self.item)
+        if known.attempts < self.after:
+            return
+        reason = f"{self.why} ({known.attempts} failed attempts)" if known.attempts else self.why
+        if known.drops >= MIN_DROPS_OF_HEAVY_OBJECT:
+            reason += f"; too heavy for the tool, or slippery: the tool dropped it {known.drops} times"
+        cell.ledger.reject(self.item, reason)

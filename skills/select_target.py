@@ -30,7 +30,8 @@ class SelectTarget(Skill):
     * `surest` prefers the target with the highest confidence of the last detection.
     * `least_tried` prefers the fewest failed attempts and, of several such targets, the nearest.
     * With `among`, the skill fails with `no_candidate` as soon as none of these items is open or lost.
-    * With `same`, the skill fails with `no_candidate` if the item is held, placed, rejected or skipped.
+    * With `same`, the skill fails with `no_candidate` if the item is held, placed, rejected or skipped, or
+      after `attempts` failed attempts to pick it.
     """
 
     targets: In[list[Target]] = port(doc="the known targets")
@@ -46,10 +47,13 @@ class SelectTarget(Skill):
         choices=("shortest_tour", "nearest", "surest", "least_tried"),
         doc="the first of the `shortest_tour`, the `nearest`, the `surest` or the `least_tried` target",
     )
+    attempts: int = param(100, ge=1, doc="number of failed attempts after which `same` is no candidate")
     reasons = ("no_candidate", "unseen", "doubtful")
 
     def run(self, cell: Cell) -> None:
         """Select the first candidate in the preferred order."""
+        if self.same and (count := cell.ledger.describe(self.same).attempts) >= self.attempts:
+            raise self.failure("no_candidate", f"{count} attempts to pick {self.same} failed")
         pickable_targets = sort_pickable_targets(cell, self.targets)
         candidates = [target for target in pickable_targets if self._is_requested(cell, target.item)]
         if not candidates:

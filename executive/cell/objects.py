@@ -59,6 +59,7 @@ class KnownItem:
         bin: Name of the bin that contains the item, or "".
         position: Last known position of the centre `(3,)` [m] in the world.
         attempts: Number of failed attempts to pick the item.
+        drops: Number of times that the tool dropped the item.
         deferrals: Number of times that the item was deferred.
         deferral_rank: Rank among the deferred items, in the order of deferral; 0 if the item is not deferred.
     """
@@ -69,6 +70,7 @@ class KnownItem:
     bin: BinName
     position: Array
     attempts: int
+    drops: int
     deferrals: int
     deferral_rank: int
 

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from executive.cell.config import LedgerConfig
 from executive.cell.detection import Observation
+from executive.ledger.certainty import MIN_EXISTENCE_PROBABILITY, Certainty
 from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, ItemRecord, State
 from executive.ledger.staleness import Staleness
 
@@ -24,8 +24,6 @@ MAX_PUSH_DISTANCE = 0.12
 """Maximum distance by which a person may push an item that still counts as the same item [m]."""
 MAX_MISS_PROBABILITY_OF_MOVED_ITEM = 0.05
 """Maximum probability, for a moved item, that all images since its last detection missed it by chance."""
-MIN_EXISTENCE_PROBABILITY = 0.9
-"""Minimum probability of existence of an item that is picked, or matched to a moved item."""
 
 
 def associate(
@@ -76,21 +74,25 @@ def may_show_item(observation: Observation, record: ItemRecord, gate: float) -> 
 
 
 def find_moved_item(
-    new_item: ItemRecord, records: Iterable[ItemRecord], staleness: Staleness, config: LedgerConfig
+    new_item: ItemRecord, records: Iterable[ItemRecord], staleness: Staleness, certainty: Certainty
 ) -> ItemRecord | None:
-    """Return the nearest item that may have been dropped or moved to the position of a new item, or None.
+    """Return the item that may have been dropped or moved to the position of a new item, or None.
 
-    The class of the new item must be certain, because another object may have fallen to the position.
+    An item that the tool dropped must be somewhere, and comes first; then the nearest item. For other items,
+    the class of the new item must be certain, because another object may have been moved to the position.
     """
     if (
         new_item.state is not State.SEEN
         or new_item.failed_pick_count
         or new_item.belief.existence_probability < MIN_EXISTENCE_PROBABILITY
-        or new_item.belief.class_error > config.max_class_error
     ):
         return None
-    candidates = [item for item in records if _may_be_same_object(item, new_item, staleness, config)]
-    return min(candidates, key=lambda item: _compute_horizontal_distance(item, new_item), default=None)
+    candidates = [item for item in records if _may_be_same_object(item, new_item, staleness, certainty)]
+
+    def make_sort_key(item: ItemRecord) -> tuple[bool, float]:
+        return item.state is not State.DROPPED, _compute_horizontal_distance(item, new_item)
+
+    return min(candidates, key=make_sort_key, default=None)
 
 
 def find_duplicate(record: ItemRecord, records: Iterable[ItemRecord], gate: float) -> ItemRecord | None:
@@ -100,7 +102,7 @@ def find_duplicate(record: ItemRecord, records: Iterable[ItemRecord], gate: floa
 
 
 def _may_be_same_object(
-    old_item: ItemRecord, new_item: ItemRecord, staleness: Staleness, config: LedgerConfig
+    old_item: ItemRecord, new_item: ItemRecord, staleness: Staleness, certainty: Certainty
 ) -> bool:
     """Return True if a new item may be the same object as an old item that recent images no longer show.
 
@@ -110,16 +112,18 @@ def _may_be_same_object(
     """
     if old_item is new_item or old_item.detected_label != new_item.detected_label:
         return False
-    if old_item.state is State.DROPPED and old_item.was_taken_away:
-        return new_item.was_place_searched and new_item.first_stamp > old_item.stamp
-    if old_item.state is State.DROPPED:
+    if old_item.state is State.DROPPED and not old_item.was_taken_away:
         return new_item.first_change_count > old_item.change_count
+    if not certainty.is_class_certain(new_item):
+        return False
+    if old_item.state is State.DROPPED:
+        return new_item.was_place_searched and new_item.first_stamp > old_item.stamp
     change_number = staleness.find_change_number(old_item.position, old_item.change_count)
     may_be_moved_by_robot = change_number is not None and new_item.first_change_count >= change_number
     may_be_moved_by_person = (
         _compute_horizontal_distance(old_item, new_item) <= MAX_PUSH_DISTANCE
         and new_item.first_stamp > old_item.stamp
-        and old_item.belief.miss_probability <= config.max_miss_probability
+        and certainty.is_position_empty(old_item)
     )
     is_pushed_phantom = (
         old_item.state is State.PHANTOM

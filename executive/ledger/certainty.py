@@ -10,9 +10,10 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from executive.cell.config import LedgerConfig
-from executive.ledger.association import MIN_EXISTENCE_PROBABILITY
 from executive.ledger.item import REASON_UNCERTAIN, ItemRecord, State
 
+MIN_EXISTENCE_PROBABILITY = 0.9
+"""Minimum probability of existence of an item that is picked, or matched to a moved item."""
 MIN_P_VALUE = 0.01
 """Minimum p-value of the class-consistency test (`Belief.confusion_p_value`) of an item that is sorted."""
 MAX_P_VALUE_TO_REJECT = 0.001
@@ -48,23 +49,32 @@ class Certainty:
     def is_certain(self, record: ItemRecord) -> bool:
         """Return True if an item's existence, class and position are certain enough to touch the item.
 
-        After a failed grasp, the position must be known more precisely. A larger class error is permitted if
-        further looks from the same viewpoint cannot prove the class, but the height of a touch can.
+        After a failed grasp, the position must be known more precisely.
         """
-        belief, max_class_error = record.belief, self.config.max_class_error
-        is_saturated = belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
-        if is_saturated and record.label in self.labels_with_unique_height:
-            max_class_error = MAX_CLASS_ERROR_FOR_TOUCH
+        belief = record.belief
         error_factor = RETRY_STANDARD_ERROR_FACTOR if record.failed_pick_count else 1.0
         return (
             belief.existence_probability >= MIN_EXISTENCE_PROBABILITY
             and record.contradiction_count <= belief.look_count
             and belief.miss_probability >= MIN_MISS_PROBABILITY_OF_PICK
-            and belief.class_error <= max_class_error
+            and self.is_class_certain(record)
             and belief.confusion_p_value >= MIN_P_VALUE
             and math.hypot(record.standard_error, record.bias_std)
             <= error_factor * self.config.max_position_std
         )
+
+    def is_class_certain(self, record: ItemRecord) -> bool:
+        """Return True if an item's class is certain enough to touch the item.
+
+        A larger class error is permitted if further looks from the same viewpoint cannot prove the class, but
+        the height of a touch can.
+        """
+        is_saturated = record.belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
+        has_unique_height = record.label in self.labels_with_unique_height
+        max_error = self.config.max_class_error
+        if is_saturated and has_unique_height:
+            max_error = MAX_CLASS_ERROR_FOR_TOUCH
+        return record.belief.class_error <= max_error
 
     def may_be_on_table(self, record: ItemRecord) -> bool:
         """Return True if an item in the state SEEN may still lie on the table."""

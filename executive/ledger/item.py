@@ -79,6 +79,7 @@ class ItemRecord:
         bin: Name of the bin that contains the item, or "".
         reason: Reason of the state, or "".
         failed_pick_count: Number of failed attempts to pick the item.
+        drop_count: Number of times that the tool dropped the item.
         empty_probe_count: Number of descents that found only the table, since the item was moved or touched.
         had_contact: True if the tool has touched the item at any height.
         touched_label: Class whose height the last touch confirmed, or "".
@@ -114,6 +115,7 @@ class ItemRecord:
     bin: str = ""
     reason: str = ""
     failed_pick_count: int = 0
+    drop_count: int = 0
     empty_probe_count: int = 0
     had_contact: bool = False
     touched_label: str = ""
@@ -166,7 +168,7 @@ class ItemRecord:
             state = State.SKIPPED.value if is_skipped else "deferred" if self.deferral_rank else "open"
         return KnownItem(
             self.item, self.label, state, self.bin, self.position, self.failed_pick_count,
-            self.deferral_count, self.deferral_rank,
+            self.drop_count, self.deferral_count, self.deferral_rank,
         )  # fmt: skip
 
     def distance_to(self, position: Array) -> float:
@@ -224,10 +226,22 @@ class ItemRecord:
         self.bias_std, self.confidence = bias_std, observation.detection.confidence
         self.change_count, self.frame_id, self.stamp = frame.change_count, frame.id, frame.stamp
 
-    def merge(self, new_item: ItemRecord) -> None:
-        """Add the evidence and the position of `new_item`, which is the same object after a move."""
-        self.belief.merge(new_item.belief)
-        self.empty_probe_count, self.was_taken_away = 0, False
+    def merge(self, new_item: ItemRecord, max_class_error: float) -> None:
+        """Add the evidence and the position of `new_item`, which is the same object after a move.
+
+        If the class error of `new_item` is above `max_class_error`, only its own looks count for the class,
+        because another object may have moved to its position; the failed attempts stay counted.
+        """
+        if new_item.belief.class_error <= max_class_error:
+            self.belief.merge(new_item.belief)
+        else:
+            is_confirmed = self.belief.is_confirmed
+            self.belief = new_item.belief
+            self.belief.is_confirmed |= is_confirmed
+            self.touched_label = ""
+            self.low_touch_count = 0
+        self.empty_probe_count = 0
+        self.was_taken_away = False
         # `first_position` stays the position before the move.
         self.position, self.standard_error = new_item.position, new_item.standard_error
         self.was_detected_after_move = True

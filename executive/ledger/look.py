@@ -16,6 +16,7 @@ from executive.events import DetectedObject, FrameSearched
 from executive.geometry import Array
 from executive.ledger.association import associate, find_duplicate, find_moved_item, may_show_item
 from executive.ledger.belief import ITEM_AREA_FRACTION, Belief, make_viewpoint_key
+from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, State
 from executive.ledger.records import ItemRecords
@@ -47,18 +48,23 @@ class LookUpdate:
     """Update of all items with one look; `apply` executes the update.
 
     Attributes:
-        config: Thresholds of the ledger, from the cell file.
+        certainty: Decisions about items, with the thresholds of the ledger.
         records: All items; `apply` adds new items.
         coverage: Miss probabilities of the grid points on the table; `apply` updates them.
         staleness: Actions of the robot that may have moved objects on the table.
         look: Detections in the image of the look.
     """
 
-    config: LedgerConfig
+    certainty: Certainty
     records: ItemRecords
     coverage: Coverage
     staleness: Staleness
     look: Detections
+
+    @property
+    def config(self) -> LedgerConfig:
+        """Thresholds of the ledger, from the cell file."""
+        return self.certainty.config
 
     def apply(self, observations: Sequence[Observation]) -> list[ItemRecord]:
         """Update the items with the observations on the table, and return the changed items.
@@ -92,10 +98,15 @@ class LookUpdate:
         candidates = [item for item in known_items if item.belief.is_probable or staleness.is_unmoved(item)]
         matches = associate(observations, candidates, staleness, self.config.gate)
         unmatched_items = [record for record in candidates if record not in matches.values()]
+        moved_items = [item for item in unmatched_items if not staleness.is_unmoved(item)]
+        moved_items += self.records.filter_by_state(State.DROPPED)
         detected_items = []
         for observation in observations:
-            # Prior odds: expected number of missed objects divided by expected number of false detections.
-            prior_odds = self._compute_expected_count(observation) / rates.false_detections
+            # Prior odds: expected number of missed objects divided by expected number of false detections. An
+            # item that the robot has moved must be somewhere.
+            expected_count = self._compute_expected_count(observation)
+            expected_count += sum(item.detected_label == observation.detection.label for item in moved_items)
+            prior_odds = expected_count / rates.false_detections
             record = matches.get(observation) or self._add_item(observation, prior_odds)
             if record.reason.startswith(REASON_UNCERTAIN) and not record.failed_pick_count:
                 record.set_state(State.SEEN, "")
@@ -161,8 +172,8 @@ class LookUpdate:
         """
         phantoms = []
         for index, new_item in enumerate(detected_items):
-            if known_item := find_moved_item(new_item, self.records, self.staleness, self.config):
-                known_item.merge(new_item)
+            if known_item := find_moved_item(new_item, self.records, self.staleness, self.certainty):
+                known_item.merge(new_item, self.config.max_class_error)
                 detected_items[index] = known_item
                 if new_item.first_stamp == new_item.stamp:
                     self.records.remove(new_item)

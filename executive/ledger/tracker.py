@@ -163,6 +163,7 @@ class Tracker(LedgerQueries):
         self._records.change_state(record, State.DROPPED)
         self._bin_contents.set_prior_log_odds(record, landing)
         record.failed_pick_count += 1
+        record.drop_count += 1
         record.change_count = self.change_count
         self.invalidate_positions()
 
@@ -258,7 +259,7 @@ class Tracker(LedgerQueries):
         bias_std = detections.error_rates.bias
         bin_names = {entry: self._bin_contents.find_bin_name(entry, bias_std) for entry in observations}
         observations_on_table = [entry for entry, bin_name in bin_names.items() if bin_name is None]
-        update = LookUpdate(self.config, self._records, self._coverage, self._staleness, detections)
+        update = LookUpdate(self._certainty, self._records, self._coverage, self._staleness, detections)
         for record in update.apply(observations_on_table):
             self._certainty.reject_if_uncertain(record, is_unmoved=self._staleness.is_unmoved(record))
             self._records.emit(record)

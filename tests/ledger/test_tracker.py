@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from ledger_bench import Bench, Thing
 
-from executive.cell.detection import ErrorRates
+from executive.cell.detection import ErrorRates, assume_rates
 from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.events import DetectedObject, FrameSearched, ItemChanged
@@ -265,6 +267,28 @@ def test_one_slip_about_the_class_costs_some_looks_and_no_more(bench: Bench) -> 
         sure.append(bench.ledger.is_certain("duck-1"))
     assert bench.ledger.get_label("duck-1") == "cube"
     assert sure == [False, True, True, True, True, True]
+
+
+UNMEASURED = replace(assume_rates(0.5, "never measured"), repeated=0.0)
+
+
+def test_a_dropped_item_keeps_its_identity_before_looks_prove_its_class_again(bench: Bench) -> None:
+    for attempts in range(1, 4):
+        for _ in range(4):
+            bench.look(CUBE, by=UNMEASURED)
+        bench.drop("cube-1")
+        bench.look(CUBE, by=UNMEASURED)
+        known = bench.ledger.describe("cube-1")
+        assert (known.state, known.attempts, known.drops) == ("open", attempts, attempts)
+        assert not bench.ledger.is_certain("cube-1"), "another object may lie there"
+    assert bench.ledger.count_states()["seen"] == 1
+
+
+def test_a_dropped_item_is_found_beside_the_workspace_in_one_look(bench: Bench) -> None:
+    bench.look(CUBE, view="full")
+    bench.drop("cube-1")
+    bench.look(("cube", 0.70, 0.2), view="full")
+    assert bench.ledger.describe("cube-1").position[:2] == pytest.approx([0.70, 0.2])
 
 
 def test_a_misread_object_is_nobody_who_is_missed_before_its_class_is_sure(bench: Bench) -> None:

@@ -14,7 +14,7 @@ from skills.approach import Approach
 from skills.grasp import Grasp
 from skills.move_to_scan import MoveToScan
 from skills.put_down import PutDown
-from skills.reject_target import RejectTarget
+from skills.reject_target import MIN_DROPS_OF_HEAVY_OBJECT, RejectTarget
 from skills.release import Release
 from skills.transit import Transit
 
@@ -182,6 +182,16 @@ def test_an_item_is_given_up_with_its_reason_after_the_failures_the_mission_gran
         run_skill(RejectTarget(item="cube-1", after=2), fake)
         assert fake.ledger.describe("cube-1").state == state, failures
     assert fake.ledger.list_items()[0].reason == "could not be picked (2 failed attempts)"
+
+
+def test_the_reason_of_an_item_that_the_tool_drops_again_and_again_is_its_weight(
+    fake: FakeCell, target: Target
+) -> None:
+    for _ in range(MIN_DROPS_OF_HEAVY_OBJECT):
+        fake.ledger.record_grasp("cube-1")
+        fake.ledger.record_drop("cube-1")
+    run_skill(RejectTarget(item="cube-1"), fake)
+    assert "too heavy" in fake.ledger.list_items()[0].reason
 
 
 def test_move_to_scan_goes_to_the_cameras_first_pose_only_if_the_table_is_out_of_view(fake: FakeCell) -> None:

@@ -1,0 +1,163 @@
+"""Shipped missions under random faults of objects, tool and detector: each run ends after few picks.
+
+A run has random parts (heavy, slippery, unsealable) and a detector with random misses, wrong classes and
+false detections; the ledger assumes high error rates, or believes the rates of the cell file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections import Counter
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from executive.cell.detection import Answer
+from executive.errors import Fault
+from executive.plugins import load_cell_kind
+from executive.testing.faults import ScheduledFault, after, tool_does_not_release, with_probability
+from executive.testing.faults.detector_faults import make_detector_effect
+from executive.testing.faults.effect import Effect, Occurrence
+from executive.testing.faults.object_faults import MAX_TOOL_DISTANCE
+from executive.testing.run_mission import MissionResult, run_mission
+
+ATTEMPTS = {
+    "sort_overhead": 6, "sort_wrist": 6, "sort_stacked": 6, "weigh_and_sort": 6, "sort_with_second_chance": 4,
+    "sort_fasteners": 6, "sort_by_priority": 6, "sort_and_verify": 6, "two_detectors": 6,
+}  # fmt: skip
+"""Missions, and the number of failed attempts after which each rejects an object."""
+ASSUMED_RATES = {
+    "miss_rate": 0.15,
+    "confusion_rate": 0.05,
+    "false_detections": 0.2,
+    "jitter": 2.0,
+    "repeated": 0.8,
+}
+"""Rates that runs assume for a detector that was never measured."""
+TIMEOUT = 900.0
+"""Longest time of a run on its clock [s]."""
+
+
+@dataclass
+class Parts:
+    """Random properties of the objects by their number, and the number of picks of each object.
+
+    Attributes:
+        heavy: Objects that fall as soon as they are lifted.
+        slippery: Objects that fall during a transport with the probability 0.5.
+        unsealable: Objects on which the tool never closes.
+        rng: Random generator of the slips.
+        pick_counts: Number of times that the tool closed on each object.
+    """
+
+    heavy: set[int]
+    slippery: set[int]
+    unsealable: set[int]
+    rng: np.random.Generator
+    pick_counts: Counter[int]
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator) -> Parts:
+        """Return random properties of up to 20 objects."""
+        kinds = rng.choice(["", "", "heavy", "slippery", "unsealable"], 20)
+        numbers = {kind: set(np.flatnonzero(kinds == kind)) for kind in ("heavy", "slippery", "unsealable")}
+        return cls(**numbers, rng=rng, pick_counts=Counter())
+
+    def close(self, proceed: Callable[[], None], occurrence: Occurrence) -> None:
+        """Close the tool and count the pick, unless the touched object cannot be sealed."""
+        tool = occurrence.context.cell.arm.tool_pose.position
+        objects = occurrence.context.world.objects
+        distances = [math.dist(one.position[:2], tool[:2]) for one in objects]
+        number = int(np.argmin(distances)) if distances else -1
+        if distances and distances[number] <= MAX_TOOL_DISTANCE:
+            self.pick_counts[number] += 1
+            if number in self.unsealable:
+                return
+        proceed()
+
+    def drop(self, occurrence: Occurrence) -> bool:
+        """Drop a heavy object after the start of a motion, and a slippery one at a random moment."""
+        context = occurrence.context
+        if (held := context.world.held_object) is None or context.motion_progress < 0.05:
+            return False
+        number = next(index for index, one in enumerate(context.world.objects) if one.body == held.body)
+        if number in self.heavy or (number in self.slippery and self.rng.random() < 0.01):
+            context.world.break_seal()
+        return False
+
+
+def make_errors(rng: np.random.Generator, labels: Sequence[str]) -> Callable[[Answer], Answer]:
+    """Return a change of answers: misses, wrong classes and false detections with random rates."""
+    miss_rate, confusion_rate, false_rate = rng.uniform(0, (0.3, 0.1, 0.2))
+
+    def change(answer: Answer) -> Answer:
+        found = [one for one in answer.confident if rng.random() >= miss_rate]
+        labels_found = [
+            str(rng.choice(labels)) if rng.random() < confusion_rate else one.label for one in found
+        ]
+        found = [replace(one, label=label) for one, label in zip(found, labels_found, strict=True)]
+        if found and rng.random() < false_rate:
+            left, top = rng.uniform((200, 110), (420, 330))
+            found.append(replace(found[0], box=(left, top, left + 26.0, top + 26.0)))
+        return replace(answer, confident=tuple(found))
+
+    return change
+
+
+def run_with_faults(seed: int, kind: str) -> tuple[str, int, MissionResult, Parts]:
+    """Run the mission of a seed; return its name, its number of attempts, the result and the parts."""
+    rng = np.random.default_rng([seed, 43])
+    mission = list(ATTEMPTS)[seed % len(ATTEMPTS)]
+    parts = Parts.draw(rng)
+    labels = ("bolt", "nut", "washer") if "fasteners" in mission else ("cube", "sphere", "duck")
+    faults: list[ScheduledFault] = [
+        after(0.0, Effect("part", parts.drop, {"close": parts.close})),
+        after(0.0, make_detector_effect("detector_errs", make_errors(rng, labels))),
+        with_probability(0.05, "*/Release", tool_does_not_release(), seed=seed),
+    ]
+    values: dict[str, Any] = {"cell.kind": kind}
+    if seed % 2:
+        detector = "fasteners" if "fasteners" in mission else "embedded"
+        values |= {f"cell.detectors.{detector}.{key}": str(value) for key, value in ASSUMED_RATES.items()}
+    result = run_mission(mission, load_cell_kind(kind), seed=seed, set=values, faults=faults, timeout=TIMEOUT)
+    return mission, ATTEMPTS[mission], result, parts
+
+
+def explain_problem(seed: int, kind: str) -> str:
+    """Return what is wrong with the run of a seed, or ""."""
+    try:
+        mission, attempts, result, parts = run_with_faults(seed, kind)
+    except Fault as error:
+        return f"seed {seed}: {error}"
+    problems = []
+    if result.status == "FAULT":
+        problems.append(f"{result.reason}: {result.message}")
+    if parts.pick_counts and max(parts.pick_counts.values()) > attempts + 1:
+        problems.append(f"{max(parts.pick_counts.values())} picks of an object")
+    named = [row.item for row in result.accounts.list_items() if row.state in ("rejected", "lost")]
+    if not result.agrees and (result.status == "SUCCESS" or not named):
+        problems.append(f"{result.status}, items {dict(result.items)}, audit {result.audit}")
+    return f"seed {seed}, {mission}: {'; '.join(problems)}" if problems else ""
+
+
+def main() -> int:
+    """Run all seeds, print each problem, and return 1 if there is one."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=0, help="first seed")
+    parser.add_argument("--runs", type=int, default=500)
+    parser.add_argument("--kind", default="fake", choices=["fake", "sim"])
+    options = parser.parse_args()
+    seeds = range(options.seed, options.seed + options.runs)
+    with ProcessPoolExecutor(2) as pool:
+        problems = [text for text in pool.map(explain_problem, seeds, [options.kind] * len(seeds)) if text]
+    print(*problems, f"{len(seeds) - len(problems)} of {len(seeds)} runs without a problem", sep="\n")
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
