@@ -158,7 +158,7 @@ def test_a_folded_tree_shows_every_subtree_once():
     assert [line.strip("│├└─ ") for line in text.splitlines() if "as above" in line] == [
         "recover look: try  (as above, other params)",
         "look: try  (as above)", "look: try  (as above, other params)",
-        "look: try  (as above, other params)", "recover find_again: retry  (as above)",
+        "look: try  (as above, other params)", "recover find_again: retry  (as above, other params)",
     ]  # fmt: skip
     picture = ElementTree.fromstring(shown("sort_overhead", "--fold", "--svg").stdout)
     assert [part.attrib["data-kind"] for part in picture if "use" in part.attrib.get("class", "")] == [

@@ -147,7 +147,7 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
     assert outcome.status == "INCOMPLETE", outcome
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
-    assert next(row for row in run.workcell.accounts.list_items() if row.state == "rejected").attempts == 12
+    assert next(row for row in run.workcell.accounts.list_items() if row.state == "rejected").attempts == 6
 
 
 def test_books_that_do_not_balance_are_a_fault(missions: Path) -> None:

@@ -145,8 +145,8 @@ def test_an_object_that_is_lost(at_home) -> None:
     assert (
         text(run, numbered=False)
         == """\
-FAILURE after 1.57 s: 1 object was lost: cube-1
-lost        cube-1 last detected at (0.500, 0.100, 0.025) m at 0.05 s, not detected in the 3 later looks;
+FAILURE after 0.93 s: 1 object was lost: cube-1
+lost        cube-1 last detected at (0.500, 0.100, 0.025) m at 0.05 s, not detected in the 2 later looks;
             Transit.dropped at 0.82 s: the seal on cube-1 broke on the way to red_bin, near (0.50, 0.10,
             0.12) m
 now         the arm is at rest, the tool is empty
@@ -171,7 +171,7 @@ why no node in missions/sort_overhead.yaml handled the failure, from the root do
   carry_and_watch: try  caught Transit.blocked (link 5 met a wrench), but the handler failed
                         (missions/library/sorting.yaml:N)
   put_aside: try        catches only PutDown.dropped (missions/library/sorting.yaml:N)
-  PutDown of cube-1     tree/2:repeat/do/carry_and_watch/try/catch/4/put_aside/try/do/PutDown
+  PutDown of cube-1     tree/2:repeat/do/carry_and_watch/try/catch/3/put_aside/try/do/PutDown
                         (missions/library/sorting.yaml:N)
 readings    arm.met = link 5 met a wrench (1.23 s), tool.bears = 7.9 (0.75 s), tool.holding = True (0.74 s)
 last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
