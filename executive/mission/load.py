@@ -25,6 +25,7 @@ from executive.mission.model.values import Literal
 from executive.mission.parse.cell_file import CellFile
 from executive.mission.parse.read_mission import read_mission
 from executive.mission.text.file_search import find_mission, get_shipped_folder
+from executive.perception.camera_model import find_calibration_doubts
 from executive.perception.envelope.rated_detectors import find_unmeasured_detectors
 from executive.skill import Skill
 from executive.tree.node_registry import load_control_nodes
@@ -108,6 +109,8 @@ def load_mission(
     skills = {**skills, **files.behaviours}
     config = cell.config if cell else None
     cell_kind, classes_by_detector, min_times = None, {}, None
+    if cell is not None and config is not None:
+        findings += _warn_about_calibration(cell, config)
     if cell is not None and config is not None and find_cell_kind is not None:
         try:
             cell_kind = find_cell_kind(config.kind)
@@ -146,6 +149,14 @@ def _make_predefined_lists(mission: Mission, config: CellConfig) -> dict[str, Se
         "bins": list(config.bins),
         "classes": [route.label for route in mission.routes],
     }
+
+
+def _warn_about_calibration(cell: CellFile, config: CellConfig) -> Iterator[Finding]:
+    """Yield a warning for each entry of a calibration that does not fit the images of its camera."""
+    for name, camera in config.cameras.items():
+        for key, message in find_calibration_doubts(camera):
+            span = cell.find_span(("cameras", name, "calibration", key))
+            yield make_warning(span, "calibration", message)
 
 
 def _warn_about_unmeasured_detectors(cell: CellFile) -> Iterator[Finding]:

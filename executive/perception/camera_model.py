@@ -7,6 +7,7 @@ continuous: pixel i covers [i, i + 1), so that the centre of an image is (W / 2,
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import cv2
 import numpy as np
@@ -18,6 +19,9 @@ from executive.geometry import Array, Pose
 
 NEAR_PLANE, FAR_PLANE = 0.02, 5.0
 """Distances of the near and far clipping planes of rendered cameras [m]."""
+
+MAX_CENTRE_ERROR = 0.2
+"""Maximum distance of the principal point from the centre of the image, as a fraction of half the image."""
 
 
 def compute_camera_matrix(width: int, height: int, fov_deg: float) -> Array:
@@ -37,36 +41,15 @@ def compute_field_of_view(matrix: Array, height: int) -> float:
 def compute_look_at_pose(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Pose:
     """Return the pose of a camera at `position` `(3,)` [m] that looks at `target` `(3,)` [m].
 
-    `up` `(3,)` is the direction to the top of the image; it need not be perpendicular to the optical axis.
-
-    Raises:
-        ValueError: The arguments do not determine a pose.
+    `up` `(3,)` is the direction to the top of the image; it need not be perpendicular to the optical axis,
+    but must not be parallel to it.
     """
-    origin, upward = np.asarray(position, dtype=float), np.asarray(up, dtype=float)
+    origin = np.asarray(position, dtype=float)
     axis = np.asarray(target, dtype=float) - origin
-    right = np.cross(axis, upward)
-    if np.linalg.norm(right) < 1e-9:
-        raise ValueError(
-            f"a camera at {origin.tolist()} with axis {axis.tolist()} cannot have {upward.tolist()} as "
-            "its upward direction: look_at must differ from position, and up must not be parallel to the axis"
-        )
+    right = np.cross(axis, np.asarray(up, dtype=float))
     z = axis / np.linalg.norm(axis)
     x = right / np.linalg.norm(right)
     return Pose(np.column_stack([x, np.cross(z, x), z]), origin)
-
-
-def convert_from_opencv(matrix: ArrayLike, rvec: ArrayLike, tvec: ArrayLike) -> tuple[Array, Pose]:
-    """Return camera matrix `(3, 3)` [pixel] and pose `X_WC` of a camera calibrated with OpenCV.
-
-    `rvec` [rad] and `tvec` [m] of `cv2.solvePnP` transform from world to camera (inverse: `Frame.to_opencv`).
-    """
-    # scipy.spatial is imported here because the import takes 0.3 s, and few cells need it.
-    from scipy.spatial.transform import Rotation
-
-    camera_matrix = np.array(matrix, dtype=float)
-    camera_matrix[:2, 2] += 0.5  # In OpenCV, the centre of the first pixel is (0, 0) instead of (0.5, 0.5).
-    X_CW = Pose(Rotation.from_rotvec(rvec).as_matrix(), np.asarray(tvec, dtype=float))
-    return camera_matrix, X_CW.inverse()
 
 
 def compute_calibration(config: CameraConfig) -> tuple[Array, Pose]:
@@ -79,10 +62,28 @@ def compute_calibration(config: CameraConfig) -> tuple[Array, Pose]:
         assert config.position and config.look_at and config.up and config.fov_deg, "checked by CameraConfig"
         matrix = compute_camera_matrix(config.width, config.height, config.fov_deg)
         return matrix, compute_look_at_pose(config.position, config.look_at, config.up)
-    transform = calibration.mount_to_camera or calibration.camera_to_mount
-    assert transform is not None, "checked by CalibrationConfig"
-    matrix, pose = convert_from_opencv(calibration.matrix, transform.rotation, transform.translation)
-    return matrix, pose if calibration.mount_to_camera else pose.inverse()
+    matrix = np.reshape(calibration.matrix, (3, 3)).astype(float)
+    matrix[:2, 2] += 0.5  # In OpenCV, the centre of the first pixel is (0, 0) instead of (0.5, 0.5).
+    if calibration.camera_to_mount is not None:
+        return matrix, calibration.camera_to_mount.compute_pose()
+    assert calibration.mount_to_camera is not None, "checked by CalibrationConfig"
+    return matrix, calibration.mount_to_camera.compute_pose().inverse()
+
+
+def find_calibration_doubts(camera: CameraConfig) -> Iterator[tuple[str, str]]:
+    """Yield key and message for each entry of a calibration that does not fit the images of a camera."""
+    if (calibration := camera.calibration) is None:
+        return
+    principal_point, size = np.array(calibration.matrix)[[2, 5]], np.array([camera.width, camera.height])
+    fitting_size = np.round(2 * principal_point + 1)
+    if (np.abs(fitting_size / size - 1) > MAX_CENTRE_ERROR).any():
+        sizes = [f"{width:.0f} x {height:.0f} pixels" for width, height in (size, fitting_size)]
+        message = (
+            f"the principal point {principal_point.tolist()} is far from the centre of {sizes[0]}; the matrix"
+        )
+        yield "matrix", f"{message} fits {sizes[1]}: correct the size of the image, or scale the matrix"
+    if any(calibration.distortion):
+        yield "distortion", "the matrix is that of undistorted images; undistort them with `cv2.undistort`"
 
 
 def project(matrix: Array, X_WC: Pose, points: ArrayLike) -> Array:

@@ -6,7 +6,8 @@ Each field is a key of `missions/cells/*.yaml`, in SI units. Values of keys that
 from __future__ import annotations
 
 from executive.cell.config.arm import ArmConfig, LimitsConfig, MotionConfig, ToolConfig
-from executive.cell.config.cameras import CalibrationConfig, CameraConfig, DepthConfig, NoiseConfig
+from executive.cell.config.calibration import CalibrationConfig
+from executive.cell.config.cameras import CameraConfig, DepthConfig, NoiseConfig
 from executive.cell.config.cell import CellConfig, DetectorConfig, LedgerConfig
 from executive.cell.config.objects import BinConfig, ObjectConfig, TableConfig
 from executive.cell.config.section import Colour, Section

@@ -1,20 +1,14 @@
-"""Sections of a cell file: cameras with calibration, noise and depth sensor."""
+"""Sections of a cell file: cameras with noise and depth sensor."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from executive.cell.config.calibration import CalibrationConfig
 from executive.cell.config.section import Distance, Fraction, Length, Name, Natural, Section, Vector
-
-Pixels = Annotated[float, Field(ge=-1e5, le=1e5)]
-"""An entry of a camera matrix [pixel]; at a focal length of 100,000 pixels, 640 pixels span 0.4 degrees."""
-Row = tuple[Pixels, Pixels, Pixels]
-"""A row of a camera matrix."""
-RotationComponent = Annotated[float, Field(ge=-7, le=7)]
-"""A component of a rotation vector [rad]; 7 rad are more than one revolution."""
 
 POSE_AND_FOV_KEYS = ("position", "look_at", "up", "fov_deg")
 """Keys that a camera without a calibration needs for its pose and field of view."""
@@ -54,37 +48,6 @@ class DepthConfig(Section):
     """Fraction of the pixels near an edge that have no measurement."""
     dropout: Fraction = 0.01
     """Fraction of all pixels that have no measurement."""
-
-
-class TransformConfig(Section):
-    """A coordinate transformation in OpenCV's form: p' = R p + t."""
-
-    rotation: tuple[RotationComponent, RotationComponent, RotationComponent]
-    """Rotation vector, the axis times the angle [rad]: OpenCV's rvec, from R by `cv2.Rodrigues`."""
-    translation: Vector
-    """OpenCV's tvec t: x, y, z [m]."""
-
-
-class CalibrationConfig(Section):
-    """Camera matrix and pose in the form of OpenCV's calibration, for images without distortion."""
-
-    matrix: tuple[Row, Row, Row]
-    """[[fx, 0, cx], [0, fy, cy], [0, 0, 1]] [pixel]; as in OpenCV, pixel centres have integer coordinates."""
-    mount_to_camera: TransformConfig | None = None
-    """Transformation of points into the camera frame, from the world frame (fixed camera) or the flange
-    frame (wrist camera), for instance from `cv2.solvePnP`."""
-    camera_to_mount: TransformConfig | None = None
-    """Inverse of `mount_to_camera`, for instance from `cv2.calibrateHandEye`; exactly one key is required."""
-
-    @model_validator(mode="after")
-    def _check_matrix_and_pose(self) -> CalibrationConfig:
-        (fx, skew, _), (zero, fy, _), last_row = self.matrix
-        if fx <= 0 or fy <= 0 or (skew, zero) != (0, 0) or last_row != (0, 0, 1):
-            requirement = "a matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with fx and fy above 0"
-            raise ValueError(f"needs {requirement}, not {[list(row) for row in self.matrix]}")
-        if (self.mount_to_camera is None) == (self.camera_to_mount is None):
-            raise ValueError("needs exactly one of mount_to_camera and camera_to_mount, its inverse")
-        return self
 
 
 class CameraConfig(Section):
@@ -135,6 +98,12 @@ class CameraConfig(Section):
         present = [key for key in POSE_AND_FOV_KEYS if getattr(self, key) is not None]
         if self.calibration is not None and present:
             raise ValueError(f"must not have {', '.join(present)} besides calibration, which defines them")
+        image, calibration = f"{self.width} x {self.height}", self.calibration
+        if calibration and calibration.width and image != f"{calibration.width} x {calibration.height}":
+            raise ValueError(
+                f"has images of {image} pixels, but its calibration is for {calibration.width} x "
+                f"{calibration.height}; correct width and height, or calibrate at this resolution"
+            )
         if self.calibration is None and len(present) < len(POSE_AND_FOV_KEYS):
             missing = ", ".join(key for key in POSE_AND_FOV_KEYS if key not in present)
             raise ValueError(f"needs {missing}, or a calibration instead of {', '.join(POSE_AND_FOV_KEYS)}")

@@ -20,6 +20,7 @@ from executive.cells.fake.visuals import FakeVisuals
 from executive.cells.fake.world import TOUCH_DISTANCE, FakeWorld, describe_lack_of_room, put_random_objects
 from executive.cells.ground_truth import FinalObject, count_outcomes
 from executive.cells.min_times import CellMinTimes
+from executive.cells.table_views import find_view_errors
 from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import InputError
 from executive.events import Emit, discard_event
@@ -123,13 +124,13 @@ class FakeCell(CellWithoutHardware):
 
     @staticmethod
     def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return key and message for an unsupported arm, each place out of reach, and a lack of room."""
+        """Return key and message for an unsupported arm, places out of reach, lack of room, and bad views."""
         del cell_folder
         if arm_errors := tuple(find_arm_errors(config)):
             return arm_errors
         room_error = describe_lack_of_room(config, config.table.objects[1])
         room_errors = [(("table", "objects"), room_error)] if room_error else []
-        return (*find_places_out_of_reach(config), *room_errors)
+        return (*find_places_out_of_reach(config), *room_errors, *find_view_errors(config))
 
     @staticmethod
     def labels(config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:

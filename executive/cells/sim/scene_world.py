@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from executive.cell.config import CalibrationConfig, CameraConfig, CellConfig, ObjectConfig
-from executive.cell.config.cameras import POSE_AND_FOV_KEYS, TransformConfig
+from executive.cell.config.calibration import TransformConfig
+from executive.cell.config.cameras import POSE_AND_FOV_KEYS
 from executive.cells.sim.arrangements import DAMAGED_MODEL_NUMBER, load_unknown_model, scale_model
 from executive.cells.sim.scene_file import ANY_CLASS, SceneConfig, UnknownConfig
 from executive.cells.sim.table_top import WOOD_TEXTURE
@@ -76,8 +77,8 @@ def _change_camera(camera: CameraConfig, scene: SceneConfig) -> CameraConfig:
     factor = camera_model.compute_camera_matrix(camera.width, camera.height, fov)[1, 1] / matrix[1, 1]
     (fx, fy), (cx, cy) = factor * matrix.diagonal()[:2], matrix[:2, 2] - 0.5
     pose = TransformConfig(rotation=tuple(X_MC.rotation_vector), translation=tuple(X_MC.position))
-    rows = ((fx, 0.0, cx), (0.0, fy, cy), (0.0, 0.0, 1.0))
-    calibration = CalibrationConfig(matrix=rows, camera_to_mount=pose)
+    entries = (fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0)
+    calibration = CalibrationConfig(matrix=entries, camera_to_mount=pose)
     return camera.model_copy(update={**dict.fromkeys(POSE_AND_FOV_KEYS), "calibration": calibration})
 
 

@@ -16,13 +16,21 @@ from executive.mission.parse.overrides import CELL_PREFIX, make_override_source,
 from executive.mission.parse.validate import KeyPath, find_span, validate
 from executive.mission.source import Source, Span
 from executive.mission.text.file_search import find_file_below, read_source
-from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, parse_yaml
+from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, flatten, parse_yaml
 
 BASE_KEY = "base"
 """Key with the path of the base file, which supplies the missing top-level keys."""
 
 DETECTORS_KEY = "detectors"
 """Key whose value is merged with the value in the base, detector by detector."""
+
+CALIBRATION_KEYS: Mapping[str, str] = {
+    "camera_matrix": "matrix", "cameraMatrix": "matrix", "K": "matrix", "k": "matrix",
+    "distortion_coefficients": "distortion", "distCoeffs": "distortion", "D": "distortion", "d": "distortion",
+    "distortion_model": "distortion_model", "image_width": "width", "width": "width",
+    "image_height": "height", "height": "height",
+}  # fmt: skip
+"""Keys of a calibration by the keys of `camera_info` files, `CameraInfo` messages and files of OpenCV."""
 
 MAX_BASE_COUNT = 5
 """Maximum number of files in the chain of bases of a cell file."""
@@ -80,6 +88,7 @@ def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
     if root is None:
         return CellFile(path, None, source, findings=tuple(reader.findings))
     root, override_findings = override_cell(root, overrides)
+    root = reader.arrange_matrices(root)
     config, validation_errors = validate(root, CellConfig)
     override_findings += _find_overridden_base(overrides)
     findings = (*reader.findings, *override_findings, *validation_errors)
@@ -144,6 +153,42 @@ class _CellFileReader:
             self.findings.append(make_error(reference.span, "no-base", str(problem)))
             return None
         return root
+
+    def arrange_matrices(self, node: YamlNode, is_calibration: bool = False) -> YamlNode:
+        """Return a tree whose calibrations contain the entries of files, and each matrix as one list."""
+        if not isinstance(node, YamlMapping):
+            return flatten(node) if is_calibration else node
+        if is_calibration and (data := node.get("data")):
+            return flatten(data)
+        entries = []
+        for entry in self._insert_file(node).entries if is_calibration else node.entries:
+            is_inside = is_calibration or entry.key.text == "calibration"
+            entries.append(replace(entry, value=self.arrange_matrices(entry.value, is_inside)))
+        return replace(node, entries=tuple(entries))
+
+    def _insert_file(self, calibration: YamlMapping) -> YamlMapping:
+        """Return a calibration, completed by the entries of its file, if any."""
+        file = calibration.get("file")
+        if not isinstance(file, YamlScalar):
+            return calibration
+        folder = self.folders.get(file.span.source, next(iter(self.folders.values())))
+        try:
+            source = read_source(find_file_below(folder, file.text, ("cells",)))
+        except InputError as problem:
+            self.findings.append(make_error(file.span, "no-calibration", str(problem)))
+            return calibration
+        # PyYAML reads neither the first line nor the tags of OpenCV; the replacements keep all columns.
+        text = source.text.replace("%YAML:", "#YAML:").replace("!!opencv-matrix", " " * 15)
+        # A message that `ros2 topic echo` prints ends with ---.
+        text = text.rstrip().removesuffix("---")
+        root, findings = parse_yaml(source, text)
+        self.findings += findings
+        entries = [
+            replace(entry, key=replace(entry.key, text=CALIBRATION_KEYS[entry.key.text]))
+            for entry in (root.entries if isinstance(root, YamlMapping) else ())
+            if entry.key.text in CALIBRATION_KEYS
+        ]
+        return _inherit_entries(calibration, replace(calibration, entries=tuple(entries)))
 
 
 def _merge_entry(entry: YamlEntry, base: YamlMapping) -> YamlEntry:

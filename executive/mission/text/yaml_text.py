@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import yaml
 from pydantic import JsonValue
@@ -137,6 +137,11 @@ def list_children(node: YamlNode) -> tuple[YamlNode, ...]:
     if isinstance(node, YamlMapping):
         return tuple(entry.value for entry in node.entries)
     return node.items if isinstance(node, YamlSequence) else ()
+
+
+def flatten(node: YamlNode) -> YamlNode:
+    """Return a list of lists as the list of their scalars, in order; return other nodes unchanged."""
+    return replace(node, items=tuple(iterate_scalars(node))) if isinstance(node, YamlSequence) else node
 
 
 def parse_yaml(source: Source, text: str | None = None) -> tuple[YamlNode | None, list[Finding]]:

@@ -116,8 +116,7 @@ def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wri
     assert list(find_pose_errors(posed(overhead, aside=reaching(overhead, 0.53, 0.0, 0.2)))) == [
         (
             ("cameras", "overhead", "scan_poses", 1),
-            'from the pose "aside" the camera overhead does not see the whole workspace: a part of it is '
-            "outside of the image or behind the arm",
+            'in the pose "aside" the arm hides a part of the workspace from the camera overhead',
         )
     ]
     turned = (40.0, *wrist.arm.poses_deg["scan"][1:])

@@ -37,7 +37,7 @@ def at_scan_pose(build: Build, config: CellConfig) -> tuple[World, str]:
 
 OBLONG = CalibrationConfig.model_validate(
     {
-        "matrix": [[430, 0, 300], [0, 480, 255], [0, 0, 1]],
+        "matrix": [430, 0, 300, 0, 480, 255, 0, 0, 1],
         "mount_to_camera": {"rotation": [2.221441, -2.221441, 0], "translation": [0, 0.5, 1.2]},
     }
 )
