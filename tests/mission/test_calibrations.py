@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CameraConfig
+from executive.cell.config.calibration import CalibrationConfig
 from executive.mission.findings import MissionError
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.camera_model import compute_calibration, find_calibration_doubts
@@ -126,3 +127,10 @@ def test_an_error_in_a_file_is_found_in_the_file(old: str, new: str, expected: s
 def test_distortion_is_doubtful() -> None:
     camera = read(f"{NINE}\n      distortion: [[-0.3, 0.1, 0, 0, 0]]")
     assert [key for key, _ in find_calibration_doubts(camera)] == ["distortion"]
+
+
+def test_a_matrix_in_rows_of_an_earlier_record_is_read() -> None:
+    transform = {"rotation": [0, 0, 0], "translation": [0, 0, 1]}
+    rows = [[461, 0, 320], [0, 461, 240], [0, 0, 1]]
+    calibration = CalibrationConfig.model_validate({"matrix": rows, "mount_to_camera": transform})
+    assert calibration.matrix == (461, 0, 320, 0, 461, 240, 0, 0, 1)

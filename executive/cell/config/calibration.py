@@ -100,6 +100,15 @@ class CalibrationConfig(Section):
     camera_to_mount: TransformConfig | None = None
     """Inverse of `mount_to_camera`, for instance from `cv2.calibrateHandEye`; exactly one key is required."""
 
+    @field_validator("matrix", mode="before")
+    @classmethod
+    def _join_rows(cls, entries: object) -> object:
+        """Return the entries of a matrix in rows, as earlier records of runs contain it."""
+        if not isinstance(entries, list):
+            return entries
+        rows = [row if isinstance(row, list) else [row] for row in entries]
+        return tuple(entry for row in rows for entry in row)
+
     @field_validator("matrix")
     @classmethod
     def _check_matrix(cls, entries: tuple[float, ...]) -> tuple[float, ...]:
