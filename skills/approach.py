@@ -64,6 +64,8 @@ class Approach(Skill):
         find_goal_and_task = partial(make_approach, cell, self.target, self.overtravel, self.offset)
         motion = yield from plan(self, cell.arm, find_goal_and_task)
         goal, _ = find_goal_and_task()
+        # The zero of a load cell drifts; only before the descent, the tool is at rest and certainly empty.
+        cell.ledger.record_empty_load(tool.load)
         yield from follow(self, cell, motion, until=_build_contact_check(tool))
         label, object_class = self.target.label, cell.classes[self.target.label]
         centre_height = float(self.target.position[2])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from executive.cell.objects import Item
@@ -44,4 +46,5 @@ class PutDown(Skill):
                 raise
         x, y, _ = cell.arm.tool_pose.position
         centre = np.array((x, y, top_height - object_class.height / 2))
-        yield from release(self, cell, item, self.settle, lambda: cell.ledger.record_put_down(item, centre))
+        record_put_down = partial(cell.ledger.record_put_down, item, centre)
+        yield from release(self, cell, item, self.settle, record_put_down, falls=False)

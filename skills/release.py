@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import release
@@ -25,10 +27,12 @@ class Release(Skill):
     waits = "settle"
 
     def run(self, cell: Cell) -> Steps:
-        """Open the tool, wait, and read the vacuum sensor."""
+        """Open the tool, wait, and read the sensors of vacuum and contact."""
         item, bin = self.held, self.bin
         if cell.ledger.find_held_item() == item:
-            yield from release(self, cell, item, self.settle, lambda: cell.ledger.record_placement(item, bin))
+            record_placement = partial(cell.ledger.record_placement, item, bin)
+            falls = cell.bins[bin].contains(cell.arm.tool_pose.position)
+            yield from release(self, cell, item, self.settle, record_placement, falls=falls)
             yield  # The next selection of a target needs most of a control period.
         elif cell.ledger.describe(item).state != "placed":
             raise self.failure("dropped", f"{item} is not in the tool any more")

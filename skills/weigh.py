@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from executive.cell.arm import Goal
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
@@ -11,7 +13,11 @@ from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Newtons, Out, Secon
 
 
 class Weigh(Skill):
-    """Lift the held item, and determine its class and its bin by its weight."""
+    """Lift the held item, and determine its class and its bin by its weight.
+
+    The weight is the load minus the load of the empty tool before the approach. The skill fails with
+    `implausible` if the load cell is broken: its readings are all equal, or no finite numbers.
+    """
 
     held: In[Item] = port(refers_to="item", doc="the item in the tool")
     weight: Out[Newtons] = port(doc="the weight of the item")
@@ -19,7 +25,7 @@ class Weigh(Skill):
     height: Metres = param(0.05, ge=0.01, le=0.3, doc="height by which the item is lifted")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time between motion and measurement")
     period: Seconds = param(0.25, ge=0.05, le=10, doc="time over which the load is averaged")
-    reasons = ("unreachable", "blocked", "dropped", "contradicted", "no_bin")
+    reasons = ("unreachable", "blocked", "dropped", "implausible", "contradicted", "no_bin")
     uses = ("arm", "tool")
     senses = True
     moves = True
@@ -37,7 +43,11 @@ class Weigh(Skill):
             loads.append(cell.tool.load)
             yield
         fail_if_dropped(self, cell, self.held, "during the weighing")
-        self.weight = sum(loads) / len(loads)
+        self.weight = sum(loads) / len(loads) - cell.ledger.empty_load
+        if len(set(loads)) == 1 or not math.isfinite(self.weight):
+            raise self.failure(
+                "implausible", f"the load cell is broken: it reads {loads[0]:.3f} N all the time"
+            )
         if contradiction := cell.ledger.record_weight(self.held, self.weight, cell.tool.load_std):
             raise self.failure("contradicted", f"the class of {self.held} is uncertain: {contradiction}")
         self.bin = choose_bin(cell, self.held)

@@ -33,6 +33,10 @@ class Ledger(Protocol):
         """Number of actions of the robot so far that may have moved objects on the table."""
 
     @property
+    def empty_load(self) -> float:
+        """Load of the empty tool before the last approach [N], the zero of a weighing; 0 if it is unknown."""
+
+    @property
     def unknown_labels(self) -> Mapping[str, int]:
         """Labels that are not in the cell file, each with its maximum number of boxes per frame."""
 
@@ -132,6 +136,9 @@ class Ledger(Protocol):
                 the full image, or contains the place of the item.
             observations: The same detections, localized in the world.
         """
+
+    def record_empty_load(self, load: float) -> None:
+        """Record the load of the empty tool at rest [N]."""
 
     def record_touch(self, item: Item, contradiction: str = "", *, may_have_missed_top: bool = False) -> bool:
         """Record a touch of an item, and return False if the touch contradicts the class of the item.

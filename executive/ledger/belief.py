@@ -11,6 +11,8 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from executive.cell.detection import Detections, ErrorRates
 
 VIEWPOINT_GRID_SPACING = 0.02
@@ -130,10 +132,9 @@ class Belief:
         """
         if not self.label_counts:
             return 1.0
-        max_value = self.log_likelihoods[self.label]
         other_values = (value for label, value in self.log_likelihoods.items() if label != self.label)
-        odds_of_other_class = sum(math.exp(value - max_value) for value in (0.0, *other_values))
-        return odds_of_other_class / (1.0 + odds_of_other_class)
+        log_likelihood_of_others = float(np.logaddexp.reduce([0.0, *other_values]))
+        return compute_probability(log_likelihood_of_others - self.log_likelihoods[self.label])
 
     @property
     def confusion_p_value(self) -> float:

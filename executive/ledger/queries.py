@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -25,6 +26,9 @@ MIN_LOG_RATIO_OF_WEIGHT = math.log(0.01)
 """Minimum log likelihood ratio of a weight that agrees with a class, against objects of no declared class. At
 the minimum, the class and an undeclared class (prior odds 0.01) are equally probable."""
 
+MIN_LOOKS_WITHOUT_CLASS = 3
+"""Minimum number of looks that show an item of no class before the table counts as searched."""
+
 
 @dataclass(eq=False)
 class LedgerQueries:
@@ -40,6 +44,7 @@ class LedgerQueries:
         routes: Names of the permitted bins by class.
         quotas: Maximum numbers of objects in the bins.
         emit: Function that receives the events.
+        unknown_labels: Labels that are not in the cell file, each with its maximum number of boxes per frame.
     """
 
     config: LedgerConfig
@@ -51,6 +56,7 @@ class LedgerQueries:
     emit: Emit
 
     def __post_init__(self) -> None:
+        self.unknown_labels: Counter[str] = Counter()
         self._records = ItemRecords(self.emit)
         self._certainty = Certainty(self.config, find_classes_distinct_by_touch(self.classes))
         self._bin_contents = BinContents(self.config, self.bins, self.routes, self._records, self.quotas)
@@ -67,9 +73,9 @@ class LedgerQueries:
         return self._staleness.change_count
 
     def find_targets(self) -> Sequence[Target]:
-        """Return a target for each item in the state SEEN that cannot have moved since its last detection."""
-        seen_items = self._records.filter_by_state(State.SEEN)
-        return [record.target for record in seen_items if self._staleness.is_unmoved(record)]
+        """Return a target for each open item of a class that cannot have moved since its last detection."""
+        unmoved_items = filter(self._staleness.is_unmoved, self._records.filter_by_state(State.SEEN))
+        return [record.target for record in unmoved_items if record.label not in self.unknown_labels]
 
     def find_objects_on_table(self) -> Sequence[Target]:
         """Return all items that lie on the table with a probability of at least 0.5."""
@@ -119,9 +125,9 @@ class LedgerQueries:
         records = (record for record in self.records if record.item not in ignored_items)
         possible_items = [record for record in records if self._certainty.may_be_on_table(record)]
         visible_items = [record for record in possible_items if self._coverage.is_visible(record.position)]
-        # An item without a confident detection counts as an object of every class.
+        # An item without enough confident detections counts as an object of every class.
         return not any(
-            labels.intersection(self.list_possible_labels(record.item)) or not record.belief.look_count
+            labels.intersection(self.list_possible_labels(record.item)) or self._needs_look(record)
             for record in visible_items
         )
 
@@ -167,8 +173,16 @@ class LedgerQueries:
         """Return the reason why the mission does not sort further objects of a class, or ""."""
         return self._bin_contents.explain_skipped_class(label)
 
+    def _needs_look(self, record: ItemRecord) -> bool:
+        """Return True if too few looks showed an item; no touch proves an item of no class."""
+        if record.label not in self.unknown_labels:
+            return not record.belief.look_count
+        return record.belief.look_count < MIN_LOOKS_WITHOUT_CLASS or record.belief.miss_probability < 1.0
+
     def _explain_skipped_item(self, record: ItemRecord) -> str:
         """Return the reason why the mission sorts none of the possible classes of an item, or ""."""
+        if record.label in self.unknown_labels:
+            return f'the cell has no class "{record.label}"; see `class_map` and `unknown` of the cell file'
         labels = self.list_possible_labels(record.item)
         reasons = [self._bin_contents.explain_skipped_class(label) for label in labels]
         return reasons[0] if all(reasons) else ""

@@ -16,6 +16,7 @@ from executive.errors import Fault
 from executive.events import ItemChanged
 from executive.geometry import Array
 from executive.ledger import outcomes
+from executive.ledger.association import AMBIGUITY_FACTOR
 from executive.ledger.belief import make_viewpoint_key
 from executive.ledger.bin_contents import find_probable_bin
 from executive.ledger.bin_recovery import BinRecovery
@@ -32,7 +33,7 @@ class Tracker(LedgerQueries):
     an item as an event. `Ledger` documents the methods in detail.
 
     Attributes:
-        unknown_labels: Labels that are not in the cell file, each with its maximum number of boxes per frame.
+        empty_load: Load of the empty tool before the last approach [N].
         assumption_reasons: Reasons why error rates of detectors were assumed, and not measured.
     """
 
@@ -41,9 +42,8 @@ class Tracker(LedgerQueries):
         self._bin_recovery: BinRecovery | None = None
         """Recovery of the bin contents between `record_interruption` and `record_bin_contents`, or None."""
         self._last_frame_id = self._deferral_count = 0
-        self._last_stamp = 0.0
+        self._last_stamp = self.empty_load = 0.0
         """Capture time of the last look [s]."""
-        self.unknown_labels: Counter[str] = Counter()
         self.assumption_reasons: list[str] = []
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
@@ -96,6 +96,10 @@ class Tracker(LedgerQueries):
         record.mark_as_taken_away(self.change_count)
         self._records.emit(record)
         return Presence.GONE
+
+    def record_empty_load(self, load: float) -> None:
+        """Record the load of the empty tool at rest [N]."""
+        self.empty_load = load
 
     def record_touch(self, item: Item, contradiction: str = "", *, may_have_missed_top: bool = False) -> bool:
         """Record a touch, and return False if the touch contradicts the class of the item.
@@ -227,6 +231,7 @@ class Tracker(LedgerQueries):
             record for record in self._records.filter_by_state(State.DROPPED) if not record.was_taken_away
         ]
         for record in self.records:
+            self._settle_undeclared(record)
             final_state = outcomes.find_final_state(
                 record, self._certainty, skip_reason=self._explain_skipped_item(record),
                 is_completed=completed, has_touched_item=has_touched_item,
@@ -257,7 +262,8 @@ class Tracker(LedgerQueries):
     def _update(self, detections: Detections, observations: Sequence[Observation]) -> None:
         """Update the items on the table and the dropped items with the observations of a look."""
         bias_std = detections.error_rates.bias
-        bin_names = {entry: self._bin_contents.find_bin_name(entry, bias_std) for entry in observations}
+        entries = self._omit_redundant_observations(observations)
+        bin_names = {entry: self._bin_contents.find_bin_name(entry, bias_std) for entry in entries}
         observations_on_table = [entry for entry, bin_name in bin_names.items() if bin_name is None]
         update = LookUpdate(self._certainty, self._records, self._coverage, self._staleness, detections)
         for record in update.apply(observations_on_table):
@@ -268,6 +274,32 @@ class Tracker(LedgerQueries):
         elif detections.view == "full":
             self._bin_contents.confirm_placed_items(detections, observations)
             self._bin_contents.mark_dropped_items_as_placed(detections, bin_names)
+
+    def _omit_redundant_observations(self, observations: Sequence[Observation]) -> list[Observation]:
+        """Return the observations without those of undeclared labels that show no further object to sort.
+
+        Such an observation is near another observation or a known object, or it is outside of the workspace.
+        """
+        kept = [entry for entry in observations if entry.detection.label not in self.unknown_labels]
+        targets = [each for each in self.find_objects_on_table() if each.label not in self.unknown_labels]
+        positions = [target.position for target in targets]
+        for entry in (entry for entry in observations if entry not in kept):
+            distances = [math.dist(entry.position, position) for position in positions]
+            distances += [math.dist(entry.position, other.position) for other in kept]
+            is_separate = min(distances, default=math.inf) > AMBIGUITY_FACTOR * self.config.gate
+            if is_separate and self._coverage.is_in_workspace(entry.position):
+                kept.append(entry)
+        return kept
+
+    def _settle_undeclared(self, record: ItemRecord) -> None:
+        """Reject an item of no class at the end of the run; discard it if it is not on the table any more."""
+        if record.label not in self.unknown_labels or record.state not in (*ON_TABLE, State.DROPPED):
+            return
+        if record.state is State.DROPPED or self._certainty.is_position_empty(record):
+            record.set_state(State.PHANTOM, "it is not on the table any more")
+        else:
+            record.set_state(State.REJECTED, self._explain_skipped_item(record))
+        self._records.emit(record)
 
     def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
         """Set items to DROPPED, so that later looks search for them on the table and in the bins."""

@@ -110,22 +110,27 @@ def fail_if_dropped(skill: Skill, cell: Cell, item: Item, place: str) -> None:
         )
 
 
-def release(skill: Skill, cell: Cell, item: Item, settle: float, record_release: Callable[[], None]) -> Steps:
+def release(
+    skill: Skill, cell: Cell, item: Item, settle: float, record_release: Callable[[], None], *, falls: bool
+) -> Steps:
     """Switch the vacuum off, and yield for `settle` [s] until the item lies still.
 
     `record_release` records the new position of the item in the ledger, even if the skill is halted
-    during the wait, provided that the tool is empty.
+    during the wait, provided that the tool is empty. `falls` is True if the item falls away from the lip, so
+    that a lip that still touches something shows an item that sticks to the cup.
 
     Raises:
         SkillFailed: The item still hangs on the tool; the reason is `stuck`.
     """
     cell.tool.open()
+    is_stuck = False
     try:
         yield from cell.clock.sleep(settle)
+        is_stuck = cell.tool.holding or (falls and cell.tool.touching)
     finally:
-        if not cell.tool.holding:
+        if not (is_stuck or cell.tool.holding):
             record_release()
-    if cell.tool.holding:
+    if is_stuck:
         raise skill.failure("stuck", f"{item} hangs on the tool {settle:.2f} s after release")
 
 

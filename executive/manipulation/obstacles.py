@@ -51,10 +51,12 @@ def predict_next_slot_index(cell: Cell, bin_name: str, excluded_item: Item | Non
 
 
 def make_obstacle(cell: Cell, target: Target) -> Obstacle:
-    """Return the bounding cylinder of a target as an obstacle."""
+    """Return the bounding cylinder of a target as an obstacle; of no class: as large as the largest class."""
     x, y, z = map(float, target.position)
-    object_class = cell.classes[target.label]
-    return Obstacle(x, y, object_class.radius, z + object_class.height / 2, target.item)
+    object_class = cell.classes.get(target.label)
+    classes = [object_class] if object_class else cell.classes.values()
+    radius, height = max(each.radius for each in classes), max(each.height for each in classes)
+    return Obstacle(x, y, radius, z + height / 2, target.item)
 
 
 def find_max_object_height(cell: Cell) -> float:

@@ -194,7 +194,7 @@ def make_slot_goal(
 def make_put_down_goal(cell: Cell, object_class: ObjectClass, drop_height: float, item: Item | None) -> Goal:
     """Return the goal of a put-down: an object at `drop_height` [m] above a free position on the table.
 
-    The position is the free candidate nearest to `cell.safe_place`; if none is free, `cell.safe_place`.
+    The position is the free, reachable candidate nearest to `cell.safe_place`; if none, `cell.safe_place`.
     `item` is the item in the tool, which is no obstacle; None if the ledger knows no item there.
     """
     x, y, table_height = map(float, cell.safe_place)
@@ -203,8 +203,9 @@ def make_put_down_goal(cell: Cell, object_class: ObjectClass, drop_height: float
     sorted_offsets = sorted(product(offsets, offsets), key=lambda offset: math.hypot(*offset))
     candidates = ((x + dx, y + dy) for dx, dy in sorted_offsets)
     free_positions = (xy for xy in candidates if _is_free(cell, xy, object_class.radius + MIN_GAP, item))
-    goal_x, goal_y = next(free_positions, (x, y))
-    return Goal((goal_x, goal_y, table_height + object_class.height + drop_height))
+    height = table_height + object_class.height + drop_height
+    goals = (Goal((*xy, height)) for xy in free_positions)
+    return next((goal for goal in goals if not cell.arm.describe_unreachable(goal)), Goal((x, y, height)))
 
 
 def _is_free(cell: Cell, position: tuple[float, float], min_distance: float, item: Item | None) -> bool:

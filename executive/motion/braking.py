@@ -24,6 +24,10 @@ MIN_BRAKING_TIME = 0.02
 """Shortest time from full speed to rest [s]."""
 MAX_BRAKING_TIME = 0.5
 """Longest time from full speed to rest [s]."""
+RETREAT_TIME = 0.15
+"""Path time before a collision to which the arm moves back after the collision [s]."""
+MAX_RETREAT_RATE = 0.75
+"""Largest rate at which the arm moves back, as a fraction of the speed of the planned motion."""
 _ROUNDING_ERROR = 1e-9  # fraction of a control period
 _BRAKING_TIMES = np.geomspace(MIN_BRAKING_TIME, MAX_BRAKING_TIME, 18)
 """Candidates for the time from full speed to rest, the shortest first [s]."""
@@ -54,6 +58,19 @@ def plan_braking(trajectory: Trajectory, start_time: float, limits: JointLimits)
         if peak_fraction < min_peak_fraction:
             best_path_times, min_peak_fraction = profile.path_times, peak_fraction
     return best_path_times
+
+
+def plan_retreat(collision_time: float, rest_time: float) -> Array:
+    """Return the path times `(N,)` [s] of the control steps of a motion back along the path, rest to rest.
+
+    The motion begins at path time `rest_time` [s], where the arm came to rest after a collision at path time
+    `collision_time` [s]. It ends `RETREAT_TIME` before the collision, or at the start of the planned motion.
+    """
+    path_length = rest_time - max(0.0, collision_time - RETREAT_TIME)
+    # The quintic polynomial from 0 to 1 with zero rate and acceleration at both ends has the peak rate 15/8.
+    step_count = _count_steps(15 / 8 * path_length / MAX_RETREAT_RATE)
+    fractions = np.arange(1, step_count + 1) / step_count
+    return np.asarray(rest_time - path_length * fractions**3 * (10 - 15 * fractions + 6 * fractions**2))
 
 
 def _list_profiles(trajectory: Trajectory, start_time: float) -> Iterator[_BrakingProfile]:

@@ -21,6 +21,11 @@ from executive.perception.depth_image import measure_top_height
 RayTest = Callable[[Array, Array], Array | None]
 """Function of origin `(3,)` [m] and direction `(3,)` of a ray; returns the first hit `(3,)` [m], or None."""
 
+UNKNOWN_HALF_HEIGHT = 0.025
+"""Assumed height of the centre of an object of no class above its support [m]."""
+UNKNOWN_POSITION_STD = 0.01
+"""Standard deviation of the position of an object of no class along each axis [m]: its height is unknown."""
+
 
 @dataclass(frozen=True, eq=False)
 class CellLocalizer:
@@ -58,31 +63,33 @@ class CellLocalizer:
             ) from None
 
     def localize(self, detections: Detections) -> list[Observation]:
-        """Return the observations of all doubtful detections, then of all confident detections.
+        """Return the observations of all doubtful, all unknown, then all confident detections.
 
-        A doubtful detection that cannot be localized is omitted if there is a confident detection.
+        An unknown detection that cannot be localized is omitted, and a doubtful one if there is a confident
+        detection.
 
         Raises:
             NoDepth: A detection cannot be localized and is not omitted.
         """
         confident = [self._observe(detections, detection) for detection in detections.confident]
-        doubtful = []
-        for detection in detections.doubtful:
+        others = []
+        for detection in (*detections.doubtful, *detections.unknown):
             try:
-                doubtful.append(self._observe(detections, detection, is_doubtful=True))
+                others.append(self._observe(detections, detection))
             except NoDepth:
-                if not confident:
+                if detection in detections.doubtful and not confident:
                     raise
-        return [*doubtful, *confident]
+        return [*others, *confident]
 
-    def _observe(
-        self, detections: Detections, detection: Detection, *, is_doubtful: bool = False
-    ) -> Observation:
+    def _observe(self, detections: Detections, detection: Detection) -> Observation:
         """Return the observation of one detection: position, standard deviation and contradiction."""
-        frame = detections.frame
-        position = self.locate(detection, frame)
+        frame, contradiction = detections.frame, ""
+        position, is_doubtful = self.locate(detection, frame), detection in detections.doubtful
         std = detections.error_rates.jitter * frame.compute_depth(position) / float(frame.matrix[0, 0])
-        contradiction = "" if is_doubtful else self._describe_contradiction(detections, detection, position)
+        if detection.label not in self.classes:
+            std = max(std, UNKNOWN_POSITION_STD)
+        elif not is_doubtful:
+            contradiction = self._describe_contradiction(detections, detection, position)
         return Observation(detection, position, std, not (is_doubtful or contradiction), contradiction)
 
     def _describe_contradiction(self, detections: Detections, detection: Detection, position: Array) -> str:
@@ -106,7 +113,8 @@ class CellLocalizer:
         Raises:
             NoDepth: The box has too few depth values, or the ray hits nothing.
         """
-        half_height = self.classes[detection.label].height / 2
+        object_class = self.classes.get(detection.label)
+        half_height = object_class.height / 2 if object_class else UNKNOWN_HALF_HEIGHT
         if self.method == "plane":
             return half_height
         if self.method == "depth":

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from executive.cell.frame import Frame, FrameCaptured
-from executive.events import DetectedObject, FrameSearched, NodeEnded, TargetSelected, TimedEvent
+from executive.events import DetectedObject, FrameSearched, NodeEnded, RunEnded, TargetSelected, TimedEvent
 from executive.record.pictures.drawing_thread import PictureDrawer
 from executive.record.pictures.picture_content import PictureContent
 from executive.record.timeline.activation import get_skill_name
@@ -33,7 +33,8 @@ class PictureRecorder:
 
     `<tick>_<item>.jpg` shows the image in which an item was selected. After a failed attempt to pick an item,
     `<tick>_<item>_<reason>.jpg` shows the image in which the item was selected last. After the failure of a
-    skill without an item, `<tick>_<reason>.jpg` shows the last image, unless another picture shows it.
+    skill without an item, `<tick>_<reason>.jpg` shows the last image, unless another picture shows it. At the
+    end of the run, `<tick>_<item>.jpg` shows the last image of each rejected item of no class.
 
     Args:
         folder: Folder of the pictures.
@@ -63,6 +64,12 @@ class PictureRecorder:
             self._queue(timed, event, None)
         elif isinstance(event, NodeEnded) and event.skill and event.status == "FAILURE":
             self._queue(timed, self._timeline.selections.get(event.item), event)
+        elif isinstance(event, RunEnded):
+            for name, item in self._timeline.items.by_name.items():
+                label, frame_id = item.last_change.label, item.sighting.frame if item.sighting else 0
+                look = self._look_by_frame_id.get(frame_id)
+                if item.last_change.state == "rejected" and look and label in look[1].unknown_labels:
+                    self._queue(timed, TargetSelected(name, label, frame_id, ""), None)
         # The timeline gets the event last, so that the picture shows a failed skill as running.
         self._timeline(timed)
 

@@ -81,7 +81,7 @@ CASES = {
         cells/overhead.yaml:LINE:1: error[unknown-key]: the file has no key "ledgre"
         LINE | ledgre: {gate: 0.03}
              | ^^^^^^
-          Did you mean "ledger"? Keys of the file: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detector, detectors, localization, objects, ledger, safe_place.
+          Did you mean "ledger"? Keys of the file: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detector, detectors, localization, objects, unknown, ledger, safe_place.
         """,
         cell=("safe_place:", "ledgre: {gate: 0.03}\nsafe_place:"),
     ),
@@ -158,7 +158,7 @@ def test_a_mistake_in_a_file_is_reported_once_and_nothing_moves(
             --set:1:22: error[unknown-key]: the cell has no key "tols"
                1 | cell.tols.cup_radius=0.01
                  |                      ^^^^
-              Did you mean "tool"? Keys of the cell: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detector, detectors, localization, objects, ledger, safe_place.
+              Did you mean "tool"? Keys of the cell: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detector, detectors, localization, objects, unknown, ledger, safe_place.
             """,
         ),
     ],

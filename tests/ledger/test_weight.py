@@ -47,6 +47,13 @@ def test_the_ratio_is_that_of_a_normal_and_a_uniform_distribution() -> None:
     assert ratios["cube"] == pytest.approx(math.log(density / 0.1))
 
 
+@pytest.mark.parametrize("weight", [0.5 * GRAVITY, -50.0, 1e4])
+def test_a_weight_far_from_all_classes_leaves_no_certain_class(weight: float) -> None:
+    belief = seen_belief()
+    weigh(belief, weight)
+    assert belief.class_error == pytest.approx(1.0)
+
+
 def test_the_mass_of_a_class_may_vary() -> None:
     varied = {"cube": ObjectClass("cube", 0.05, 0.0354, mass=0.05, mass_std=0.1)}
     assert compute_weight_log_ratios(1.0, STD, varied)["cube"] > -2.0

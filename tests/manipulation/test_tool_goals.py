@@ -11,6 +11,7 @@ from at_hand import look, pick
 from executive.cell.arm import Goal
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.objects import ObjectClass
+from executive.cells.fake.arm import FakeArm
 from executive.cells.fake.cell import FakeCell
 from executive.manipulation.tool_goals import (
     DROP_HEIGHT,
@@ -69,6 +70,16 @@ def test_where_nothing_is_free_it_is_the_safe_place_all_the_same(
     fake.world.put("cube", 0.5, 0.1)
     item, cube = picked(fake, "cube"), fake.cell.classes["cube"]
     assert make_put_down_goal(fake.cell, cube, 0.01, item).position[:2] == pytest.approx(SAFE)
+
+
+def test_a_place_out_of_reach_is_not_chosen(
+    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        FakeArm, "describe_unreachable", lambda arm, goal: "too far" if goal.position[0] <= SAFE[0] else ""
+    )
+    goal = make_put_down_goal(fake.cell, fake.cell.classes["cube"], 0.01, held)
+    assert goal.position[0] > SAFE[0]
 
 
 def test_the_goal_of_an_approach_lies_below_the_surface_and_the_last_part_is_slow(fake: FakeCell) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from executive.cells.fake.arm import FakeTool
 from executive.cells.fake.cell import FakeCell
 from executive.testing.faults import during, seal_breaks
 from executive.testing.run_mission import run_mission
@@ -22,6 +23,13 @@ def test_a_dropped_object_does_not_end_the_sort_by_weight(skill: str) -> None:
     result = run_mission("weigh_and_sort", faults=faults, arrange=put_objects)
     assert result.list_failure_reasons(f"*/{skill}") == ["dropped"]
     assert (result.status, result.items["placed"], result.agrees) == ("SUCCESS", 3, True)
+
+
+def test_a_broken_load_cell_leaves_all_objects_on_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FakeTool, "load", 0.0)
+    result = run_mission("weigh_and_sort", arrange=put_objects)
+    assert (result.status, result.items["rejected"], result.agrees) == ("INCOMPLETE", 3, True)
+    assert "the load cell is broken" in result.message
 
 
 def test_after_the_working_time_the_held_object_is_put_down_and_no_other_is_picked() -> None:

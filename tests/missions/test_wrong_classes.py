@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from executive.cell.detection import Detection
@@ -43,9 +44,60 @@ def test_a_class_that_is_always_mistaken_is_in_no_wrong_bin_and_rejected_by_its_
     assert result.list_failure_reasons().count("contradicted") == 6
 
 
-def test_labels_that_the_cell_does_not_know_are_reported_and_the_table_is_not_empty() -> None:
-    result = sorted_with("sort_overhead", {"cube": "box", "duck": "rubber-duck"})
-    assert (result.status, result.items["placed"], result.accounts.unknown_labels) == (
-        "SUCCESS", 1, {"box": 2, "rubber-duck": 1},
-    )  # fmt: skip
-    assert (result.is_table_empty, result.audit["unseen"]) == (False, 3)
+@pytest.mark.parametrize("mission", ["sort_overhead", "sort_wrist"])
+@pytest.mark.parametrize("label", ["banana", "Cube"])
+def test_objects_of_no_class_are_reported_as_not_sorted(mission: str, label: str) -> None:
+    result = sorted_with(mission, {"cube": label})
+    assert (result.status, result.items["placed"], result.items["rejected"]) == ("INCOMPLETE", 2, 2)
+    assert (result.agrees, result.accounts.unknown_labels) == (True, {label: 2})
+    assert f'{label}-1 (the cell has no class "{label}"' in result.message
+
+
+def sorted_beside_banana(
+    is_shown: Callable[[int], bool], x: float, y: float, confidence: float, **cell: str
+) -> MissionResult:
+    """Sort `OBJECTS`; some looks also show a banana at (x, y) [m]."""
+
+    def arrange(fake: FakeCell) -> None:
+        def add_banana(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
+            camera = fake.camera.capture()
+            column, row, depth = camera.matrix @ camera.X_WC.inverse().apply(np.array([x, y, 0.025]))
+            u, v = column / depth, row / depth
+            banana = Detection("banana", confidence, (u - 9, v - 9, u + 9, v + 9))
+            return [*true, banana] if is_shown(look) else true
+
+        fake.world.objects.clear()
+        for thing in OBJECTS:
+            fake.world.put(*thing)
+        fake.detector.make_answer = add_banana
+
+    return run_mission("sort_overhead", FakeCell, arrange=arrange, set=cell)
+
+
+@pytest.mark.parametrize(
+    ("is_shown", "x", "y", "confidence", "status"),
+    [
+        (lambda look: True, 0.5, 0.0, 0.9, "INCOMPLETE"),
+        (lambda look: look >= 5, 0.5, 0.0, 0.9, "INCOMPLETE"),
+        (lambda look: look % 2 == 0, 0.5, 0.0, 0.9, "INCOMPLETE"),
+        (lambda look: look == 1, 0.5, 0.0, 0.9, "SUCCESS"),
+        (lambda look: look == 3, 0.5, 0.0, 0.9, "SUCCESS"),
+        (lambda look: look <= 6, 0.5, 0.0, 0.9, "SUCCESS"),
+        (lambda look: True, 0.5, 0.0, 0.4, "SUCCESS"),
+        (lambda look: True, 0.8, 0.0, 0.9, "SUCCESS"),
+        (lambda look: True, 0.35, 0.5, 0.9, "SUCCESS"),
+        (lambda look: look == 1, 0.46, -0.12, 0.9, "SUCCESS"),
+    ],
+    ids=["always", "late", "every other look", "one look", "a later look", "taken away", "doubtful",
+         "beside the workspace", "in a bin", "box of a cube"],
+)  # fmt: skip
+def test_a_box_of_no_class_counts_if_looks_confirm_it_in_the_workspace(
+    is_shown: Callable[[int], bool], x: float, y: float, confidence: float, status: str
+) -> None:
+    result = sorted_beside_banana(is_shown, x, y, confidence)
+    assert (result.status, result.items["placed"]) == (status, 4)
+
+
+def test_a_label_that_the_cell_file_ignores_is_not_counted() -> None:
+    result = sorted_beside_banana(lambda look: True, 0.5, 0.0, 0.9, **{"cell.unknown.ignore": "[banana]"})
+    assert (result.status, result.accounts.unknown_labels, result.is_table_empty) == ("SUCCESS", {}, True)

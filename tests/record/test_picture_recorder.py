@@ -7,7 +7,16 @@ from itertools import chain
 import cv2
 import numpy as np
 import pytest
-from events import at, detected, frame_searched, item_changed, run_started, skill_ended, skill_started
+from events import (
+    at,
+    detected,
+    frame_searched,
+    item_changed,
+    run_ended,
+    run_started,
+    skill_ended,
+    skill_started,
+)  # fmt: skip
 
 from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, NodeEnded, TargetSelected, TimedEvent
@@ -21,11 +30,14 @@ NEAR = detected("cube", box=[90, 40, 120, 70], position=[0.5, -0.1, 0.02])
 DUCK = detected("duck", box=[20, 90, 50, 120], position=[0.6, 0.1, 0.02])
 
 
-def look(number: int, *found: DetectedObject) -> list[TimedEvent]:
+def look(number: int, *found: DetectedObject, **more) -> list[TimedEvent]:
     image = np.full((160, 160, 3), 150, np.uint8)
     visible = np.ones((160, 160), bool)
     frame = Frame(number, "overhead", image, None, np.eye(3), Pose.identity(), 0.5, visible, 0)
-    return [at(number, FrameCaptured(frame), 0.5), at(number, frame_searched(*found, frame=number), 0.5)]
+    return [
+        at(number, FrameCaptured(frame), 0.5),
+        at(number, frame_searched(*found, frame=number, **more), 0.5),
+    ]
 
 
 def decision(frame: int = 1, tick: int = 12) -> list[TimedEvent]:
@@ -80,6 +92,20 @@ def test_a_decision_is_drawn_on_the_frame_it_rests_on(tmp_path):
     # The chosen box's edge has the colour of the first class; the image is drawn four times as large.
     blue, green, red = (int(value) for value in image[220, 80])
     assert blue > green > red + 40
+
+
+def test_a_rejected_item_of_no_class_is_drawn_at_the_end(tmp_path, drawn):
+    # The ledger reports an item before the look that shows it.
+    position = (0.6, 0.1, 0.02)
+    shown(
+        tmp_path, item("duck-1", "seen", position=position, looks=1),
+        look(1, DUCK, CUBE, unknown_labels=["duck"]), look(2, CUBE), decision(),
+        item("duck-1", "rejected", position=position, looks=1), item("cube-2", "rejected"),
+        [at(20, run_ended(), 1.0)],
+    )  # fmt: skip
+    scene = drawn["000020_duck-1.jpg"]
+    assert (scene.item, scene.selected_index, len(scene.detections)) == ("duck-1", 0, 2)
+    assert list(drawn) == ["000012_cube-1.jpg", "000020_duck-1.jpg"]
 
 
 def test_a_picture_says_what_the_run_is_about(tmp_path, drawn):

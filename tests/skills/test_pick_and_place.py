@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from executive.cell.objects import Target
+from executive.cells.fake.arm import FakeTool
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
@@ -163,11 +164,16 @@ def test_a_seal_that_breaks_on_the_way_is_dropped_and_the_arm_stops(fake: FakeCe
     assert fake.ledger.describe("cube-1").state == "lost", "a dropped item is looked for again"
 
 
+@pytest.mark.parametrize(
+    ("attribute", "value"),
+    [("open", lambda tool: None), ("touching", True)],
+    ids=["held by the vacuum", "sticks to the lip"],
+)
 def test_what_does_not_come_off_is_stuck_and_not_placed(
-    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
+    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch, attribute: str, value: object
 ) -> None:
     run_skill(Transit(held=held, bin="red_bin"), fake)
-    monkeypatch.setattr(fake.tool, "open", lambda: None)
+    monkeypatch.setattr(FakeTool, attribute, value)
     result = run_skill(Release(held=held, bin="red_bin", settle=0.2), fake)
     assert (result.reason, result.message) == ("stuck", "cube-1 hangs on the tool 0.20 s after release")
     assert result.ticks == pytest.approx(0.2 * 240, abs=1)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import at_hand
 import pytest
 
 from executive.cell.workcell import CellOptions
+from executive.cells.fake.arm import FakeTool
 from executive.cells.fake.cell import FakeCell, SilentOperator, load_empty_cell
 from executive.geometry import GRAVITY
 from executive.skill import SkillFailed
@@ -63,6 +65,24 @@ def test_the_item_is_lifted_before_it_is_weighed() -> None:
     height = fake.arm.tool_pose.position[2]
     run_skill(Weigh(held=item, height=0.1), fake)
     assert fake.arm.tool_pose.position[2] == pytest.approx(height + 0.1)
+
+
+@pytest.mark.parametrize("zero", [0.1 * GRAVITY, -0.1 * GRAVITY, 20.0])
+def test_the_load_of_the_empty_tool_before_the_approach_is_the_zero(zero: float) -> None:
+    fake = make_fake()
+    fake.tool.load_error = zero
+    result = weigh(fake, pick(fake, "bottle"))
+    assert (result.outputs["weight"], result.outputs["bin"]) == (pytest.approx(0.05 * GRAVITY), "red_bin")
+
+
+@pytest.mark.parametrize("load", [0.0, 0.05 * GRAVITY, math.nan, math.inf])
+def test_a_load_that_never_changes_or_is_no_number_is_implausible(
+    load: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fake = make_fake()
+    item = pick(fake, "bottle")
+    monkeypatch.setattr(FakeTool, "load", load)
+    assert weigh(fake, item).reason == "implausible"
 
 
 def test_a_weight_of_another_class_that_looks_different_contradicts_the_look() -> None:

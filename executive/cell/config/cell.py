@@ -73,6 +73,14 @@ class DetectorConfig(Section):
         return dict(self.model_extra or {})
 
 
+class UndeclaredConfig(Section):
+    """Objects whose label is no class of the cell."""
+
+    ignore: tuple[Name, ...] = ()
+    """Labels whose objects may lie on the table: the run ignores their boxes. Any other object of no class
+    is rejected, so that the run ends as INCOMPLETE."""
+
+
 class CellConfig(Section):
     """A cell: robot, tool, camera, table, bins, objects and detectors.
 
@@ -111,6 +119,8 @@ class CellConfig(Section):
     `ray`, a ray test of the simulator."""
     objects: dict[Name, ObjectConfig] = Field(min_length=1)
     """Classes of objects by the label that the detectors report."""
+    unknown: UndeclaredConfig = UndeclaredConfig()
+    """Objects whose label is no class of the cell."""
     ledger: LedgerConfig = LedgerConfig()
     """Thresholds of the ledger, which tracks the objects."""
     safe_place: Vector

@@ -37,6 +37,9 @@ MAX_TOOL_SPEED = 1.0
 DEFAULT_BREAKAWAY_FORCE = 7.9
 """Breakaway force of the seals of the fake tool, unless a test changes it [N]."""
 
+LOAD_NOISE = 1e-9
+"""Amplitude of the noise of the load of the fake tool [N], so that the load cell does not seem broken."""
+
 
 @dataclass(frozen=True, eq=False)
 class FakeMotion:
@@ -230,7 +233,7 @@ class FakeTool:
     Args:
         world: The world with the objects.
         get_tip_position: Returns the position of the tool tip `(3,)` [m].
-        load_std: Standard deviation of a reading of `load` [N], which the fake tool only declares.
+        load_std: Declared standard deviation of a reading of `load` [N].
 
     Attributes:
         can_seal: Function that returns True if the cup can seal on the touched object; set by tests.
@@ -243,6 +246,7 @@ class FakeTool:
         self._get_tip_position = get_tip_position
         self.load_std = load_std
         self.load_error = 0.0
+        self._noise = LOAD_NOISE
         self.can_seal: Callable[[], bool] = lambda: True
         self.breakaway_force = DEFAULT_BREAKAWAY_FORCE
 
@@ -264,9 +268,10 @@ class FakeTool:
 
     @property
     def load(self) -> float:
-        """Weight of the held object by the mass of its class, plus `load_error` [N]; no noise."""
-        held = self._world.held_object
-        return self.load_error + (self._world.classes[held.label].mass * GRAVITY if held else 0.0)
+        """Weight of the held object by the mass of its class, plus `load_error` and alternating noise [N]."""
+        held, self._noise = self._world.held_object, -self._noise
+        force = self._world.classes[held.label].mass * GRAVITY if held else 0.0
+        return force + self.load_error + self._noise
 
     def close(self) -> None:
         """Seal the cup on the touched object."""

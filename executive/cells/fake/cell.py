@@ -118,7 +118,7 @@ class FakeCell(CellWithoutHardware):
             arm=self.arm,
             tool=self.tool,
             camera=self.camera,
-            detectors=screen_detectors(self.detectors, classes),
+            detectors=screen_detectors(self.detectors, classes, config.unknown.ignore),
             localizer=CellLocalizer("plane", classes, bins),
         )
 

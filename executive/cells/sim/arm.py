@@ -19,7 +19,7 @@ from executive.cells.sim.world import World
 from executive.errors import Fault
 from executive.events import Emit, discard_event
 from executive.geometry import Array, Pose
-from executive.motion.braking import plan_braking
+from executive.motion.braking import plan_braking, plan_retreat
 from executive.motion.planner import Planner
 from executive.motion.plans import Plan, PlanFactory
 from executive.motion.trajectory import Trajectory
@@ -29,14 +29,16 @@ DIFFERENTIATION_STEP = 1e-4
 START_TOLERANCE = math.radians(0.2)
 """Maximum difference between the position of a joint and its position at the start of a motion [rad]."""
 TRACKING_TOLERANCE = math.radians(0.5)
-"""Maximum tracking error of a joint [rad]; the error of an undisturbed arm is below 0.001°."""
+"""Maximum tracking error of a joint [rad]; the error of an undisturbed arm is below 0.001°. A larger error is
+the sign of a collision: something holds or pushes the arm."""
 
 
 class SimArm:
     """The arm of a PyBullet world; implements `executive.cell.arm.Arm`.
 
-    Call `advance` before each physics step; it commands the joint positions for the end of that step. The arm
-    brakes after a collision, or if a disturbance pushes the arm off its path.
+    Call `advance` before each physics step; it commands the joint positions for the end of that step. After a
+    collision, the arm brakes and moves back along its path. A collision is a new contact, or a disturbance
+    that pushes the arm off its path.
 
     Args:
         world: The world of the arm.
@@ -72,7 +74,6 @@ class SimArm:
         self._motion: Trajectory | None = None
         self._motion_time = 0.0
         self._braking_times: list[float] | None = None
-        self._fault_message: str | None = None
         self._commanded_q = self.q
         # A run may be interrupted before the first joint command is logged.
         if rebuilder is None or not rebuilder.braking_start[0].size:
@@ -107,12 +108,7 @@ class SimArm:
 
     @property
     def at_rest(self) -> bool:
-        """True while the arm neither follows a motion nor brakes; raises and clears a stored fault.
-
-        Raises:
-            Fault: The arm has left its commanded path since the last call.
-        """
-        self._raise_stored_fault()
+        """True while the arm neither follows a motion nor brakes."""
         return self._motion is None
 
     def describe_unreachable(self, goal: Goal) -> str:
@@ -142,16 +138,23 @@ class SimArm:
     def start(self, motion: Motion) -> None:
         """Begin to follow a motion. The arm must be at rest at the start of the motion.
 
+        If something has pushed the arm away from the start, the arm stays there, which counts as a collision.
+
         Raises:
-            Fault: The arm is moving, is not at the start, or did not plan the motion.
+            Fault: The arm is moving, was not sent to the start, or did not plan the motion.
         """
         self._require_rest("start a motion")
         reject_generator(motion)
         if not isinstance(motion, Trajectory):
             raise Fault(f"the simulated arm follows its own planned motions, not a {type(motion).__name__}")
-        self._store_position_error(motion.start, START_TOLERANCE, "the start of the motion")
-        self._raise_stored_fault()
-        self._motion, self._motion_time, self.collision = motion, 0.0, None
+        if error := _describe_difference(self._commanded_q, motion.start, START_TOLERANCE):
+            raise Fault(f"the start of the motion is not at the end of the last motion: {error}")
+        self.collision = self._describe_disturbance(START_TOLERANCE) or None
+        if self.collision is not None:
+            self._commanded_q = self.q
+            self.send_command()
+            return
+        self._motion, self._motion_time = motion, 0.0
         self._contact_monitor.reset()
         self._world.log.append_motion(motion)
 
@@ -162,10 +165,12 @@ class SimArm:
             self._braking_times = list(plan_braking(self._motion, self._motion_time, limits))
 
     def stop_after_collision(self, message: str) -> None:
-        """Set `collision` to a message and brake; do nothing if the arm is at rest or brakes already."""
+        """Set `collision` to a message, brake, and move back; do nothing at rest or while the arm brakes."""
         if self._motion is not None and self._braking_times is None:
             self.collision = message
-            self.stop()
+            braking_times = plan_braking(self._motion, self._motion_time, self.planner.limits)
+            retreat_times = plan_retreat(self._motion_time, float(braking_times[-1]))
+            self._braking_times = [*braking_times.tolist(), *retreat_times.tolist()]
 
     def close(self) -> None:
         """Cancel the plans that have not started, wait for the running plan, and end the planning thread."""
@@ -177,15 +182,12 @@ class SimArm:
 
     def advance(self) -> None:
         """Check for disturbances and collisions, and send the command for the next physics step."""
-        if self._fault_message is None and self._braking_times is None:
-            self._store_position_error(self._commanded_q, TRACKING_TOLERANCE, "the command")
-            if self._fault_message is not None:
-                self.stop()
         if self._motion is None:
             return
         if self._braking_times is None:
             lip_may_touch = self._motion_time >= self._motion.guarded_start_time
-            if message := self._contact_monitor.describe_new_contact(lip_may_touch):
+            message = self._contact_monitor.describe_new_contact(lip_may_touch)
+            if message := message or self._describe_disturbance(TRACKING_TOLERANCE):
                 self.stop_after_collision(message)
         if self._braking_times is None:
             self._motion_time += STEP
@@ -212,24 +214,22 @@ class SimArm:
         if isinstance(goal, str) and goal not in self._poses:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
 
-    def _store_position_error(self, q: Array, tolerance: float, description: str) -> None:
-        """Store a fault message with `description` if a joint is over `tolerance` [rad] away from `q`."""
-        errors = np.abs(self.q - q).tolist()
-        joint = errors.index(max(errors))
-        if errors[joint] > tolerance:
-            self._fault_message = (
-                f"{description} is {math.degrees(errors[joint]):.2f}° away from the position of joint "
-                f"{joint + 1}; {math.degrees(tolerance):.1f}° are allowed"
-            )
+    def _describe_disturbance(self, tolerance: float) -> str:
+        """Return a sentence if a joint is over `tolerance` [rad] away from its command, else ""."""
+        error = _describe_difference(self.q, self._commanded_q, tolerance)
+        return f"something holds or pushes the arm off its path: {error}" if error else ""
 
     def _require_rest(self, action: str) -> None:
-        self._raise_stored_fault()
         if self._motion is not None:
             remaining = self._motion.duration - self._motion_time
             raise Fault(f"the arm cannot {action} while moving ({remaining:.2f} s to go); wait for `at_rest`")
 
-    def _raise_stored_fault(self) -> None:
-        """Raise and clear the stored fault, if any."""
-        if self._fault_message is not None:
-            message, self._fault_message = self._fault_message, None
-            raise Fault(message)
+
+def _describe_difference(q: Array, expected_q: Array, tolerance: float) -> str:
+    """Return a clause if a joint at `q` `(n,)` [rad] is over `tolerance` [rad] away from `expected_q`."""
+    errors = np.abs(q - expected_q).tolist()
+    joint = errors.index(max(errors))
+    degrees, allowed = math.degrees(errors[joint]), math.degrees(tolerance)
+    return (
+        f"joint {joint + 1} is {degrees:.2f}° away; {allowed:.1f}° are allowed" if degrees > allowed else ""
+    )

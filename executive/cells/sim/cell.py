@@ -103,7 +103,7 @@ class SimCell(SimCellChecks, CellWithoutHardware):
             arm=self._arm,
             tool=self._tool,
             camera=self._camera,
-            detectors=screen_detectors(self._detectors, classes),
+            detectors=screen_detectors(self._detectors, classes, config.unknown.ignore),
             classes=classes,
             localizer=localizer,
         )

@@ -121,9 +121,9 @@ class World:
 
     def name_body(self, body: int) -> str:
         """Return the name of a body for messages."""
-        names = {self.table: "the table", self.floor: "the floor"}
+        names = {self.table: "the table", self.floor: "the floor", self.arm: "the arm"}
         names |= {bin_body: name for name, bin_body in self.bin_bodies.items()}
-        return f"a {self.labels[body]}" if body in self.labels else names.get(body, "the arm")
+        return f"a {self.labels[body]}" if body in self.labels else names.get(body, "something unknown")
 
     def name_link(self, link: int) -> str:
         """Return the name of a link of the arm for messages, by its index."""

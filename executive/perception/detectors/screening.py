@@ -5,7 +5,7 @@ Every answer of every kind of detector is screened before a skill reads it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from itertools import filterfalse
 
@@ -32,14 +32,15 @@ MAX_SECOND_CLASS_RATIO = 0.5
 def screen_answer(answer: Answer, frame: Frame, view: str, label_map: Mapping[str, str]) -> Answer:
     """Return an answer with its detections divided into `confident`, `doubtful` and `unknown`.
 
-    Boxes that the arm occludes, and unknown labels with a confidence below the threshold, are omitted. The
-    label of a class that looks like another class is replaced by the label of the other class.
+    Boxes that the arm occludes, ignored labels, and doubtful boxes with unknown labels are omitted. The label
+    of a class that looks like another class is replaced by the label of the other class.
 
     Args:
         answer: Answer with all detections in `confident`.
         frame: The searched frame.
         view: Name of the searched region, for an error message.
-        label_map: For each class of the cell, the class that the detectors report for it.
+        label_map: For each class of the cell, the class that the detectors report for it; "" for each ignored
+            label.
 
     Raises:
         Crowded: There are more than `MAX_BOXES` boxes.
@@ -59,10 +60,10 @@ def screen_answer(answer: Answer, frame: Frame, view: str, label_map: Mapping[st
     for detection in answer.confident:
         if frame.compute_visible_fraction(detection.box) < MIN_VISIBLE_FRACTION:
             continue
-        if detection.label in label_map:
-            detections = confident if _is_confident(detection, threshold) else doubtful
-            detections.append(replace(detection, label=label_map[detection.label]))
-        elif detection.confidence >= threshold:
+        label, is_confident = label_map.get(detection.label), _is_confident(detection, threshold)
+        if label:
+            (confident if is_confident else doubtful).append(replace(detection, label=label))
+        elif label is None and is_confident:
             unknown.append(detection)
     return replace(answer, confident=tuple(confident), doubtful=tuple(doubtful), unknown=tuple(unknown))
 
@@ -74,7 +75,8 @@ class ScreenedDetector:
     Attributes:
         detector: The detector.
         name: Name of the detector in the cell file.
-        label_map: For each class of the cell, the class that the detectors report for it.
+        label_map: For each class of the cell, the class that the detectors report for it; "" for each ignored
+            label.
     """
 
     detector: Detector
@@ -90,10 +92,16 @@ class ScreenedDetector:
 
 
 def screen_detectors(
-    detectors: Mapping[str, Detector], classes: Mapping[str, ObjectClass]
+    detectors: Mapping[str, Detector],
+    classes: Mapping[str, ObjectClass],
+    ignored_labels: Collection[str] = (),
 ) -> dict[str, Detector]:
-    """Return detectors with screened answers, by name; `classes` are the classes of the cell by label."""
-    label_map = {label: object_class.detected_label for label, object_class in classes.items()}
+    """Return detectors with screened answers, by name.
+
+    `classes` are the classes of the cell by label; boxes with `ignored_labels` are omitted.
+    """
+    label_map = dict.fromkeys(ignored_labels, "")
+    label_map |= {label: object_class.detected_label for label, object_class in classes.items()}
     return {name: ScreenedDetector(detector, name, label_map) for name, detector in detectors.items()}
 
 

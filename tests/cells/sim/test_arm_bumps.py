@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import numpy as np
+import pybullet
 import pytest
 from rig import Rig
 
@@ -12,6 +13,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, build_object_class
 from executive.cell.objects import Load
 from executive.geometry import Array
+from executive.motion.braking import RETREAT_TIME
 from executive.motion.trajectory import Trajectory
 from tests.benchmarks.halts import measure_distance
 
@@ -48,7 +50,8 @@ def bump(rig: Rig, motion: Trajectory, earliest: float = 0.0) -> str:
         s = rig.arm._motion_time
         rig.step()
     assert s >= earliest, rig.arm.collision
-    assert rig.run() <= 120
+    assert rig.run() <= 400
+    assert rig.arm._commanded_q == pytest.approx(motion.state_at(max(0.0, s - RETREAT_TIME)).q)
     assert measure_distance(rig.arm._commanded_q, motion) < 1e-9
     assert rig.arm.collision is not None
     return rig.arm.collision
@@ -105,3 +108,16 @@ def test_the_shaft_of_the_tool_feels_a_bump_on_a_guarded_motion_too(rig: Rig) ->
     float_at(rig, "cube", np.add(on_the_way_down(rig, motion), (0, -beside, NECK_LENGTH - 0.025)), mass=1.0)
     said = bump(rig, motion, earliest=motion.guarded_start_time)
     assert said.startswith("the tool ran into a cube, with the tool at")
+
+
+@pytest.mark.parametrize("mass", [0.0, 1000.0], ids=["fixed", "heavy"])
+def test_an_unknown_obstacle_blocks_each_motion_and_breaks_nothing(rig: Rig, mass: float) -> None:
+    rig.go(LEFT)
+    x, y, z = tool_at(rig, rig.planned(RIGHT), 0.5)
+    shape = rig.world.client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.03, 0.03, z / 2])
+    post = rig.world.client.createMultiBody(mass, shape, basePosition=[x, y, z / 2])
+    for _ in range(3):
+        assert bump(rig, rig.planned(RIGHT)).startswith("the tool ran into something unknown")
+        assert rig.world.client.getClosestPoints(rig.world.arm, post, 0.0) == (), "it moved back"
+    rig.go("home")
+    assert rig.arm.collision is None
