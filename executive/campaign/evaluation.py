@@ -16,13 +16,13 @@ from executive.cells.sim.object_positions import find_max_object_count
 from executive.cells.sim.scene_file import load_scene
 from executive.errors import InputError, explain_os_errors
 from executive.mission.findings import suggest_choice
-from executive.perception.detectors.detector_registry import find_detector_errors
+from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 from executive.perception.envelope import measurement
 from executive.perception.localization import CellLocalizer
 from executive.record.atomic_file import write_atomically
 from executive.training.evaluation import evaluate
 from executive.training.evaluation.cell_detector import CellDetector
-from executive.training.evaluation.metrics import NO_OBJECT, Evaluation
+from executive.training.evaluation.metrics import NO_OBJECT, ClassMetrics, Evaluation
 from executive.training.evaluation.worst_mistakes import WorstMistakes
 from executive.training.labelled_image import LabelledImage
 from executive.training.rendering import generate_dataset, render_run_frames
@@ -30,6 +30,10 @@ from executive.training.samples import LabelledDataset
 
 MAX_OBJECT_COUNT = 20
 """Maximum number of objects in a rendered scene; fewer if the table has no room for them."""
+MIN_OBJECT_COUNT = 30
+"""Minimum number of objects of each class in a measurement that runs may use."""
+MIN_ACCURACY = 0.5
+"""Minimum precision and recall in a measurement that runs may use."""
 OpenProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
 """Function that opens a progress bar with a name; the context manager yields `update(done, total)`."""
 
@@ -43,7 +47,7 @@ class ImageSettings:
     """Settings for the images on which detectors are measured, and for the detections.
 
     Attributes:
-        dataset: Folder of a dataset; None: rendered scenes of the cell.
+        dataset: Labelled images; None: rendered scenes of the cell.
         image_count: Number of rendered images per cell.
         seed: Random seed.
         is_randomized: True for scenes with domain randomization; False for the initial scenes of runs.
@@ -53,7 +57,7 @@ class ImageSettings:
         threshold: Minimum confidence of a detection; None: the threshold of the detector.
     """
 
-    dataset: Path | None
+    dataset: LabelledDataset | None
     image_count: int
     seed: int
     is_randomized: bool
@@ -140,8 +144,11 @@ def measure_detector(
     cell_of_images = None if settings.dataset is not None or settings.is_randomized else detector.cell
     camera = next(iter(cell_of_images.cameras.values())) if cell_of_images else None
     classes = tuple(detector.cell.objects) if detector.cell else None
+    configs, name, folder = detector.configs, detector.name, detector.base_folder
+    if settings.dataset is not None:
+        known_classes = classes or find_detectable_labels(configs, folder)[name] or ()
+        settings.dataset.match_classes(known_classes, f"detector {name}")
     with _open_images(detector.cell, settings, progress) as samples:
-        configs, name, folder = detector.configs, detector.name, detector.base_folder
         cell_detector = CellDetector(
             configs, name, base=folder, camera=camera, view=settings.view, classes=classes
         )
@@ -159,7 +166,7 @@ def _open_images(
 ) -> Iterator[Images]:
     """Open the images of the dataset, or render scenes of the cell; a context manager."""
     if settings.dataset is not None:
-        yield LabelledDataset(settings.dataset)
+        yield settings.dataset
         return
     assert cell is not None
     with tempfile.TemporaryDirectory() as folder:
@@ -197,6 +204,24 @@ def _build_localizer(cell: CellConfig) -> Localizer | None:
     return CellLocalizer(cell.localization, classes)
 
 
+def find_weakness(detector: DetectorUnderTest, evaluation: Evaluation) -> str:
+    """Return the reason why a measurement predicts runs badly; "" if there is none.
+
+    A precision or recall near zero is usually an error in the labels, not in the detector.
+    """
+    assert detector.cell is not None
+    if evaluation.reliability is None:
+        return f"no usable answer: {evaluation.why}"
+    counts = {label: 0 for label, section in detector.cell.objects.items() if not section.looks_like}
+    counts |= {label: metrics.objects for label, metrics in evaluation.by_class.items()}
+    problems = [f"{count} {label} objects" for label, count in counts.items() if count < MIN_OBJECT_COUNT]
+    all_classes = ClassMetrics(evaluation.objects, evaluation.precision, evaluation.recall)
+    for name, metrics in {"all classes": all_classes, **evaluation.by_class}.items():
+        if min(metrics.precision, metrics.recall) < MIN_ACCURACY:
+            problems.append(f"precision {metrics.precision:.2f}, recall {metrics.recall:.2f} of {name}")
+    return ", ".join(problems)
+
+
 def store_evaluation(
     detector: DetectorUnderTest, evaluation: Evaluation, out: Path | None, *, command: str, duration: float
 ) -> Path:
@@ -210,13 +235,11 @@ def store_evaluation(
         duration: Duration of the evaluation [s].
 
     Raises:
-        InputError: The detector gave no usable answer to any image, or the file cannot be read or written.
+        InputError: The file cannot be read or written.
     """
     assert detector.cell is not None
+    assert evaluation.reliability is not None
     path = out or detector.base_folder / f"{detector.cell.cell}{measurement.MEASUREMENT_SUFFIX}"
-    if evaluation.reliability is None:
-        problem = f"detector {detector.name} gave no usable answer: {evaluation.why}"
-        raise InputError(f"{problem}; nothing was measured")
     new_measurement = measurement.Measurement(
         detector=detector.name,
         fingerprint=dict(measurement.compute_fingerprint(detector.cell, detector.name, detector.base_folder)),

@@ -10,6 +10,7 @@ import click
 
 from executive.cli import options
 from executive.cli.streams import keep_stdout_clean, print_json
+from executive.errors import InputError
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 """File name suffixes of the formats in which the worst mistakes can be saved."""
@@ -54,13 +55,17 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
     help="File for the error rates that runs read; by default CELL.measured.json beside the cell file.",
 )  # fmt: skip
 @options.workers_option
+@click.option(
+    "--force", is_flag=True,
+    help="Store a measurement with precision or recall below 0.5, or with fewer than 30 objects of a class.",
+)  # fmt: skip
 @click.option("--sheet", type=options.FILE, metavar="FILE.png", help="Image file for the worst mistakes.")
 @options.json_option
 def command(
     cells: tuple[str, ...], detector_name: str | None, dataset: Path | None, weights: Path | None,
     labels: Path | None, images: int, seed: int, threshold: float | None, varied: bool, view: str,
-    scene: Path | None, overrides: dict[str, str], out: Path | None, workers: int, sheet: Path | None,
-    as_json: bool,
+    scene: Path | None, overrides: dict[str, str], out: Path | None, workers: int, force: bool,
+    sheet: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Measure the accuracy of a detector.
 
@@ -84,24 +89,27 @@ def command(
         (not has_image_suffix, f'the name of --sheet "{sheet}" must end in {", ".join(IMAGE_SUFFIXES)}'),
     )
     results: dict[str, Any] = {}
+    weaknesses: list[str] = []
     # Only a measurement under the conditions of a run predicts the error rates in runs.
     has_run_conditions = threshold is None and view == "table" and not (weights or varied or scene)
     is_stored = bool(cells) and has_run_conditions and (out is not None or not overrides)
     with keep_stdout_clean():
         from executive.campaign import evaluation
         from executive.cli.cells import find_cell, load_cells
-        from executive.cli.progress import print_report, report_polygons, show_progress
+        from executive.cli.progress import print_report, show_progress
         from executive.training.evaluation.worst_mistakes import WorstMistakes
+        from executive.training.samples import LabelledDataset
         from executive.view.detector_results import list_metrics
 
         worst_mistakes = WorstMistakes()
-        settings = evaluation.ImageSettings(dataset, images, seed, varied, view, workers, scene, threshold)
+        samples = LabelledDataset(dataset) if dataset else None
+        if samples:
+            click.echo(samples.summary, err=True)
+        settings = evaluation.ImageSettings(samples, images, seed, varied, view, workers, scene, threshold)
         cell_names = cells or (() if dataset else ("overhead",))
         configs = load_cells(cell_names, overrides)
         configs_by_file = dict(zip(map(find_cell, cell_names), configs.values(), strict=True))
         detectors = list(evaluation.list_detectors(configs_by_file, detector_name, weights, labels))
-        if dataset is not None:
-            report_polygons(dataset)
         for detector in detectors:
             evaluation.check_detector(detector, settings)
         for detector in detectors:
@@ -110,7 +118,12 @@ def command(
             print_report(list_metrics(name, detector.name, result))
             kind = detector.configs[detector.name].kind
             results[name] = {"detector": detector.name, "kind": kind, **result.to_dict()}
-            if is_stored and detector.cell is not None:
+            if not is_stored or detector.cell is None:
+                continue
+            weakness = evaluation.find_weakness(detector, result)
+            if weakness and not (force and result.reliability):
+                weaknesses.append(f"the measurement of detector {detector.name} is not stored: {weakness}")
+            else:
                 source = f"--dataset {dataset}" if dataset else f"--images {images} --seed {seed}"
                 arguments = f"--cell {detector.cell.cell} --detector {detector.name} {source}"
                 repeat, duration = f"executive evaluate {arguments}", time.monotonic() - start_time
@@ -125,3 +138,6 @@ def command(
     if as_json:
         files = {"scene": scene and str(scene), "weights": weights and str(weights)}
         print_json({"seed": seed, "varied": varied, **files, "measured": results})
+    if weaknesses:
+        advice = "check the labels, measure more images, or store the measurement with --force"
+        raise InputError(f"{'; '.join(weaknesses)}; {advice}")

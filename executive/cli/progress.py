@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import click
 from rich import progress
@@ -76,14 +75,6 @@ def print_report(lines_and_tables: Iterable[RenderableType]) -> None:
     console = Console(stderr=True, highlight=False, markup=False, force_terminal=False)
     for line_or_table in lines_and_tables:
         console.print(line_or_table, soft_wrap=isinstance(line_or_table, str))
-
-
-def report_polygons(folder: Path) -> None:
-    """Print a note if labels in a dataset folder are polygons, of which only the bounding boxes are used."""
-    from executive.training.samples import LabelledDataset
-
-    if count := LabelledDataset(folder).polygon_count:
-        click.echo(f"note: {count} polygons in {folder} are replaced by their bounding boxes", err=True)
 
 
 def print_halt() -> None:

@@ -15,7 +15,7 @@ from executive.cli.streams import keep_stdout_clean
 @click.command(name="train")
 @click.option(
     "--dataset", type=FOLDER, required=True,
-    help="COCO or YOLO dataset, from `executive dataset` or an export of Roboflow.",
+    help="COCO or YOLO dataset, from `executive dataset` or an export of an annotation tool.",
 )  # fmt: skip
 @click.option("--out", type=FOLDER, required=True, help="Folder for model, checkpoints and metrics.")
 @click.option(
@@ -34,12 +34,11 @@ def command(dataset: Path, out: Path, model: Path | None, rate: float | None, ep
     Needs the extra `train`: uv sync --extra train (a download of about 3 GB on Linux).
     """
     with keep_stdout_clean():
-        from executive.cli.progress import report_polygons, show_progress
-        from executive.training.samples import list_splits
-        from executive.training.train import Settings, train
+        from executive.cli.progress import show_progress
+        from executive.training.train import Settings, load_dataset, train
 
-        for split in list_splits(dataset):
-            report_polygons(split)
+        for images in load_dataset(dataset).values():
+            click.echo(images.summary, err=True)
         with show_progress("training") as progress:
             train(dataset, out, Settings(model, rate, epochs, seed), _make_epoch_printer(epochs), progress)
         click.echo(

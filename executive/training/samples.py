@@ -1,44 +1,42 @@
-"""Reader of labelled images from COCO and YOLO folders, for instance exports of Roboflow."""
+"""Reader of labelled images: COCO and YOLO datasets, for instance of Roboflow, CVAT and Ultralytics."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter, ValidationError
+from PIL import ExifTags, Image
+from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
 from executive.cell.frame import Box
-from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import MAX_QUOTATION_LENGTH, InputError
+from executive.geometry import Array
+from executive.training import dataset_layout
 from executive.training.labelled_image import LabelledImage
 
-COCO_FILE_NAME = "_annotations.coco.json"
-"""Name of the file with the COCO annotations of a split."""
-YOLO_CLASS_FILES = ("data.yaml", "data.yml")
-"""Permitted names of the file with the class names of a YOLO dataset."""
-IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp")
-"""Suffixes of the image files in a YOLO dataset."""
-YOLO_BOX_VALUE_COUNT = 4
-"""Number of values of a YOLO box: centre x, centre y, width and height."""
 MAX_OBJECT_COUNT = 1_000
 """Maximum number of labelled objects in an image; RF-DETR detects at most 300 (its number of queries)."""
 MAX_COCO_FILE_SIZE = 500_000_000
 """Maximum size of a COCO file [byte]; the largest annotation file of COCO 2017 has 470 MB."""
-MAX_LABEL_FILE_SIZE = 10_000_000
-"""Maximum size of the YOLO label file of an image [byte]."""
-MAX_CLASS_FILE_SIZE = 100_000
-"""Maximum size of a YOLO class file [byte]."""
-NORMALIZED_TOLERANCE = 1e-6
-"""Maximum rounding error of a normalized coordinate, as a fraction of the image side."""
-EVALUATION_SPLITS = ("test", "valid", "val", "train")
-"""Folders of a dataset, in the order in which they are preferred for an evaluation."""
+MAX_NORMALIZED = 2.0
+"""Maximum absolute value of a normalized coordinate; 0 to 1 is inside of the image."""
+MIN_BOX_SIZE = 1.0
+"""Minimum width and height of the box of an object [pixel]."""
+MAX_COPY_DISTANCE = 1.0
+"""Maximum difference between the coordinates of two boxes of the same object [pixel]."""
+CORNER_FRACTIONS = (0.9, 0.1)
+"""Minimum fractions of the boxes of a COCO file with corners: boxes that fit as two corners, and boxes that
+end outside of their images if they are read as corner and size."""
+MAX_FRACTION = 1.02
+"""Maximum coordinate in an image, as a fraction of its width or height; annotation tools round."""
+OUTSIDE, SMALL = "boxes outside of the image dropped", "boxes smaller than a pixel dropped"
+"""Descriptions of dropped boxes in the summary of a dataset."""
 
 
 @dataclass
@@ -47,52 +45,35 @@ class ImageAnnotation:
 
     Attributes:
         labels: Class of each object.
-        boxes: Left, top, right and bottom of each object, in pixels or normalized to 0 to 1.
-        is_normalized: True if the boxes are in normalized coordinates; False if they are in pixels.
-        polygon_count: Number of boxes that enclose an annotated polygon.
+        boxes: Left, top, right and bottom of each object, inside of the upright image [pixel].
+        scale: Factors on x and y from the annotations to the image, which may be resized.
     """
 
-    labels: list[str] = field(default_factory=list)
-    boxes: list[Box] = field(default_factory=list)
-    is_normalized: bool = False
-    polygon_count: int = 0
-
-    def to_pixel_boxes(self, width: int, height: int) -> tuple[Box, ...]:
-        """Return the boxes in pixels for an image of `width` by `height` pixels."""
-        x_scale, y_scale = (width, height) if self.is_normalized else (1, 1)
-        return tuple(
-            (left * x_scale, top * y_scale, right * x_scale, bottom * y_scale)
-            for left, top, right, bottom in self.boxes
-        )
-
-    def add(self, label: str, box: Box, message_prefix: str) -> None:
-        """Add an object; `message_prefix` is the start of the error message for too many objects."""
-        if len(self.labels) == MAX_OBJECT_COUNT:
-            raise InputError(f"{message_prefix} more than {MAX_OBJECT_COUNT} objects; divide the image")
-        self.labels.append(label)
-        self.boxes.append(box)
+    labels: tuple[str, ...]
+    boxes: tuple[Box, ...]
+    scale: tuple[float, float]
 
 
-Annotations = Mapping[Path, ImageAnnotation]
-"""Annotations of a split by the path of the image, sorted by path."""
 Length = Annotated[FiniteFloat, Field(ge=0)]
 """Width or height of a COCO box [pixel]."""
-ContentT = TypeVar("ContentT")
 
 
 class _CocoImage(BaseModel):
-    """An image of a COCO file."""
+    """An image of a COCO file; a width or height of 0 is unknown."""
 
     id: int
     file_name: str
+    width: int = Field(0, ge=0)
+    height: int = Field(0, ge=0)
 
 
 class _CocoObject(BaseModel):
-    """A labelled object; `bbox` has left, top, width and height [pixel]."""
+    """A labelled object; `bbox` has left, top, width and height [pixel]; a crowd is not a single object."""
 
     image_id: int
     category_id: int
     bbox: tuple[FiniteFloat, FiniteFloat, Length, Length]
+    iscrowd: bool = False
 
 
 class _CocoCategory(BaseModel):
@@ -100,6 +81,7 @@ class _CocoCategory(BaseModel):
 
     id: int
     name: str
+    supercategory: str | None = None
 
 
 class _CocoFile(BaseModel):
@@ -110,140 +92,195 @@ class _CocoFile(BaseModel):
     categories: list[_CocoCategory]
 
 
-class _YoloClassFile(BaseModel):
-    """A YOLO class file: class names by class number, or in the order of the class numbers."""
+class LabelledDataset:
+    """Labelled images of a split of a dataset.
 
-    names: dict[int, str] | list[str]
+    Args:
+        folder: Folder of the dataset, or of one split.
+        split: `train`, `valid` or `test`; "": the first existing split of `dataset_layout.SPLITS`.
 
-
-def is_split(folder: Path) -> bool:
-    """Return True if a folder is a split of a dataset: labelled images in COCO or YOLO format."""
-    is_yolo = (folder / "images").is_dir() and (folder / "labels").is_dir()
-    return is_yolo or (folder / COCO_FILE_NAME).is_file()
-
-
-def read_annotations(split: Path) -> Annotations:
-    """Return the annotations of one split of a dataset.
+    Attributes:
+        annotations: Annotations by the path of the image.
+        classes: Class names in the order of their numbers.
+        notes: Numbers of dropped or changed boxes and images, by description.
 
     Raises:
-        InputError: A file is damaged, or an image is missing or lies outside of the folder; the message
-            names the file and the line or the key.
+        InputError: There are no labelled images or no objects, the annotations are damaged or ambiguous, or
+            an image is missing or lies outside of the folder; the message names file and line or key.
     """
-    images = _read_coco(split) if (split / COCO_FILE_NAME).is_file() else _read_yolo(split)
-    return dict(sorted(images, key=lambda image: str(image[0])))
+
+    def __init__(self, folder: Path, split: str = "") -> None:
+        splits = dataset_layout.find_splits(folder)
+        split = split or next(iter(splits), "")
+        self._name = f"{folder}, split {split}" if split else f"{folder}"
+        if split not in splits:
+            parts = "images, for instance .jpg, and a COCO file, or labels/ and data.yaml (YOLO)"
+            raise InputError(f"{self._name} contains no labelled images; it must contain {parts}")
+        self._source = splits[split]
+        self.annotations: dict[Path, ImageAnnotation] = {}
+        self.notes: Counter[str] = Counter()
+        self._relative_boxes = [np.zeros((0, 4))]
+        is_coco = self._source.file.suffix == ".json"
+        self._property_folder = self._source.file.parent if is_coco else self._source.images[0].parent.parent
+        self.classes = self._read_coco() if is_coco else self._read_yolo()
+        if _are_corners(np.concatenate(self._relative_boxes)):
+            problem = "many boxes end outside of their images, and seem to be left, top, right and bottom"
+            raise InputError(f"{self._source.file}: {problem}; write left, top, width and height")
+        object_count = self.object_counts.total()
+        if self.notes[OUTSIDE] + self.notes[SMALL] > object_count:
+            raise InputError(f"{self.summary}; write the boxes in the units of the format (COCO: pixels)")
+        if not object_count:
+            raise InputError(f"{self.summary}; an evaluation or a training needs objects")
+
+    def __len__(self) -> int:
+        return len(self.annotations)
+
+    def __iter__(self) -> Iterator[LabelledImage]:
+        """Yield the labelled images; an image is read when the iteration reaches it.
+
+        Raises:
+            InputError: An image cannot be read.
+        """
+        ignored_boxes = read_image_properties(self._property_folder / "ignored.json")
+        truth = read_image_properties(self._property_folder / "truth.json")
+        for path, annotation in self.annotations.items():
+            ignored = np.reshape(ignored_boxes.get(path.name, ()), (-1, 4)) * (annotation.scale * 2)
+            yield LabelledImage(
+                path.name, read_image(path), annotation.labels, annotation.boxes,
+                tuple(map(tuple, ignored.tolist())), truth.get(path.name, {}),
+            )  # fmt: skip
+
+    @property
+    def object_counts(self) -> Counter[str]:
+        """Number of objects of each class."""
+        return Counter(label for annotation in self.annotations.values() for label in annotation.labels)
+
+    @property
+    def summary(self) -> str:
+        """Number of images, objects of each class, and dropped boxes, as one line."""
+        counts = ", ".join(f"{label} {count}" for label, count in sorted(self.object_counts.items()))
+        notes = "".join(f"; {count} {description}" for description, count in self.notes.items() if count)
+        return f"{self._name}: {len(self)} images; objects: {counts or 'none'}{notes}"
+
+    def match_classes(self, known: Collection[str], source: str) -> None:
+        """Spell class names as in `known` if they differ only in case or outer spaces.
+
+        Args:
+            known: Known class names; empty: the names are unknown.
+            source: Description of the source of the known names.
+
+        Raises:
+            InputError: There are known class names, but no object has one of them.
+        """
+        spellings = {name.casefold(): name for name in known} | {name: name for name in known}
+        for annotation in self.annotations.values():
+            pairs = ((label, label.strip().casefold()) for label in annotation.labels)
+            annotation.labels = tuple(spellings.get(name, spellings.get(key, name)) for name, key in pairs)
+        if known and not self.object_counts.keys() & set(known):
+            names = ", ".join(self.object_counts)
+            problem = f"no class of the objects ({names}) is a class of {source} ({', '.join(known)})"
+            raise InputError(f"{self._name}: {problem}; rename the classes of the dataset")
+
+    def _read_coco(self) -> list[str]:
+        """Read the annotations in a COCO file, and return the classes."""
+        file = self._source.file
+        content = dataset_layout.parse_file(file, MAX_COCO_FILE_SIZE, _CocoFile.model_validate_json)
+        class_names = {category.id: category.name for category in content.categories}
+        objects: dict[int, list[_CocoObject]] = {image.id: [] for image in content.images}
+        if len(class_names) < len(content.categories) or len(objects) < len(content.images):
+            raise InputError(f"{file}: two images or two categories have the same id")
+        for index, coco_object in enumerate(content.annotations):
+            for key, ids in (("image_id", objects), ("category_id", class_names)):
+                if (value := getattr(coco_object, key)) not in ids:
+                    known = ", ".join(map(str, ids))[:MAX_QUOTATION_LENGTH] or "none"
+                    raise InputError(f"{file}: annotations[{index}].{key}: no id {value}; ids: {known}")
+            objects[coco_object.image_id].append(coco_object)
+        for index, image in enumerate(content.images):
+            path = self._source.find_image(image.file_name, f"{file}: images[{index}].file_name")
+            if path in self.annotations:
+                raise InputError(f"{file}: two images have the same file_name")
+            singles = [coco_object for coco_object in objects[image.id] if not coco_object.iscrowd]
+            self.notes["crowds dropped"] += len(objects[image.id]) - len(singles)
+            corners = np.reshape([coco_object.bbox for coco_object in singles], (-1, 4))
+            corners[:, 2:] += corners[:, :2]
+            labels = [class_names[coco_object.category_id] for coco_object in singles]
+            self._add(path, labels, corners, (image.width, image.height))
+        # Exports of Roboflow contain a parent category, which has no objects.
+        parents = {entry.supercategory for entry in content.categories if entry.supercategory != entry.name}
+        parents -= {class_names[coco_object.category_id] for coco_object in content.annotations}
+        return [name for _, name in sorted(class_names.items()) if name not in parents]
+
+    def _read_yolo(self) -> list[str]:
+        """Read the annotations of the images of a YOLO dataset, and return the classes."""
+        # The import takes half a second; only a YOLO dataset needs the package.
+        from supervision.dataset.formats.yolo import yolo_annotations_to_detections
+
+        content = dataset_layout.read_class_file(self._source.file)
+        names = dict(enumerate(content.names)) if isinstance(content.names, list) else content.names
+        pose_word_count = 5 + content.kpt_shape[0] * content.kpt_shape[1]
+        for path in sorted(set(self._source.images)):
+            file = dataset_layout.find_label_file(path)
+            self.notes["images without a label file"] += file is None
+            text = dataset_layout.read_text(file, dataset_layout.MAX_LABEL_FILE_SIZE) if file else ""
+            rows = [words for line in text.splitlines() if (words := line.split())]
+            lines = [" ".join(words[:5] if len(words) == pose_word_count else words) for words in rows]
+            try:
+                detections = yolo_annotations_to_detections(lines, (1, 1), with_masks=False)
+                labels = [names[number] for number in np.asarray(detections.class_id).tolist()]
+            except (KeyError, ValueError, OverflowError) as error:
+                raise InputError(f"{file}: a label is invalid, or has an unknown class: {error}") from error
+            # NaN and infinity fail the comparison, too.
+            if not (np.abs(detections.xyxy) < MAX_NORMALIZED).all():
+                raise InputError(f"{file}: coordinates must be normalized (0 to 1)")
+            polygon_count = sum(line.count(" ") > 5 for line in lines)
+            self.notes["polygons replaced by their bounding boxes"] += polygon_count
+            self._add(path, labels, np.asarray(detections.xyxy, float), (1, 1))
+        return [name for _, name in sorted(names.items())]
+
+    def _add(self, path: Path, labels: list[str], corners: Array, stated_size: tuple[int, int]) -> None:
+        """Add an image with its objects, without boxes that show no object.
+
+        Args:
+            path: Path of the image.
+            labels: Class of each object.
+            corners: Left, top, right and bottom of each object `(N, 4)`, in an image with the stated size.
+            stated_size: Width and height; (1, 1) for normalized boxes, 0 for the size of the image.
+        """
+        self._source.check_image(path)
+        if len(labels) > MAX_OBJECT_COUNT:
+            raise InputError(f"{path} has more than {MAX_OBJECT_COUNT} objects; divide the image")
+        size, _ = read_image_header(path)
+        stated_size = stated_size[0] or size[0], stated_size[1] or size[1]
+        if size != stated_size == size[::-1]:
+            raise InputError(f"{path} has {size[0]} x {size[1]} pixels: it was turned after the export")
+        is_resized = stated_size not in (size, (1, 1))
+        self.notes["images resized after the export"] += is_resized
+        relative = corners / (stated_size * 2)
+        self._relative_boxes.append(relative)
+        boxes = np.clip(relative, 0, 1) * (size * 2)
+        is_near = np.abs(boxes[:, None] - boxes).max(axis=2, initial=0) < MAX_COPY_DISTANCE
+        is_copy = np.tril(is_near & np.equal.outer(labels, labels), -1).any(axis=1)
+        is_small = ((relative[:, 2:] - relative[:, :2]) * size < MIN_BOX_SIZE).any(axis=1)
+        is_outside = (boxes[:, 2:] - boxes[:, :2] < MIN_BOX_SIZE).any(axis=1)
+        reasons = np.select([is_small, is_outside, is_copy], [SMALL, OUTSIDE, "duplicates dropped"], "")
+        self.notes.update(reasons[reasons != ""].tolist())
+        kept = np.flatnonzero(reasons == "").tolist()
+        self.annotations[path] = ImageAnnotation(
+            tuple(labels[index] for index in kept), tuple(map(tuple, boxes[kept].tolist())),
+            (size[0] / stated_size[0], size[1] / stated_size[1]) if is_resized else (1.0, 1.0),
+        )  # fmt: skip
 
 
-def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
-    """Yield the path and the objects of each image of a split in COCO format."""
-    file = split / COCO_FILE_NAME
-    content = _parse_file(file, MAX_COCO_FILE_SIZE, _CocoFile.model_validate_json)
-    class_names = {category.id: category.name for category in content.categories}
-    annotations = {image.id: ImageAnnotation() for image in content.images}
-    for message, keys in (
-        ("images have the same id", [image.id for image in content.images]),
-        ("images have the same file_name", [split / image.file_name for image in content.images]),
-        ("categories have the same id", [category.id for category in content.categories]),
-    ):
-        if len(set(keys)) < len(keys):
-            raise InputError(f"{file}: two {message}")
-    for index, coco_object in enumerate(content.annotations):
-        image_id, class_id = coco_object.image_id, coco_object.category_id
-        location = f"{file}: annotations[{index}]"
-        if image_id not in annotations:
-            raise InputError(f"{location}.image_id: there is no image {image_id}")
-        if class_id not in class_names:
-            known_ids = ", ".join(map(str, class_names))[:MAX_QUOTATION_LENGTH] or "none"
-            raise InputError(f"{location}.category_id: no category has the id {class_id}; ids: {known_ids}")
-        left, top, width, height = coco_object.bbox
-        box = left, top, left + width, top + height
-        annotations[image_id].add(class_names[class_id], box, f"{location}.image_id: image {image_id} has")
-    for index, image in enumerate(content.images):
-        path = _find_image(split, image.file_name, f"{file}: images[{index}].file_name")
-        yield path, annotations[image.id]
+def _are_corners(relative: Array) -> bool:
+    """Return True if corners `(N, 4)`, as fractions of their images, were corners before the conversion.
 
-
-def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
-    """Yield the path and the objects of each image of a split in YOLO format."""
-    paths = (split.parent / name for name in YOLO_CLASS_FILES)
-    class_file = next((path for path in paths if path.is_file()), None)
-    if class_file is None:
-        raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO dataset")
-
-    def parse(text: str) -> _YoloClassFile:
-        """Return the class file; `BaseLoader` keeps a class name `no`, which YAML would convert to False."""
-        return _YoloClassFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader))
-
-    names = _parse_file(class_file, MAX_CLASS_FILE_SIZE, parse).names
-    class_names = dict(enumerate(names)) if isinstance(names, list) else names
-    folder = split / "images"
-    for path in folder.iterdir():
-        if path.suffix.lower() in IMAGE_SUFFIXES:
-            image_path = _find_image(folder, path.name, str(path))
-            yield image_path, _read_labels(split / "labels" / f"{path.stem}.txt", class_names)
-
-
-def _read_labels(file: Path, class_names: Mapping[int, str]) -> ImageAnnotation:
-    """Return the objects in the label file of a YOLO image; an image without a label file has no objects."""
-    annotation = ImageAnnotation(is_normalized=True)
-    if not os.path.lexists(file):
-        return annotation
-    for line_number, line in enumerate(_read_text(file, MAX_LABEL_FILE_SIZE).splitlines(), start=1):
-        if not line.strip():
-            continue
-        location = f"{file}:{line_number}"
-        try:
-            class_number, *texts = line.split()
-            values = [float(text) for text in texts]
-            label = class_names[int(class_number)]
-        except KeyError:
-            raise InputError(f"{location}: {class_number} is not one of {len(class_names)} classes") from None
-        except ValueError:
-            problem = f'must be a class number and normalized coordinates, not "{line}"'
-            raise InputError(f"{location}: {problem}") from None
-        is_polygon = len(values) > YOLO_BOX_VALUE_COUNT and len(values) % 2 == 0
-        if len(values) != YOLO_BOX_VALUE_COUNT and not is_polygon:
-            rule = f"a box has {YOLO_BOX_VALUE_COUNT} values and a polygon an even number, at least 6"
-            raise InputError(f"{location}: {rule}; this line has {len(values)}")
-        # NaN and infinity fail the comparison, too.
-        if not all(-NORMALIZED_TOLERANCE <= value <= 1 + NORMALIZED_TOLERANCE for value in values):
-            raise InputError(f'{location}: coordinates must be normalized (0 to 1), not "{line}"')
-        if is_polygon:
-            xs, ys = values[0::2], values[1::2]
-            box = min(xs), min(ys), max(xs), max(ys)
-        else:
-            x, y, width, height = values
-            box = x - width / 2, y - height / 2, x + width / 2, y + height / 2
-        annotation.add(label, box, f"{location}: the image has")
-        annotation.polygon_count += is_polygon
-    return annotation
-
-
-def _find_image(folder: Path, name: str, location: str) -> Path:
-    """Return the path of the image `name`; `location` (file and key) starts the error messages.
-
-    Raises:
-        InputError: The image is missing, is not a regular file, or lies outside of the folder.
+    COCO boxes are converted from left, top, width and height.
     """
-    path = folder / name
-    if not name or is_outside_path(name):
-        raise InputError(f'{location}: "{name}" is not below {folder}')
-    if not os.path.isfile(path):
-        raise InputError(f'{location}: "{name}" is not a file in {folder}')
-    if has_outside_link(folder, name):
-        raise InputError(f'{location}: "{name}" is a link to a file outside of {folder}')
-    return path
-
-
-def _read_text(file: Path, max_size: int) -> str:
-    """Return the text of a file of at most `max_size` [byte]."""
-    if not os.path.isfile(file):
-        raise InputError(f"{file} is not a file")
-    if file.stat().st_size > max_size:
-        raise InputError(f"{file} has more than {max_size / 1e6:g} MB, the maximum for this kind of file")
-    try:
-        return file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{file} cannot be read: {error}") from error
+    first, second = relative[:, :2], relative[:, 2:] - relative[:, :2]
+    fits = ((first <= second) & (second <= MAX_FRACTION)).all(axis=1)
+    ends_outside = (relative > MAX_FRACTION).any(axis=1)
+    counts = np.array([fits.sum(), ends_outside.sum()])
+    return bool(len(relative) and (counts >= len(relative) * np.array(CORNER_FRACTIONS)).all())
 
 
 def read_image_properties(file: Path) -> dict[str, Any]:
@@ -252,69 +289,28 @@ def read_image_properties(file: Path) -> dict[str, Any]:
     The result is {} if the file does not exist.
     """
     parse = TypeAdapter(dict[str, Any]).validate_json
-    return _parse_file(file, MAX_COCO_FILE_SIZE, parse) if file.is_file() else {}
+    return dataset_layout.parse_file(file, MAX_COCO_FILE_SIZE, parse) if file.is_file() else {}
 
 
-def _parse_file(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> ContentT:
-    """Return the parsed content of a file of at most `max_size` [byte].
+def read_image_header(path: Path) -> tuple[tuple[int, int], bool]:
+    """Return width and height of the upright image, and True if the file contains upright RGB or grey pixels.
 
     Raises:
-        InputError: The file is too large, cannot be read, is invalid, or lacks a required key; the message
-            names the line or the key.
+        InputError: The image cannot be read.
     """
     try:
-        return parse(_read_text(file, max_size))
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise InputError(f"{file}:{line}: invalid YAML: {error.problem}") from error
-    except ValidationError as error:
-        problem = error.errors()[0]
-        keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in problem["loc"])
-        raise InputError(f"{file}: {keys.removeprefix('.') or 'content'}: {problem['msg']}") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise InputError(f"{file} cannot be read: {error}") from error
-
-
-class LabelledDataset:
-    """Labelled images of a split; a dataset is represented by its first split in `EVALUATION_SPLITS`.
-
-    Args:
-        folder: Folder of the split or the dataset.
-
-    Attributes:
-        polygon_count: Number of boxes that enclose an annotated polygon.
-
-    Raises:
-        InputError: There are no labelled images, or the annotations are damaged.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self._split = _find_split(folder)
-        self._annotations = read_annotations(self._split)
-        self.polygon_count = sum(image.polygon_count for image in self._annotations.values())
-
-    def __len__(self) -> int:
-        return len(self._annotations)
-
-    def __iter__(self) -> Iterator[LabelledImage]:
-        """Yield the labelled images; an image is read when the iteration reaches it.
-
-        Raises:
-            InputError: An image cannot be read.
-        """
-        ignored_boxes = read_image_properties(self._split / "ignored.json")
-        truth = read_image_properties(self._split / "truth.json")
-        for path, annotation in self._annotations.items():
-            image = read_image(path)
-            height, width = image.shape[:2]
-            yield LabelledImage(
-                path.name, image, tuple(annotation.labels), annotation.to_pixel_boxes(width, height),
-                tuple(map(tuple, ignored_boxes.get(path.name, ()))), truth.get(path.name, {}),
-            )  # fmt: skip
+        with Image.open(path) as image:
+            orientation = image.getexif().get(ExifTags.Base.Orientation, 1)
+            width, height = image.size
+            is_plain = orientation == 1 and image.mode in ("RGB", "L")
+    except Exception as error:  # Pillow raises errors of many types for damaged files.
+        raise InputError(f"the image {path} cannot be read; write a sound JPEG or PNG file") from error
+    # The orientations 5 to 8 contain a quarter turn.
+    return ((height, width) if orientation in range(5, 9) else (width, height)), is_plain
 
 
 def read_image(path: Path) -> NDArray[np.uint8]:
-    """Return an image file as `(H, W, 3)` uint8, RGB.
+    """Return an image file as `(H, W, 3)` uint8, RGB, turned upright by its EXIF orientation.
 
     Raises:
         InputError: The image cannot be read.
@@ -323,23 +319,3 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     if image is None:
         raise InputError(f"the image {path} cannot be read; is it missing or damaged?")
     return np.ascontiguousarray(image[..., ::-1], dtype=np.uint8)
-
-
-def list_splits(dataset: Path) -> list[Path]:
-    """Return the existing splits of a dataset, in the order of `EVALUATION_SPLITS`."""
-    return [dataset / name for name in EVALUATION_SPLITS if is_split(dataset / name)]
-
-
-def _find_split(folder: Path) -> Path:
-    """Return `folder` if it is a split, else the first existing split of the dataset `folder`.
-
-    Raises:
-        InputError: There are no labelled images.
-    """
-    if splits := [folder] if is_split(folder) else list_splits(folder):
-        return splits[0]
-    raise InputError(
-        f"{folder} contains no labelled images: neither it nor its folders {', '.join(EVALUATION_SPLITS)} "
-        f"contain {COCO_FILE_NAME} (COCO) or images/ and labels/ (YOLO); render a dataset with "
-        "`executive dataset`"
-    )

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from executive.errors import InputError
 from executive.perception.detectors.onnx_model import read_labels
-from executive.training.evaluation.evaluate import evaluate_folder, find_label_file
+from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
+from executive.training.evaluation.evaluate import evaluate_model, find_label_file
 from executive.training.model_card import read_epochs, render_card
-from executive.training.samples import COCO_FILE_NAME, YOLO_CLASS_FILES, list_splits, read_annotations
+from executive.training.samples import LabelledDataset, read_image, read_image_header
 
 ReportEpoch = Callable[[int, dict[str, float]], None]
 """Called after each epoch with its number, from 1, and its metrics by name."""
@@ -55,18 +57,20 @@ def train(
     `metrics.csv` with the metrics of each epoch.
 
     Args:
-        dataset: Folder with `_annotations.coco.json` in `train/` and `valid/` (COCO), or `data.yaml` (YOLO).
+        dataset: Folder with a COCO or YOLO dataset with the splits `train` and `valid`.
         out: Output folder, which is created if it is missing.
         settings: Settings of the training.
         report_epoch: Called after each epoch.
         report_batch: Called after each batch.
 
     Raises:
-        InputError: The folder is not a dataset, `start_model` does not exist, or the training packages are
-            not installed.
+        InputError: The dataset is incomplete or damaged, `start_model` does not exist, or the training
+            packages are not installed.
     """
     start_model, learning_rate = settings.start_model, settings.learning_rate
-    _check_inputs(dataset, start_model)
+    if start_model is not None and not start_model.is_file():
+        raise InputError(f"there is no model {start_model} to start from; train one first, or omit --from")
+    splits = load_dataset(dataset)
     try:
         from executive.training.architecture import declare_missing_operators, describe_architecture
 
@@ -77,11 +81,12 @@ def train(
         advice = "install the extra, about 3 GB to download on Linux: uv sync --extra train"
         raise InputError(f'training needs the package "{error.name}"; {advice}') from error
     out.mkdir(parents=True, exist_ok=True)
-    fit_model(dataset, out, settings, report_epoch, report_batch)
+    with tempfile.TemporaryDirectory(dir=out) as folder:
+        write_coco_dataset(splits, Path(folder))
+        fit_model(Path(folder), out, settings, report_epoch, report_batch)
     model, labels = out / "model.onnx", out / "labels.txt"
     export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model)
-    validation = next(path for path in (dataset / "valid", dataset / "val", dataset) if path.is_dir())
-    accuracy = evaluate_folder(model, labels, validation, CARD_THRESHOLD)
+    accuracy = evaluate_model(model, labels, splits["valid"], CARD_THRESHOLD)
     card = render_card(
         title=f"Small RF-DETR trained on {dataset.name}",
         summary=f"Detects {', '.join(read_labels(labels))} in square images.",
@@ -108,16 +113,30 @@ def choose_learning_rate(start_model: Path | None, labels: list[str]) -> float:
     return NEW_MODEL_LEARNING_RATE
 
 
-def _check_inputs(dataset: Path, start_model: Path | None) -> None:
-    """Raise `InputError` if the start model is missing, or if the dataset is missing or damaged."""
-    if start_model is not None and not start_model.is_file():
-        raise InputError(f"there is no model {start_model} to start from; train one first, or omit --from")
-    coco_files = [dataset / split / COCO_FILE_NAME for split in ("train", "valid")]
-    yolo_files = [dataset / name for name in YOLO_CLASS_FILES]
-    if not (all(map(Path.is_file, coco_files)) or any(map(Path.is_file, yolo_files))):
-        raise InputError(
-            f"{dataset} is not a dataset: it needs train/_annotations.coco.json and "
-            "valid/_annotations.coco.json (COCO), or data.yaml (YOLO); a Roboflow export has either format"
-        )
-    for split in list_splits(dataset):
-        read_annotations(split)
+def load_dataset(folder: Path) -> dict[str, LabelledDataset]:
+    """Return the splits `train` and `valid` of a dataset; the classes of `valid` are spelled as in `train`.
+
+    Raises:
+        InputError: A split is missing, empty or damaged.
+    """
+    dataset = {split: LabelledDataset(folder, split) for split in ("train", "valid")}
+    dataset["valid"].match_classes(dataset["train"].classes, "the split train")
+    return dataset
+
+
+def write_coco_dataset(dataset: Mapping[str, LabelledDataset], folder: Path) -> None:
+    """Write splits as a COCO dataset with the boxes and pixels that an evaluation sees.
+
+    The COCO files contain absolute paths of the images that RF-DETR decodes like `read_image`. Other images
+    are converted, for instance because RF-DETR ignores the EXIF orientation.
+    """
+    entries = []
+    classes = dict.fromkeys([*dataset["train"].classes, *dataset["valid"].object_counts])
+    for split, images in dataset.items():
+        for index, (path, annotation) in enumerate(images.annotations.items()):
+            size, is_plain = read_image_header(path)
+            file = path.absolute() if is_plain else build_image_path(folder, "coco", split, f"{index}.png")
+            if not is_plain:
+                save_image(file, read_image(path))
+            entries.append(DatasetEntry(split, str(file), size, annotation.labels, annotation.boxes))
+    write_annotations(folder, "coco", entries, list(classes))

@@ -30,14 +30,14 @@ def evaluate(*arguments, code=0):
     """Return what the command says and the figures it prints."""
     result = CliRunner().invoke(main, ["evaluate", "--json", *map(str, arguments)])
     assert result.exit_code == code, result.output
-    return result.stderr, json.loads(result.stdout) if code == 0 else None
+    return result.stderr, json.loads(result.stdout) if result.stdout else None
 
 
 @pytest.mark.slow
 def test_a_cells_detector_is_measured_as_in_a_run_with_a_sheet_of_its_worst_misses(tmp_path):
     sheet = tmp_path / "sheet.png"
     stored = tmp_path / "overhead.measured.json"
-    options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--seed", 2, "--out", stored)
+    options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--seed", 2, "--out", stored, "--force")
     said, printed = evaluate(*options, "--sheet", sheet)
     measured = printed["measured"]["overhead"]
     assert (measured["detector"], measured["kind"], measured["images"]) == ("embedded", "embedded", 1)
@@ -72,7 +72,11 @@ def test_a_detector_is_measured_in_the_world_of_a_scene_file(tmp_path):
     ("arguments", "where", "detector"),
     [
         ((), "grey", "embedded"),
-        (("--cell", "wrist", "--detector", "embedded", "--out", "wrist.json"), "wrist on grey", "embedded"),
+        (
+            ("--cell", "wrist", "--detector", "embedded", "--out", "w.json", "--force"),
+            "wrist on grey",
+            "embedded",
+        ),
         (("--weights", MODEL_PATH, "--labels", LABELS_PATH, "--threshold", 0.9), "grey", "model"),
     ],
 )
@@ -85,6 +89,18 @@ def test_a_dataset_is_measured_on_with_or_without_a_cell_or_a_model_file(dataset
     assert (printed["weights"], measured["threshold"]) == ((str(MODEL_PATH), 0.9) if model else (None, 0.5))
 
 
+def test_a_weak_measurement_is_printed_but_stored_by_force_only(dataset, tmp_path):
+    options = ("--dataset", dataset, "--cell", "overhead", "--out", tmp_path / "o.json")
+    said, printed = evaluate(*options, code=2)
+    assert (
+        "is not stored: 1 cube objects, 0 sphere objects, 0 duck objects, precision 0.00, recall 0.00" in said
+    )
+    assert printed["measured"]["overhead on grey"]["recall"] == 0
+    assert not (tmp_path / "o.json").exists()
+    evaluate(*options, "--force")
+    assert len(read_measurements(tmp_path / "o.json")) == 1
+
+
 @pytest.mark.slow
 def test_a_cell_with_other_values_is_measured_and_stored_in_a_named_file_only(missions, tmp_path):
     options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--seed", 2)
@@ -93,7 +109,7 @@ def test_a_cell_with_other_values_is_measured_and_stored_in_a_named_file_only(mi
     said, printed = evaluate(*options, *changed)
     assert (printed["measured"]["overhead"]["threshold"], "stored" in said) == (0.7, False)
     assert sorted((missions / "cells").iterdir()) == before
-    evaluate(*options, *changed, "--out", tmp_path / "o.json")
+    evaluate(*options, *changed, "--out", tmp_path / "o.json", "--force")
     assert read_measurements(tmp_path / "o.json")[0].fingerprint["threshold"] == "0.7"
 
 
@@ -126,6 +142,7 @@ def test_a_measurement_with_a_threshold_of_zero_is_not_stored(tmp_path):
             "fruit is of kind fake; measure its detector on your own images",
         ),
         (("--dataset", "."), ". contains no labelled images"),
+        (("--dataset", "grey", "--cell", "fasteners"), "is a class of detector fasteners"),
         (("--weights", "no.onnx", "--labels", LABELS_PATH, "--dataset", "grey"), "there is no model file"),
         (("--sheet", "sheet.gif"), 'the name of --sheet "sheet.gif" must end in .png, .jpg, .jpeg'),
     ],

@@ -1,182 +1,222 @@
-"""Damaged data sets: each gives one error that names the file and the line or the key."""
+"""Datasets of other tools are read like the clean dataset; damaged or ambiguous ones are refused."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from click.testing import CliRunner
+from PIL import Image
 
+from executive.cli.main import main
 from executive.errors import InputError
-from executive.training.samples import LabelledDataset, read_annotations
-
-Content = dict[str, Any]
-
-
-def coco() -> Content:
-    """Return the content of a sound COCO file with one object."""
-    return {
-        "images": [{"id": 1, "file_name": "a.jpg"}],
-        "annotations": [{"image_id": 1, "category_id": 3, "bbox": [10, 20, 30, 40]}],
-        "categories": [{"id": 3, "name": "duck"}],
-    }
-
-
-def changed(*keys: Any, value: Any = None) -> Content:
-    """Return a COCO file in which the value behind `keys` is another, or is left out."""
-    content: Any = coco()
-    inner = content
-    for key in keys[:-1]:
-        inner = inner[key]
-    if value is None:
-        del inner[keys[-1]]
-    else:
-        inner[keys[-1]] = value
-    return dict(content)
+from executive.training import train
+from executive.training.labelled_image import LabelledImage
+from executive.training.samples import LabelledDataset
+from tests.training.dataset_variants import (
+    CLASSES,
+    COCO,
+    REFUSED,
+    VARIANTS,
+    Change,
+    add,
+    write_coco,
+    write_yolo,
+)  # fmt: skip
 
 
-@pytest.fixture
-def split(tmp_path: Path) -> Path:
-    """A folder `train` with the image a.jpg, beside a link to it and a pipe."""
-    folder = tmp_path / "data" / "train"
-    folder.mkdir(parents=True)
-    (folder / "a.jpg").write_bytes(b"image")
-    (tmp_path / "b.jpg").write_bytes(b"image")
-    (folder / "link.jpg").symlink_to(tmp_path / "b.jpg")
-    os.mkfifo(folder / "pipe.jpg")
-    return folder
+@pytest.fixture(scope="module")
+def samples():
+    """Two images of 160 by 120 pixels, each with two filled boxes."""
+    boxes = (20.0, 10.0, 60.0, 40.0), (100.0, 70.0, 150.0, 110.0)
+    image = np.full((120, 160, 3), 200, np.uint8)
+    image[10:40, 20:60] = 200, 30, 20
+    return [LabelledImage(label, image, (label, "duck"), boxes) for label in ("cube", "sphere")]
 
 
-def test_a_sound_coco_file_is_read(split: Path) -> None:
-    (split / "_annotations.coco.json").write_text(json.dumps(coco()))
-    ((path, annotation),) = read_annotations(split).items()
-    assert (path, annotation.labels, annotation.boxes) == (split / "a.jpg", ["duck"], [(10, 20, 40, 60)])
+def check_equal(images: Any, samples: Any) -> None:
+    """Check that images have the labels, relative boxes and colours of the samples."""
+    for image, sample in zip(images, samples, strict=True):
+        size, sample_size = (np.array(one.image.shape[1::-1]) for one in (image, sample))
+        assert image.labels == sample.labels
+        assert np.array(image.boxes) / np.tile(size, 2) == pytest.approx(
+            np.array(sample.boxes) / np.tile(sample_size, 2), abs=0.005
+        )
+        colour = image.image[image.image.shape[0] // 5, image.image.shape[1] // 4]
+        assert colour.tolist() == pytest.approx([200, 30, 20], abs=9)
 
 
-NAME = ("images", 0, "file_name")
-BOX = ("annotations", 0, "bbox")
+@pytest.mark.parametrize("name", VARIANTS)
+def test_a_dataset_of_another_tool_is_read_like_the_clean_one(tmp_path, samples, name):
+    VARIANTS[name](tmp_path, samples)
+    images = LabelledDataset(tmp_path)
+    images.match_classes(CLASSES, "detector eye")
+    check_equal(images, samples)
+    assert sorted(map(str.lower, images.classes))[:2] == ["cube", "duck"]
+    assert len(images.classes) == 3
+
+
+@pytest.mark.parametrize("word", REFUSED)
+def test_an_ambiguous_or_damaged_dataset_is_refused(tmp_path, samples, word):
+    write, options = REFUSED[word]
+    write(tmp_path, samples, **options)
+    with pytest.raises(InputError, match=word):
+        LabelledDataset(tmp_path).match_classes(CLASSES, "detector eye")
 
 
 @pytest.mark.parametrize(
-    ("content", "error"),
+    "options", [{}, {"turn": 6}, {"mode": "CMYK", "suffixes": (".jpg",)}, {"factors": (1.25, 1)}]
+)
+def test_a_training_sees_the_pixels_and_boxes_of_an_evaluation(tmp_path, samples, options):
+    for split in ("train", "valid"):
+        file = f"{split}/_annotations.coco.json"
+        write_coco(tmp_path / "data", samples, file=file, folder=split, name=f"{split}\\{{}}", **options)
+    dataset = train.load_dataset(tmp_path / "data")
+    train.write_coco_dataset(dataset, tmp_path / "out")
+    content = json.loads((tmp_path / "out/train/_annotations.coco.json").read_text())
+    assert [category["name"] for category in content["categories"]] == list(CLASSES)
+    for entry, sample in zip(content["images"], dataset["train"], strict=True):
+        boxes = np.array([box["bbox"] for box in content["annotations"] if box["image_id"] == entry["id"]])
+        boxes[:, 2:] += boxes[:, :2]
+        assert boxes == pytest.approx(np.array(sample.boxes), abs=0.001)
+        # RF-DETR reads images like this.
+        with Image.open(tmp_path / "out/train" / entry["file_name"]) as image:
+            assert np.array_equal(np.asarray(image.convert("RGB")), sample.image)
+
+
+def test_the_summary_states_objects_and_dropped_boxes(tmp_path, samples):
+    write_coco(tmp_path, samples, change=COCO["outside"]["change"])
+    counts = "2 images; objects: cube 1, duck 2, sphere 1; 4 boxes outside of the image dropped"
+    assert LabelledDataset(tmp_path).summary == f"{tmp_path}, split test: {counts}"
+
+
+def test_a_lost_label_file_is_counted_and_an_upper_case_one_is_read(tmp_path, samples):
+    write_yolo(tmp_path, samples)
+    (tmp_path / "labels/val/a0.txt").rename(tmp_path / "labels/val/a0.TXT")
+    (tmp_path / "labels/val/a1.txt").unlink()
+    assert "cube 1, duck 1; 1 images without a label file" in LabelledDataset(tmp_path).summary
+
+
+@pytest.mark.parametrize("split", ["test", "valid"])
+def test_a_missing_split_is_not_replaced_by_other_images(tmp_path, samples, split):
+    data = {"train": "images/train", "val": "", "test": "../test/images"}
+    write_yolo(tmp_path, samples, folder="images/train", labels="labels/train", data=data)
+    with pytest.raises(InputError, match=f"split {split} contains no labelled images"):
+        LabelledDataset(tmp_path, split)
+
+
+def test_images_of_equal_names_in_two_folders_are_different(tmp_path, samples):
+    for folder, part in (("cam1", samples[:1]), ("cam2", samples[1:])):
+        write_yolo(tmp_path, part, folder=f"images/val/{folder}", labels=f"labels/val/{folder}")
+    check_equal(LabelledDataset(tmp_path), samples)
+
+
+def test_boxes_are_clipped_and_ignored_boxes_are_resized_with_the_image(tmp_path, samples):
+    write_coco(tmp_path, samples, factors=(2, 1), change=add([140, 100, 40, 40]))
+    (tmp_path / "test/ignored.json").write_text(json.dumps({"a0.png": [[10, 10, 20, 20]]}))
+    image = next(iter(LabelledDataset(tmp_path)))
+    assert image.boxes[-1] == pytest.approx((280, 100, 320, 120))
+    assert image.ignored_boxes == ((20, 10, 40, 20),)
+
+
+def set_value(*keys: Any, value: Any) -> Change:
+    """Return a change that replaces a value in a COCO file."""
+
+    def change(content: Any) -> None:
+        for key in keys[:-1]:
+            content = content[key]
+        content[keys[-1]] = value
+
+    return change
+
+
+NAME, BOX = ("images", 0, "file_name"), ("annotations", 0, "bbox")
+
+
+@pytest.mark.parametrize(
+    ("change", "error"),
     [
-        ("", "content: Invalid JSON: EOF"),
-        ("{", "content: Invalid JSON: EOF"),
-        ("[]", "content: Input should be an object"),
-        (b"\xff\xfe", "cannot be read: 'utf-8' codec"),
-        ("[" * 100_000, "content: Invalid JSON: recursion limit"),
-        (changed("images"), "images: Field required"),
-        (changed("annotations"), "annotations: Field required"),
-        (changed("categories"), "categories: Field required"),
-        (changed("images", 0, "id"), "images[0].id: Field required"),
-        (changed(*NAME), "images[0].file_name: Field required"),
-        (changed("annotations", 0, "image_id"), "annotations[0].image_id: Field required"),
-        (changed("annotations", 0, "image_id", value=9), "annotations[0].image_id: there is no image 9"),
-        (changed("annotations", 0, "category_id", value=9),
-         "annotations[0].category_id: no category has the id 9; ids: 3"),
-        (changed(*BOX), "annotations[0].bbox: Field required"),
-        (changed(*BOX, value=[1, 2, 3]), "annotations[0].bbox[3]: Field required"),
-        (changed(*BOX, value=[1, 2, 3, 4, 5]), "annotations[0].bbox: Tuple should have at most 4 items"),
-        (changed(*BOX, value=[1, 2, 3, float("nan")]), "bbox[3]: Input should be a finite number"),
-        (changed(*BOX, value=[1, 2, -3, 4]), "bbox[2]: Input should be greater than or equal to 0"),
-        (changed(*BOX, value="box"), "annotations[0].bbox: Input should be"),
-        (changed("images", value=[{"id": 1, "file_name": "a.jpg"}] * 2), "two images have the same id"),
-        (changed("images", value=[{"id": 1, "file_name": "a.jpg"}, {"id": 2, "file_name": "./a.jpg"}]),
-         "two images have the same file_name"),
-        (changed("categories", value=[{"id": 3, "name": "duck"}, {"id": 3, "name": "cube"}]),
-         "two categories have the same id"),
-        (changed("annotations", value=coco()["annotations"] * 1001),
-         "annotations[1000].image_id: image 1 has more than 1000 objects; divide the image"),
-        (changed(*NAME, value="b.jpg"), 'images[0].file_name: "b.jpg" is not a file in '),
-        (changed(*NAME, value="../../b.jpg"), 'images[0].file_name: "../../b.jpg" is not below '),
-        (changed(*NAME, value="/etc/passwd"), 'images[0].file_name: "/etc/passwd" is not below '),
-        (changed(*NAME, value="link.jpg"), 'images[0].file_name: "link.jpg" is a link to a file outside of '),
-        (changed(*NAME, value="pipe.jpg"), 'images[0].file_name: "pipe.jpg" is not a file in '),
-        (changed(*NAME, value="."), 'images[0].file_name: "." is not a file in '),
+        (set_value("images", value=[{}]), "images[0].id: Field required"),
+        (set_value("annotations", 0, "image_id", value=9), "annotations[0].image_id: no id 9; ids: 0"),
+        (set_value(*BOX, value=[1, 2, 3, float("nan")]), "bbox[3]: Input should be a finite number"),
+        (set_value(*BOX, value=[1, 2, -3, 4]), "bbox[2]: Input should be greater than or equal to 0"),
+        (set_value("images", 1, "id", value=0), "have the same id"),
+        (set_value(*NAME, value="./a1.png"), "two images have the same file_name"),
+        (add(*[[1, 2, 30, 40]] * 1000), "has more than 1000 objects; divide the image"),
+        (set_value(*NAME, value="../../b.jpg"), 'images[0].file_name: "../../b.jpg" is not a file in '),
+        (set_value(*NAME, value="/etc/passwd"), 'images[0].file_name: "/etc/passwd" is not a file in '),
+        (set_value(*NAME, value="link.jpg"), "link.jpg is not a file in "),
+        (set_value(*NAME, value="pipe.jpg"), "pipe.jpg is not a file in "),
+        (set_value(*NAME, value="text.png"), "text.png cannot be read; write a sound JPEG or PNG file"),
     ],
 )  # fmt: skip
-def test_a_damaged_coco_file_is_one_error(split: Path, content: Any, error: str) -> None:
-    file = split / "_annotations.coco.json"
-    raw = content if isinstance(content, str | bytes) else json.dumps(content)
-    file.write_bytes(raw.encode() if isinstance(raw, str) else raw)
+def test_a_damaged_coco_dataset_is_one_error(tmp_path, samples, change, error):
+    write_coco(tmp_path / "data", samples, change=change)
+    (tmp_path / "b.jpg").write_bytes(b"image")
+    (tmp_path / "data/test/text.png").write_bytes(b"image")
+    (tmp_path / "data/test/link.jpg").symlink_to(tmp_path / "b.jpg")
+    os.mkfifo(tmp_path / "data/test/pipe.jpg")
     with pytest.raises(InputError) as raised:
-        read_annotations(split)
-    text = str(raised.value)
-    assert text.startswith(str(file))
-    assert error in text
-
-
-@pytest.fixture
-def yolo(split: Path) -> Callable[..., Path]:
-    """Write a YOLO data set with one image and return the folder of its split."""
-
-    def write(labels: str, data: str = "names: [duck, cube]\n") -> Path:
-        (split / "images").mkdir()
-        (split / "labels").mkdir()
-        (split / "images/a.jpg").write_bytes(b"image")
-        (split / "labels/a.txt").write_text(labels)
-        (split.parent / "data.yaml").write_text(data)
-        return split
-
-    return write
-
-
-def test_boxes_and_polygons_of_yolo_are_read(yolo: Callable[..., Path]) -> None:
-    split = yolo("1 0.5 0.5 0.2 0.4\n\n0 0.1 0.1 0.3 0.1 0.3 0.2\n")
-    (annotation,) = read_annotations(split).values()
-    assert annotation.labels == ["cube", "duck"]
-    box, polygon = annotation.to_pixel_boxes(100, 200)
-    assert box == pytest.approx((40, 60, 60, 140))
-    assert polygon == pytest.approx((10, 20, 30, 40))
-    assert LabelledDataset(split).polygon_count == 1
+        LabelledDataset(tmp_path / "data")
+    assert error in str(raised.value)
 
 
 @pytest.mark.parametrize(
-    ("labels", "data", "error"),
+    ("file", "content", "error"),
     [
-        ("2 0.5 0.5 0.2 0.4\n", "names: [duck, cube]\n", "labels/a.txt:1: 2 is not one of 2 classes"),
-        ("\n-1 0.5 0.5 0.2 0.4\n", "names: [duck]\n", "labels/a.txt:2: -1 is not one of 1 classes"),
-        (
-            "duck 0.5 0.5 0.2 0.4\n",
-            "names: [duck]\n",
-            "labels/a.txt:1: must be a class number and normalized",
-        ),
-        ("0 0.5 0.5 0.2\n", "names: [duck]\n", "labels/a.txt:1: a box has 4 values and a polygon an even"),
-        ("0 0.5 0.5 0.2 0.1 0.1\n", "names: [duck]\n", "labels/a.txt:1: a box has 4 values and a polygon"),
-        ("0 0.5 0.5 nan 0.4\n", "names: [duck]\n", "labels/a.txt:1: coordinates must be normalized (0 to 1)"),
-        (
-            "0 0.5 0.5 0.2 0.4\n" * 1001,
-            "names: [duck]\n",
-            "labels/a.txt:1001: the image has more than 1000 objects",
-        ),
-        ("0 12 20 30 40\n", "names: [duck]\n", "labels/a.txt:1: coordinates must be normalized (0 to 1)"),
-        (" " * 10_000_001, "names: [duck]\n", "labels/a.txt has more than 10 MB"),
-        ("", " " * 100_001, "data.yaml has more than 0.1 MB"),
-        ("", "names: [duck\n", "data.yaml:2: invalid YAML: "),
-        ("", "", "data.yaml: content: Input should be"),
-        ("", "nc: 2\n", "data.yaml: names: Field required"),
-        ("", "names: duck\n", "data.yaml: names"),
-        (
-            "",
-            "names: !!python/name:os.system ''\n",
-            "data.yaml: names.dict[int,str]: Input should be a valid dictionary",
-        ),
+        ("test/_annotations.coco.json", "{", "content: Invalid JSON: EOF"),
+        ("test/_annotations.coco.json", "[" * 100_000, "content: Invalid JSON: recursion limit"),
+        ("test/annotations.json", "{}", "are COCO files of one split"),
+        ("labels/val/a0.txt", " " * 10_000_001, "labels/val/a0.txt has more than 10 MB"),
+        ("labels/val/a0.txt", "\udcff", "labels/val/a0.txt cannot be read"),
+        ("labels/val/a0.txt", "0 0.5 0.5 nan 0.4", "labels/val/a0.txt: a label is invalid"),
+        ("labels/val/a0.txt", "0 0.5 0.5 0.1 0.1\n" * 1001, "has more than 1000 objects"),
+        ("data.yaml", " " * 100_001, "data.yaml has more than 0.1 MB"),
+        ("data.yaml", "names: [duck\n", "data.yaml:2: invalid YAML: "),
+        ("data.yaml", "names: !!python/name:os.system ''\n", "data.yaml: names.dict[int,str]"),
     ],
 )
-def test_a_damaged_yolo_folder_is_one_error(
-    yolo: Callable[..., Path], labels: str, data: str, error: str
-) -> None:
+def test_a_damaged_file_is_one_error(tmp_path, samples, file, content, error):
+    (write_coco if file.endswith(".json") else write_yolo)(tmp_path, samples)
+    (tmp_path / file).write_text(content, errors="surrogateescape")
     with pytest.raises(InputError) as raised:
-        read_annotations(yolo(labels, data))
+        LabelledDataset(tmp_path)
     assert error in str(raised.value)
 
 
 @pytest.mark.parametrize(
     "tag", ["!!bool foo", "!!timestamp foo", "!!int ''", "!!python/name:os.system ''", "yes"]
 )
-def test_names_of_classes_are_text_whatever_their_tag(yolo: Callable[..., Path], tag: str) -> None:
-    (annotation,) = read_annotations(yolo("0 0.5 0.5 0.2 0.4\n", f"names: [{tag}]\n")).values()
-    assert all(isinstance(label, str) for label in annotation.labels)
+def test_names_of_classes_are_text_whatever_their_tag(tmp_path, samples, tag):
+    write_yolo(tmp_path, samples)
+    (tmp_path / "data.yaml").write_text(f"names: [{tag}, duck, sphere]\n")
+    assert all(isinstance(label, str) for label in LabelledDataset(tmp_path).object_counts)
+
+
+def evaluate(folder):
+    """Return the figures of `executive evaluate`."""
+    result = CliRunner().invoke(main, ["evaluate", "--json", "--dataset", str(folder)])
+    (figures,) = json.loads(result.stdout)["measured"].values()
+    return [figures[name] for name in ("images", "objects", "precision", "recall", "map50")]
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    """Forty rendered images of a cell, and the figures of its detector."""
+    folder = tmp_path_factory.mktemp("rendered")
+    arguments = ["dataset", "overhead", "--out", str(folder), "--images", "40", "--valid", "1"]
+    CliRunner().invoke(main, arguments, catch_exceptions=False)
+    samples = list(LabelledDataset(folder))
+    write_coco(folder / "clean", samples)
+    return samples, evaluate(folder / "clean")
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", VARIANTS)
+def test_a_dataset_of_another_tool_gives_the_figures_of_the_clean_one(tmp_path, rendered, name):
+    samples, figures = rendered
+    VARIANTS[name](tmp_path, samples)
+    assert evaluate(tmp_path) == pytest.approx(figures, rel=0.01)

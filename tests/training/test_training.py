@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from executive.errors import InputError
+from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.evaluation.metrics import Distribution, Evaluation
 from executive.training.model_card import read_epochs, render_card
 from executive.training.train import Settings, choose_learning_rate, train
@@ -18,7 +19,7 @@ from executive.training.train import Settings, choose_learning_rate, train
 @pytest.mark.parametrize(
     ("start", "text"),
     [
-        (None, r"not a dataset: it needs train/_annotations\.coco\.json"),
+        (None, "split train contains no labelled images"),
         ("old.pth", r"no model .*old\.pth to start from"),
     ],
 )
@@ -39,7 +40,11 @@ def test_a_training_goes_on_in_smaller_steps_if_the_checkpoint_knows_its_labels(
 
 @pytest.mark.skipif(importlib.util.find_spec("torch") is not None, reason="the extra is installed")
 def test_training_without_the_extra_says_how_to_install_it(tmp_path):
-    (tmp_path / "data.yaml").write_text("names: [cube]\n")
+    for split in ("train", "valid"):
+        save_image(build_image_path(tmp_path, "coco", split, "a.jpg"), np.zeros((64, 64, 3), np.uint8))
+    boxes = ((10.0, 10.0, 30.0, 30.0),)
+    entries = [DatasetEntry(split, "a.jpg", (64, 64), ("cube",), boxes) for split in ("train", "valid")]
+    write_annotations(tmp_path, "coco", entries, ["cube"])
     with pytest.raises(
         InputError,
         match='package "torch"; install the extra, about 3 GB to download on Linux: uv sync --extra train',

@@ -23,7 +23,6 @@ from executive.training.evaluation.matching import BoxMatch, is_ignored, match_d
 from executive.training.evaluation.metrics import Distribution, Evaluation
 from executive.training.evaluation.worst_mistakes import WorstMistakes
 from executive.training.labelled_image import LabelledImage
-from executive.training.samples import LabelledDataset
 
 MIN_CONFIDENCE = 0.01
 """Minimum confidence of the detections of a model file; the average precision needs low confidences."""
@@ -56,7 +55,7 @@ def evaluate(
         try:
             answer, latency = detector.detect(frame)
         except Unavailable as error:
-            unavailable_count, unavailable_reason = unavailable_count + 1, str(error)
+            unavailable_count, unavailable_reason = unavailable_count + 1, str(error) or repr(error)
             continue
         answer_counts[answer.detector] += 1
         latencies.append(latency)
@@ -115,13 +114,15 @@ def make_model_config(model: Path, labels: Path) -> DetectorConfig:
     return DetectorConfig.model_validate({"kind": "rfdetr", "floor": MIN_CONFIDENCE, **files})
 
 
-def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -> Evaluation:
-    """Return the accuracy of an exported RF-DETR on a folder of labelled images.
+def evaluate_model(
+    model: Path, labels: Path, images: Iterable[LabelledImage], threshold: float
+) -> Evaluation:
+    """Return the accuracy of an exported RF-DETR on labelled images.
 
     Args:
         model: The ONNX file.
         labels: The text file with the class names.
-        folder: Folder of a split or dataset; of a dataset, the first of `samples.EVALUATION_SPLITS` is used.
+        images: The images.
         threshold: Minimum confidence of a detection.
 
     Raises:
@@ -129,7 +130,7 @@ def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -
     """
     detector = CellDetector({MODEL_NAME: make_model_config(model, labels)}, MODEL_NAME, base=Path())
     with contextlib.closing(detector):
-        return evaluate(detector, LabelledDataset(folder), threshold=threshold)
+        return evaluate(detector, images, threshold=threshold)
 
 
 class AveragePrecision:

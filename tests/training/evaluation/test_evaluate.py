@@ -121,6 +121,7 @@ def test_without_answers_there_are_zeros_and_no_spreads(saying, sample):
     for one in (silent, unasked):
         assert (one.objects, one.precision, one.recall, one.map50) == (0, 0, 0, 0)
         assert one.reliability is one.latency is one.centre is None
+    assert evaluate(saying(""), [sample]).why == "Unavailable('')"
 
 
 def test_the_first_look_does_not_count_for_the_latency(saying, sample, both):
