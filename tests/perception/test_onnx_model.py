@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from onnx_files import make_model
 
-from executive.cell.detection import Detection
-from executive.errors import InputError
+from executive.errors import InputError, Unavailable
+from executive.perception.detectors import onnx_model
 from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
-from executive.perception.detectors.onnx_model import OnnxModel, read_labels
+from executive.perception.detectors.onnx_model import OnnxModel, find_model_errors, read_labels
 
 
 @pytest.fixture(scope="module")
@@ -24,18 +25,15 @@ def decoded(model, monkeypatch):
     """Returns what the model makes of the runtime's outputs for an image, and the input it gave for them."""
 
     def decoded(boxes, logits, image):
-        given = []
+        given = {}
 
-        class Session:
-            def run(self, names, inputs):
-                given.append((names, inputs["input"]))
-                return [np.array([boxes], np.float32), np.array([logits], np.float32)]
+        def run(names, inputs):
+            assert names == ["dets", "labels"]
+            given.update(inputs)
+            return [np.array([boxes], np.float32), np.array([logits], np.float32)]
 
-        monkeypatch.setattr(model, "_session", Session())
-        found = model.detect(image, 0.25)
-        ((names, put),) = given
-        assert names == ["dets", "labels"]
-        return found, put
+        monkeypatch.setattr(model, "_session", SimpleNamespace(run=run))
+        return model.detect(image, 0.25), given["input"]
 
     return decoded
 
@@ -44,15 +42,10 @@ IMAGE = np.zeros((100, 200, 3), np.uint8)
 
 
 def test_boxes_are_scaled_and_clipped_to_the_image_and_the_background_is_dropped(decoded):
-    found, _ = decoded([[0.5, 0.5, 0.1, 0.2]], [[2.0, -9, -9, 9]], IMAGE)
-    assert found == [
-        Detection(
-            "cube",
-            pytest.approx(1 / (1 + np.exp(-2))),
-            pytest.approx((90, 40, 110, 60)),
-            pytest.approx(1.234e-4, rel=1e-3),
-        )
-    ]
+    (found,), _ = decoded([[0.5, 0.5, 0.1, 0.2]], [[2.0, -9, -9, 9]], IMAGE)
+    assert (found.label, found.box) == ("cube", pytest.approx((90, 40, 110, 60)))
+    assert found.confidence == pytest.approx(1 / (1 + np.exp(-2)))
+    assert found.second_confidence == pytest.approx(1.234e-4, rel=1e-3)
     (found,), _ = decoded([[0.0, 1.0, 0.2, 0.2]], [[-9, 2.0, -9, -9]], IMAGE)
     assert found.box == pytest.approx((0, 90, 20, 100))
 
@@ -66,36 +59,65 @@ def test_what_is_under_the_floor_is_dropped_and_the_most_confident_comes_first(d
 def test_the_input_is_normalized_rgb_of_the_models_size(model, decoded):
     red = np.full((50, 50, 3), (255, 0, 0), np.uint8)
     _, given = decoded([[0.5] * 4], [[-9.0] * 4], red)
-    assert given.shape == (1, 3, model.input_size, model.input_size)
+    assert given.shape == (1, 3, *model.input_size)
     assert given[0, 0] == pytest.approx((1 - 0.485) / 0.229, abs=1e-5)
     assert given[0, 2] == pytest.approx((0 - 0.406) / 0.225, abs=1e-5)
 
 
 def test_a_larger_image_is_shrunk_to_the_mean_of_all_pixels_and_a_box_is_in_its_pixels(model, decoded):
-    striped = np.zeros((4 * model.input_size, 4 * model.input_size, 3), np.uint8)
+    side = 4 * model.input_size[0]
+    striped = np.zeros((side, side, 3), np.uint8)
     striped[:, ::4] = 200
     (found,), given = decoded([[0.5, 0.5, 0.1, 0.2]], [[2.0, -9, -9, -9]], striped)
     assert given[0, 0] == pytest.approx((50 / 255 - 0.485) / 0.229, abs=1e-5)
-    side = 4 * model.input_size
     assert found.box == pytest.approx((0.45 * side, 0.4 * side, 0.55 * side, 0.6 * side))
 
 
-def test_a_file_that_is_no_model_of_these_classes_is_refused(tmp_path):
-    with pytest.raises(InputError, match="has 3 classes, but there are 2 labels: cat, dog"):
-        OnnxModel(MODEL_PATH, ("cat", "dog"))
-    (tmp_path / "model.onnx").write_bytes(b"not a model")
-    with pytest.raises(InputError, match="not a model that onnxruntime can run"):
-        OnnxModel(tmp_path / "model.onnx", ("cube",))
+def outputs(boxes=(1, 5, 4), logits=(1, 5, 3), kind="float32", value=0.5):
+    return {"dets": np.full(boxes, 0.5, kind), "labels": np.full(logits, value, kind)}
 
 
-def test_a_model_with_outputs_of_variable_size_is_refused(model, monkeypatch):
-    def node(name, *shape):
-        return SimpleNamespace(name=name, shape=shape)
+def images(*shape, kind="float32"):
+    return {"image": (kind, shape)}
 
-    session = SimpleNamespace(
-        get_inputs=lambda: [node("input", 1, 3, 256, 256)],
-        get_outputs=lambda: [node("dets", 1, 50, 4), node("labels", 1, 50, "classes")],
-    )
-    monkeypatch.setattr(model, "_session", session)
-    with pytest.raises(InputError, match="input or output of variable size; export it with fixed sizes"):
-        model._check_shapes(Path("model.onnx"))
+
+def write(folder, *model):
+    (folder / "model.onnx").write_bytes(make_model(*model))
+    return folder / "model.onnx"
+
+
+@pytest.mark.parametrize(("shape", "kind"), [((1, 3, 8, 16), "float32"), (("batch", 3, 8, 8), "float16")])
+def test_a_wide_model_and_a_model_of_half_precision_find_an_object(tmp_path, shape, kind):
+    path = write(tmp_path, images(*shape, kind=kind), outputs(kind=kind))
+    assert find_model_errors(path, ("cube", "duck"), 0) == []
+    (found,) = OnnxModel(path, ("cube", "duck")).detect(IMAGE, 0.25)
+    assert (found.label, found.box) == ("cube", (50.0, 25.0, 150.0, 75.0))
+
+
+REFUSED = [
+    *((images(*shape), outputs(), r"it has image .*; export it with rfdetr")
+      for shape in ((4, 3, 8, 8), (1, 1, 8, 8), (1, 8, 8, 3), (1, 1, 3, 8, 8))),
+    (images(1, 3, 8, 8, kind="uint8"), outputs(), "it has image tensor.uint8"),
+    (images(1, 3, "height", "width"), outputs(), "variable size; export it with fixed sizes"),
+    ({**images(1, 3, 8, 8), "size": ("int64", (1, 2))}, outputs(), "it has .* size tensor"),
+    (images(1, 3, 8, 8), {"output0": np.zeros((1, 84, 9), "float32")}, "it has .* output0"),
+    (images(1, 3, 8, 8), outputs((1, 5, 5), (1, 5), kind="int64"), "it has .* labels tensor.int64"),
+    (images(1, 3, 8, 8), outputs(logits=(1, 5, 4)), "has 3 classes, but there are 2 labels: cube, duck"),
+    (images(1, 3, 8, 8), outputs((1, 0, 4), (1, 0, 3)), r"dets \(1, 0, 4\)"),
+    (images(1, 3, 8, 8), outputs((1, 6, 4)), r"dets \(1, 6, 4\) and labels \(1, 5, 3\)"),
+    (images(1, 3, 8, 8), outputs(value=np.nan), "NaN"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("inputs", "arrays", "text"), REFUSED)
+def test_a_model_of_another_kind_is_refused_in_a_sentence(tmp_path, inputs, arrays, text):
+    with pytest.raises((InputError, Unavailable), match=text):
+        OnnxModel(write(tmp_path, inputs, arrays), ("cube", "duck")).detect(IMAGE, 0.25)
+
+
+def test_the_trial_of_a_model_survives_what_the_model_does(tmp_path, monkeypatch):
+    path = write(tmp_path, images(1, 3, 8, 8), outputs(), "Nonsense")
+    assert "not a model that onnxruntime can run" in find_model_errors(path, ("cube",), 1)[0]
+    abort = [sys.executable, "-c", "import os; os.abort()"]
+    monkeypatch.setattr(onnx_model, "build_command", lambda *arguments: abort)
+    assert "crashes, or takes over" in find_model_errors(path, ("cube",), 2)[0]

@@ -102,6 +102,7 @@ WRONG = [
     (RfdetrDetector, {"model_path": ONNX, "labels": 3}, "labels", 'option "labels.*" .* valid'),
     (RfdetrDetector, {"model_path": ONNX, "labels": ["a"], "c": 1}, "c", 'option "c".*not permitted'),
     (RfdetrDetector, {"model_path": "m.onnx", "labels": ["a"]}, "model_path", "no model file .*m.onnx"),
+    (RfdetrDetector, {"model_path": ONNX, "labels": ["a"]}, "model_path", "3 classes, but .* 1 labels: a"),
     (RfdetrDetector, {"model_path": ONNX, "labels": "no.txt"}, "labels", "no label file .*no.txt"),
     (RfdetrDetector, {"model_path": ONNX, "labels": "empty.txt"}, "labels", "empty.txt is empty"),
     (RfdetrDetector, {"model_path": ONNX, "labels": ONNX}, "labels", "embedded.onnx cannot be read: .*utf-8"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -46,6 +47,12 @@ def test_a_class_that_looks_like_another_gets_the_label_of_the_other() -> None:
     assert answer.confident == (detect("cube"),)
 
 
+@pytest.mark.parametrize("box", [(0.4, 0.4, 0.6, 0.5), (30, 0, 39, 9), (0, 0, 9, math.nan), (9, 0, 0, 9)])
+def test_a_box_that_cannot_show_an_object_in_the_image_is_an_error(box: Any) -> None:
+    with pytest.raises(Unavailable, match="invalid box"):
+        screen_answer(Answer("eye", (detect(), Detection("cube", 0.9, box)), RATES), FRAME, "table", LOOKS)
+
+
 def raise_unavailable() -> Answer:
     raise Unavailable("the line is busy")
 
@@ -57,7 +64,8 @@ def raise_unavailable() -> Answer:
         (
             lambda: Answer("eye", (detect(confidence=1.5),), RATES),
             Unavailable,
-            "detector eye returned an invalid box: 'cube' 1.5 at (0.0, 0.0, 9.0, 9.0)",
+            "detector eye returned an invalid box: 'cube' 1.5 at (0.0, 0.0, 9.0, 9.0) "
+            "in an image of 20 x 20 pixels",
         ),
         (
             lambda: Answer("eye", (detect(),) * (MAX_BOXES + 1), RATES),

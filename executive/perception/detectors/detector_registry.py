@@ -66,7 +66,7 @@ def build_detectors(
 
 
 def find_detector_errors(configs: Mapping[str, DetectorConfig], base: Path) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the key and the message of each error in the sections of the detectors, without loading a model.
+    """Yield the key and the message of each error in the sections of the detectors.
 
     A kind may check its options in a static method `check(config, base, all_configs)`: `base` is the folder
     of the cell file, and `all_configs` are the sections of all detectors of the cell.

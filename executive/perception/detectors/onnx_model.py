@@ -1,14 +1,16 @@
 """Exported RF-DETR model in onnxruntime, with pre-processing and post-processing.
 
-Conventions of an export by rfdetr: input `(1, 3, R, R)`, RGB in 0..1, normalized with ImageNet's mean and
+Conventions of an export by rfdetr: input `(1, 3, H, W)`, RGB in 0..1, normalized with ImageNet's mean and
 standard deviation; outputs `dets` `(1, Q, 4)`, centre x, y, width, height in 0..1, and `labels`
-`(1, Q, C + 1)`, logits with the background last.
+`(1, Q, C + 1)`, logits with the background last. All values are of float32 or float16.
 """
 
 from __future__ import annotations
 
 import functools
 import os
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -20,11 +22,17 @@ from executive.cell.detection import Detection
 from executive.cell.frame import Box
 from executive.errors import InputError, Unavailable
 from executive.perception.detectors.views import remove_duplicates
+from executive.processes import build_command
 
 CHANNEL_MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)
 """Mean of ImageNet's images, for each channel, 0 to 1."""
 CHANNEL_STD = np.array([0.229, 0.224, 0.225], dtype=np.float32)
 """Standard deviation of ImageNet's images, for each channel, 0 to 1."""
+
+INPUT_TYPES = {"tensor(float)": "float32", "tensor(float16)": "float16"}
+"""Supported types of the input, by the name in onnxruntime."""
+TRIAL_TIMEOUT = 30.0
+"""Maximum time to load a model and to run it once [s]."""
 
 
 class OnnxModel:
@@ -55,9 +63,12 @@ class OnnxModel:
         try:
             self._session = InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
         except Exception as error:
-            raise InputError(f"{path} is not a model that onnxruntime can run: {error}") from error
+            raise InputError(f"{path} is not a model that onnxruntime can run: {_shorten(error)}") from error
         self.labels = tuple(labels)
-        self.input_size = self._check_shapes(path)
+        self._check_signature(path)
+        (self._input,) = self._session.get_inputs()
+        self.input_size: tuple[int, int] = (self._input.shape[3], self._input.shape[2])
+        """Width and height of the input image [pixel]."""
 
     @staticmethod
     def load(path: Path, labels: Sequence[str], threads: int = 2) -> OnnxModel:
@@ -73,12 +84,17 @@ class OnnxModel:
         """Return the detections of at least `min_confidence` in an RGB image `(H, W, 3)`, best first.
 
         Raises:
-            Unavailable: onnxruntime failed.
+            Unavailable: onnxruntime failed, or the outputs are not those of an RF-DETR model.
         """
         try:
-            boxes, logits = self._session.run(["dets", "labels"], {"input": self._make_input(image)})
+            boxes, logits = self._session.run(["dets", "labels"], {self._input.name: self._make_input(image)})
         except Exception as error:
-            raise Unavailable(f"onnxruntime failed: {error}") from error
+            raise Unavailable(f"onnxruntime failed: {_shorten(error)}") from error
+        query_count = max(boxes.size // 4, 1)
+        shapes = (1, query_count, 4), (1, query_count, len(self.labels) + 1)
+        if (boxes.shape, logits.shape) != shapes or np.isnan(boxes).any() or np.isnan(logits).any():
+            returned = f"dets {boxes.shape} and labels {logits.shape}"
+            raise Unavailable(f"the model returned NaN, or {returned} instead of {shapes[0]} and {shapes[1]}")
         confidences = 1 / (1 + np.exp(-logits[0, :, :-1].astype(np.float64)))
         image_size = np.array(image.shape[1::-1], dtype=float)
         detections = []
@@ -91,35 +107,66 @@ class OnnxModel:
             detections.append(Detection(self.labels[label], float(confidences[query, label]), box, second))
         return remove_duplicates(sorted(detections, key=lambda detection: -detection.confidence))
 
-    def _make_input(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Return the normalized image `(1, 3, R, R)`."""
-        size = (self.input_size, self.input_size)
-        if image.shape[:2] != size:
+    def _make_input(self, image: NDArray[np.uint8]) -> NDArray[np.floating]:
+        """Return the normalized image `(1, 3, H, W)` of the model's type."""
+        size = self.input_size
+        if image.shape[1::-1] != size:
             # Area averaging uses all pixels and does not move edges; bilinear resizing would skip pixels.
-            is_larger = min(image.shape[:2]) > self.input_size
+            is_larger = image.shape[1] > size[0] and image.shape[0] > size[1]
             interpolation = cv2.INTER_AREA if is_larger else cv2.INTER_LINEAR
             image = np.asarray(cv2.resize(image, size, interpolation=interpolation), dtype=np.uint8)
         normalized = (image.astype(np.float32) / 255 - CHANNEL_MEAN) / CHANNEL_STD
-        return np.ascontiguousarray(normalized.transpose(2, 0, 1)[None])
+        return np.ascontiguousarray(normalized.transpose(2, 0, 1)[None], dtype=INPUT_TYPES[self._input.type])
 
-    def _check_shapes(self, path: Path) -> int:
-        """Check names and shapes of inputs and outputs, and return the side of the input image [pixel]."""
-        inputs = {node.name: node.shape for node in self._session.get_inputs()}
-        outputs = {node.name: node.shape for node in self._session.get_outputs()}
-        if list(inputs) != ["input"] or not {"dets", "labels"} <= set(outputs):
-            raise InputError(
-                f"{path} is not an exported RF-DETR model: it has the inputs {', '.join(inputs)} and the "
-                f'outputs {", ".join(outputs)}, but needs the input "input" and the outputs "dets", "labels"'
+    def _check_signature(self, path: Path) -> None:
+        """Check names, types and shapes of inputs and outputs; a variable size is a name or None."""
+        inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
+        shapes = {node.name: node.shape for node in outputs}
+        label_shape = shapes.get("labels", [])
+        image_shapes = [node.shape for node in inputs if node.type in INPUT_TYPES and node.shape[1:-2] == [3]]
+        # The batch may be of variable size.
+        batch_sizes = [shape[0] if isinstance(shape[0], int) else 1 for shape in image_shapes]
+        if len(inputs) != 1 or batch_sizes != [1] or "dets" not in shapes or len(label_shape) != 3:
+            nodes = ", ".join(f"{node.name} {node.type} {node.shape}" for node in (*inputs, *outputs))
+            needed = (
+                "float or float16 [1, 3, H, W], dets [1, Q, 4], labels [1, Q, C+1]; export it with rfdetr"
             )
-        size, output_count = inputs["input"][-1], outputs["labels"][-1]
-        if not isinstance(size, int) or not isinstance(output_count, int):
+            raise InputError(f"{path} is no RF-DETR for one RGB image: it has {nodes}, but needs {needed}")
+        if not all(isinstance(size, int) for size in (*inputs[0].shape[2:], label_shape[2])):
             raise InputError(f"{path} has an input or output of variable size; export it with fixed sizes")
-        class_count = output_count - 1
+        class_count = label_shape[2] - 1
         if class_count != len(self.labels):
             labels = f"{len(self.labels)} labels: {', '.join(self.labels)}"
             advice = "give one label per class, in the order of the model"
             raise InputError(f"{path} has {class_count} classes, but there are {labels}; {advice}")
-        return size
+
+
+def _shorten(error: Exception) -> str:
+    """Return the message of onnxruntime after the name of its C++ function, as one line."""
+    return " ".join(str(error).rpartition(") ")[2].split())
+
+
+@functools.lru_cache(maxsize=4)
+def find_model_errors(path: Path, labels: tuple[str, ...], _change_time: int) -> list[str]:
+    """Return messages about what is wrong with a model; `_change_time` distinguishes versions of a file.
+
+    The model is loaded and run on an empty image in a child process, because it may crash or never end.
+    """
+    command = build_command("executive.perception.detectors.onnx_model", str(path), *labels)
+    try:
+        trial = subprocess.run(command, capture_output=True, text=True, check=True, timeout=TRIAL_TIMEOUT)
+    except (OSError, ValueError, subprocess.SubprocessError):
+        return [f"{path} crashes, or takes over {TRIAL_TIMEOUT:.0f} s for an empty image; export it again"]
+    return trial.stdout.splitlines()
+
+
+def _try_model() -> None:
+    """Run the model of the command line on an empty image, and print the error message, if any."""
+    try:
+        model = OnnxModel(Path(sys.argv[1]), sys.argv[2:])
+        model.detect(np.zeros((*model.input_size, 3), np.uint8), min_confidence=1.0)
+    except (InputError, Unavailable) as error:
+        sys.stdout.write(str(error))
 
 
 @functools.lru_cache(maxsize=4)
@@ -150,3 +197,7 @@ def read_labels(path: Path) -> tuple[str, ...]:
     if not names:
         raise InputError(f"the label file {path} is empty; it needs one class name per line")
     return names
+
+
+if __name__ == "__main__":
+    _try_model()

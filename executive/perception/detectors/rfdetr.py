@@ -13,10 +13,12 @@ from pydantic import Field
 from executive.cell.config import DetectorConfig
 from executive.cell.detection import Detection
 from executive.errors import InputError
+from executive.perception.detectors import onnx_model
 from executive.perception.detectors.onnx_model import OnnxModel, describe_missing_model, read_labels
 from executive.perception.detectors.options import DetectorOptions, OptionErrors, find_class_map_errors
 from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
 from executive.perception.detectors.views import Region, search_regions
+from executive.perception.envelope.measurement import is_measured
 
 
 class RfdetrOptions(DetectorOptions):
@@ -72,21 +74,29 @@ class RfdetrDetector(ThreadedDetector):
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
-        """Yield each missing, unknown or invalid option, with an error message; load no model."""
+        """Yield each missing, unknown or invalid option, with an error message.
+
+        A model without a measurement is tried out, in a child process; a measured model has run.
+        """
         del all_configs
         errors = list(RfdetrOptions.find_errors(config))
         yield from errors
         if errors:
             return
         options = RfdetrOptions.read(config)
-        if not (base / options.model_path).is_file():
-            yield "model_path", describe_missing_model(base / options.model_path)
+        path = base / options.model_path
+        if not path.is_file():
+            yield "model_path", describe_missing_model(path)
         try:
             names = options.read_names(base)
         except InputError as error:
             yield "labels", str(error)
             return
-        yield from find_class_map_errors(config, options.class_map, names)
+        errors = list(find_class_map_errors(config, options.class_map, names))
+        if not errors and path.is_file() and not is_measured(path, base):
+            messages = onnx_model.find_model_errors(path, names, path.stat().st_mtime_ns)
+            errors = [("model_path", message) for message in messages]
+        yield from errors
 
     @classmethod
     def labels(cls, config: DetectorConfig, base: Path) -> tuple[str, ...] | None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from itertools import filterfalse
 
 from executive.cell.detection import Answer, Detection
 from executive.cell.frame import Frame
@@ -21,8 +20,10 @@ MIN_VISIBLE_FRACTION = 0.7
 MAX_BOXES = 60
 """Maximum number of boxes in one answer, including doubtful boxes and unknown labels. Shipped cells have at
 most 20 objects, and the time for the assignment of boxes to items grows more than linearly."""
-MAX_COORDINATE = 1e5
-"""Maximum absolute coordinate of a box [pixel]; all images are smaller, and squares of it do not overflow."""
+MIN_BOX_SIDE = 2.0
+"""Minimum longer side of a box [pixel]; a box in fractions of the image is smaller."""
+MAX_BOX_SIDE = 1e5
+"""Maximum longer side of a box [pixel]; all images are smaller, and squares of it do not overflow."""
 MAX_LABEL_LENGTH = 100
 """Maximum number of characters of a label, which appears in messages and on the terminal."""
 MAX_SECOND_CLASS_RATIO = 0.5
@@ -44,15 +45,16 @@ def screen_answer(answer: Answer, frame: Frame, view: str, label_map: Mapping[st
 
     Raises:
         Crowded: There are more than `MAX_BOXES` boxes.
-        Unavailable: A box, a confidence or a label is invalid.
+        Unavailable: A box, a confidence or a label is invalid, or a box does not fit the image.
     """
     if len(answer.confident) > MAX_BOXES:
         problem = f"found {len(answer.confident)} boxes in the view {view}, which cannot all be objects"
         advice = "raise `floor` of the detector in the cell file, or use another detector"
         raise Crowded(f"detector {answer.detector} {problem}; at most {MAX_BOXES} are allowed: {advice}")
-    if invalid := next(filterfalse(_is_valid, answer.confident), None):
+    if invalid := next((found for found in answer.confident if not _is_valid(found, frame)), None):
         box = f"{invalid.label[:MAX_LABEL_LENGTH]!r} {invalid.confidence:g} at {invalid.box}"
-        raise Unavailable(f"detector {answer.detector} returned an invalid box: {box}")
+        image = f"an image of {frame.visible.shape[1]} x {frame.visible.shape[0]} pixels"
+        raise Unavailable(f"detector {answer.detector} returned an invalid box: {box} in {image}")
     threshold = answer.error_rates.threshold
     confident: list[Detection] = []
     doubtful: list[Detection] = []
@@ -111,10 +113,13 @@ def _is_confident(detection: Detection, threshold: float) -> bool:
     return confidence >= threshold and detection.second_confidence <= MAX_SECOND_CLASS_RATIO * confidence
 
 
-def _is_valid(detection: Detection) -> bool:
-    """Return True if a detection has a valid box, a valid confidence and a printable label."""
+def _is_valid(detection: Detection, frame: Frame) -> bool:
+    """Return True if a detection has a valid confidence, a printable label, and a valid box in the image."""
     left, top, right, bottom = detection.box
+    height, width = frame.visible.shape
     # These comparisons also reject NaN.
-    is_in_range = all(abs(edge) <= MAX_COORDINATE for edge in detection.box)
+    sides = right - left, bottom - top
+    is_box = min(sides) >= 0 and MIN_BOX_SIDE <= max(sides) <= MAX_BOX_SIDE
+    is_in_image = right >= 0 and bottom >= 0 and left <= width and top <= height
     is_printable = detection.label.isprintable() and len(detection.label) <= MAX_LABEL_LENGTH
-    return is_in_range and left <= right and top <= bottom and 0 <= detection.confidence <= 1 and is_printable
+    return is_box and is_in_image and 0 <= detection.confidence <= 1 and is_printable

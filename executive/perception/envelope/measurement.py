@@ -113,6 +113,12 @@ def read_folders(folders: Sequence[Path]) -> tuple[list[tuple[str, Measurement]]
     return measurements, problems
 
 
+def is_measured(weights: Path, folder: Path) -> bool:
+    """Return True if a detector with this model file was measured in a cell of a folder."""
+    fingerprints = [measurement.fingerprint for _, measurement in read_folders([folder])[0]]
+    return _digest(weights) in [fingerprint.get("weights") for fingerprint in fingerprints]
+
+
 def format_measurements(measurements: Iterable[Measurement], new: Measurement) -> str:
     """Return the text of a measurement file in which `new` replaces the measurement of its detector."""
     others = [measurement for measurement in measurements if measurement.detector != new.detector]
@@ -155,7 +161,11 @@ def _digest_weights(section: DetectorConfig, base: Path) -> str:
     """Return a digest of the model file of a detector; "" for a detector without a model file."""
     find_weights = getattr(find_detector_kinds()[section.kind].load(), "weights", None)
     path = find_weights(section, base) if find_weights else None
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path and path.is_file() else ""
+    return _digest(path) if path and path.is_file() else ""
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
 def _describe_camera(camera: CameraConfig, config: CellConfig) -> dict[str, str]:

@@ -179,6 +179,7 @@ SPOILT: Mapping[str, Spoil] = {
     "negative": _all(width=-5.0),
     "huge": _all(width=1e6, height=1e6),
     "outside": _all(x=-300.0),
+    "fractions": _all(x=0.5, y=0.5, width=0.1, height=0.1),
     "overconfident": _all(confidence=1.5),
     "text for number": _all(x="12"),
     "null field": _all(y=None),

@@ -55,6 +55,7 @@ def test_boxes_by_centre_and_size_become_boxes_by_corners_cut_off_where_they_sti
         (answer({**CUBE, "y": 4.0, "height": 26.0}), r"box from \(40, -9\) to \(60, 17\)"),
         (answer({**CUBE, "y": 76.0, "height": 26.0}), r"box from \(40, 63\) to \(60, 89\)"),
         (answer({**CUBE, "x": -5.0, "width": 8.0}), r"box from \(-9, 35\) to \(-1, 45\)"),
+        (answer({**CUBE, "width": 0.1, "height": 0.2}), r"predictions\[0\] is a box of 0.1 x 0.2 pixels"),
         (answer(*[CUBE] * 301), "predictions: list should have at most 300 items"),
         (answer(CUBE, image={"width": 1, "height": 1}), "1 x 1 pixels, but the sent image has 100 x 80"),
         (answer(CUBE, image={"width": None, "height": 1}), "image.width: input should be a valid number"),
@@ -65,24 +66,30 @@ def test_what_cannot_be_is_refused_with_its_place(spoilt, text):
         read_answer(spoilt, (100, 80))
 
 
-@pytest.mark.parametrize(
-    "output",
-    [
-        answer(CUBE),
-        [CUBE],
-        {"inference_id": "1", "predictions": answer(CUBE)},
-        {"image": {"width": 100, "height": 80}, "predictions": [CUBE]},
-    ],
-    ids=["answer", "predictions", "outputs of a step", "serialized detections"],
-)
-def test_the_output_of_a_workflow_is_read_in_every_form_that_it_has(output):
+UNKNOWN = answer(image={"width": None, "height": None})
+PLACE = {"offset_x": 40, "offset_y": 35, "width": 100, "height": 80}
+IN_CROP = {**CUBE, "x": 10, "y": 5, "parent_origin": PLACE}
+NESTED = {**IN_CROP, "parent_origin": {**PLACE, "offset_x": 9, "width": 60}}
+OF_CROP = answer(IN_CROP, image={"width": 30, "height": 20})
+OUTPUTS = [
+    answer(CUBE), [CUBE], {"inference_id": "1", "predictions": answer(CUBE)},
+    [IN_CROP], [[IN_CROP], [], None], [OF_CROP, UNKNOWN], [{"predictions": OF_CROP}], [answer(CUBE), UNKNOWN],
+    [[answer({**NESTED, "root_parent_origin": PLACE})], [None]],
+    answer({**IN_CROP, "parent_origin": {"offset_x": 40, "offset_y": 35}}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("output", OUTPUTS)
+def test_the_output_of_a_workflow_is_read_in_every_form_also_of_crops(output):
     assert read_output(output, (100, 80)) == read_answer(answer(CUBE), (100, 80))
 
 
-def test_an_output_without_predictions_has_an_image_without_a_size():
-    assert read_output({"image": {"width": None, "height": None}, "predictions": []}, (100, 80)) == []
-    with pytest.raises(ValueError, match=r"image\.width: input should be a valid number"):
-        read_output({"image": {"width": None, "height": 80}, "predictions": []}, (100, 80))
+@pytest.mark.parametrize(
+    ("angle", "x", "y"), [(None, 10, 5), (90, 5, 10), (45, 10.607, 10.607), (-30, 11.16, 9.33)]
+)
+def test_an_oriented_box_becomes_the_box_around_it(angle, x, y):
+    (found,) = read_answer(answer({**CUBE, "angle": angle}), (100, 80))
+    assert found.box == pytest.approx((50 - x, 40 - y, 50 + x, 40 + y), abs=1e-2)
 
 
 @pytest.mark.parametrize(
@@ -91,8 +98,16 @@ def test_an_output_without_predictions_has_an_image_without_a_size():
         ("ball", "of type str, not an object with the key"),
         (None, "of type NoneType, not an object with the key"),
         ({"top": "ball"}, "predictions: field required"),
-        ([answer(CUBE), answer()], r"predictions\[0\].x: field required"),
-        ([[CUBE]], r"predictions\[0\]: input should be a valid dictionary"),
+        (
+            {"image": {"width": None, "height": 80}, "predictions": []},
+            r"image\.width: input should be a valid",
+        ),
+        ([NESTED], "60 x 80 pixels, but the sent image has 100 x 80"),
+        ([[CUBE], []], "predictions per crop without the place of the crop"),
+        (
+            [answer(CUBE, image={"width": 50, "height": 40})],
+            "50 x 40 pixels, but the sent image has 100 x 80",
+        ),
         (answer(answer(CUBE)), r"predictions\[0\].x: field required"),
         ({"predictions": answer({**CUBE, "x": -30.0})}, r"box from \(-40, 35\) to \(-20, 45\)"),
         (answer(CUBE, image={"width": 50, "height": 40}), "50 x 40 pixels, but the sent image has 100 x 80"),
@@ -136,6 +151,20 @@ def test_whatever_a_server_says_only_sound_boxes_get_in(said):
         assert 0 <= left <= right <= 100
         assert 0 <= top <= bottom <= 80
         assert 0 <= detection.confidence <= 1 <= len(detection.label)
+
+
+@pytest.mark.parametrize(
+    ("host", "variable", "exempt", "is_named"),
+    [
+        ("lab", "HTTP_PROXY", "", True), ("lab", "ALL_PROXY", "", True), ("lab", "HTTPS_PROXY", "", False),
+        ("127.0.0.1", "HTTP_PROXY", "", False), ("10.0.0.5", "HTTP_PROXY", "10.0.0.0/8", False),
+    ],
+)  # fmt: skip
+def test_a_message_names_the_proxy_of_a_server(monkeypatch, host, variable, exempt, is_named):
+    monkeypatch.setenv(variable, "http://user:SECRET@proxy:3128")
+    monkeypatch.setenv("NO_PROXY", exempt)
+    message = describe_failure({"failure": "refused"}, RoboflowOptions(url=f"http://{host}:9001"))
+    assert ("through the proxy in HTTP_PROXY" in message, "SECRET" in message) == (is_named, False)
 
 
 HOST = "https://serverless.roboflow.com"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -210,18 +211,6 @@ def asked_for(sentence, api):
     return sentence
 
 
-QUICK = ("401", "404", "html", "deep", "nan")
-"""Faults of every kind; the others are slow tests, and unit tests in test_answers.py."""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("fault", QUICK)
-@pytest.mark.parametrize("api", ["v1", "workflow"])
-def test_a_fault_of_the_server_is_unavailable_with_what_to_do(make, server, fault, api):
-    server.faults = lambda look: fault
-    assert_unavailable(make(**APIS[api]), f"^{server.url}", asked_for(FAULTS[fault], api))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("api", APIS)
@@ -247,6 +236,12 @@ def test_a_server_that_is_gone_and_comes_back(detector, server):
         server.start()
     server.faults = lambda look: ""
     assert len(search(detector, spot()).confident) == 1
+
+
+def test_a_server_on_this_computer_is_asked_without_a_proxy(server, monkeypatch):
+    monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
+    with contextlib.closing(build("direct", url=server.url, **V1)) as detector:
+        assert len(search(detector, spot()).confident) == 1
 
 
 @pytest.mark.slow

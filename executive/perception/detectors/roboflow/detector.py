@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -38,7 +39,9 @@ class RoboflowDetector(ThreadedDetector):
         self._options = options
         self._read_answer = read_output if options.api == "workflow" else read_answer
         server = options.model_dump(include={"url", "model_id", "api", *WORKFLOW_OPTIONS})
-        self._process = InferenceProcess({**server, "confidence": config.floor}, ApiKey())
+        # A proxy cannot reach a server on this computer.
+        environment = {**os.environ, "no_proxy": "*"} if options.is_local else os.environ
+        self._process = InferenceProcess({**server, "confidence": config.floor}, ApiKey(environment))
 
     @classmethod
     def from_config(cls, config: DetectorConfig, context: DetectorContext) -> RoboflowDetector:
@@ -92,7 +95,7 @@ class RoboflowDetector(ThreadedDetector):
             raise Unavailable(failure_messages.describe_failure(message, self._options))
         try:
             detections = self._read_answer(message["answer"], (crop.shape[1], crop.shape[0]))
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             text = failure_messages.describe_invalid_answer(str(error), self._options)
             raise Unavailable(text) from None
         detections = [detection for detection in detections if detection.confidence >= self._config.floor]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 from urllib.parse import urlsplit
+from urllib.request import getproxies
 
 from pydantic import Field
 
@@ -54,10 +55,22 @@ class RoboflowOptions(DetectorOptions):
     first for the list of loaded models; three with `v1` if the server has not loaded the model."""
 
     @property
+    def is_local(self) -> bool:
+        """True if the server runs on this computer."""
+        return (urlsplit(self.url).hostname or "").startswith(("localhost", "127.", "0.0.0.0", "::1"))
+
+    @property
     def server_origin(self) -> str:
-        """Scheme, host and port of the server's address."""
+        """Scheme, host and port of the server's address, for messages, with a note if a proxy is used."""
         parts = urlsplit(self.url)
-        return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}"
+        origin = f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}"
+        if self.is_local or not getproxies():
+            return origin
+        # The import takes 0.2 s, and most computers have no proxy.
+        from requests.utils import get_environ_proxies, select_proxy
+
+        note = f", through the proxy in {parts.scheme.upper()}_PROXY or ALL_PROXY (see NO_PROXY),"
+        return f"{origin}{note}" if select_proxy(self.url, get_environ_proxies(self.url)) else origin
 
     @property
     def model_or_workflow(self) -> str:
