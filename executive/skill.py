@@ -168,8 +168,6 @@ class Skill:
         tool_state: Required state of the tool (ANY: no requirement); state after success (ANY: unchanged).
         tool_state_after_failure: State of the tool after a failure, by reason, and after a halt, by the key
             `halt`; ANY if unknown. A failure or halt without a key leaves the state unchanged.
-        is_replayable: False if the skill may have inputs besides the cell, such as files or random numbers; a
-            replay of a recorded run may then differ.
         waits: Name of the param that contains the minimum time until success [s], or "".
     """
 
@@ -183,7 +181,6 @@ class Skill:
     is_condition: ClassVar[bool] = False
     tool_state: ClassVar[tuple[ToolState, ToolState]] = (ANY, ANY)
     tool_state_after_failure: ClassVar[Mapping[str, ToolState]] = {}
-    is_replayable: ClassVar[bool] = True
     waits: ClassVar[str] = ""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:

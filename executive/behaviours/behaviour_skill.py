@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from dataclasses import replace
 from enum import Enum
-from functools import cache
+from functools import cache, partial
 from typing import Any, ClassVar, Optional, cast
 
 from py_trees.behaviour import Behaviour
@@ -15,15 +15,13 @@ from py_trees.common import Status
 from py_trees.ports import PortInformation, PortsMixin
 
 from executive.behaviours.arguments import find_mission_type, list_arguments, to_argument
-from executive.behaviours.run_blackboard import RunBlackboard
-from executive.cell.protocols import Cell, Steps
+from executive.behaviours.run_blackboard import PORT_PREFIX, RunBlackboard
+from executive.cell.protocols import BehaviourStep, Cell, Steps
 from executive.errors import Fault, InputError
 from executive.skill import Direction, Param, Port, Skill, get_attribute_name
 
 NAME_ARGUMENT = "name"
 """Constructor argument for the name of the behaviour; missions cannot set this argument."""
-_REPLAYABLE_MODULE = "py_trees.behaviours"
-"""Module of behaviours that depend only on their arguments, the blackboard, and random numbers."""
 
 
 class BehaviourSkill(Skill):
@@ -48,9 +46,34 @@ class BehaviourSkill(Skill):
     def run(self, cell: Cell) -> Steps:
         """Tick a new instance of the behaviour until it ends; its feedback message explains a failure."""
         blackboard = RunBlackboard(cell.clock)
+        ticks = self._tick_until_end(blackboard)
+        execute = partial(cell.behaviours.execute, type(self).__name__)
+
+        def stop() -> BehaviourStep:
+            ticks.close()
+            return BehaviourStep(Status.INVALID.name, "", blackboard.shared_values)
+
+        try:
+            while (step := blackboard.restore(execute(partial(next, ticks)))).status == Status.RUNNING.name:
+                yield
+        except GeneratorExit:
+            blackboard.restore(execute(stop))
+            raise
+        if step.status == Status.FAILURE.name:
+            raise self.failure("failed", step.message)
+        if step.status != Status.SUCCESS.name:
+            raise Fault("its status is INVALID after a tick; update must return RUNNING, SUCCESS or FAILURE")
+        for name, port in self.ports.items():
+            value = step.values.get(name)
+            # A required output without a value remains unset: the caller then reports a fault of the skill.
+            if port.direction is Direction.OUT and (value is not None or port.default is None):
+                setattr(self, get_attribute_name(name), value)
+
+    def _tick_until_end(self, blackboard: RunBlackboard) -> Generator[BehaviourStep, None, None]:
+        """Create the behaviour, and yield the result of each tick until the behaviour has ended."""
         with blackboard:
             behaviour = self.behaviour_type(**self._make_arguments())
-        keys = {port: f"/{behaviour.id.hex}/{port}" for port in self.ports}
+        keys = {port: f"{PORT_PREFIX}{behaviour.id.hex}/{port}" for port in self.ports}
         try:
             with blackboard:
                 if isinstance(behaviour, PortsMixin):
@@ -59,23 +82,16 @@ class BehaviourSkill(Skill):
                 behaviour.setup_with_descendants()
                 behaviour.tick_once()
             while behaviour.status is Status.RUNNING:
-                yield
+                yield BehaviourStep(behaviour.status.name, "", blackboard.shared_values)
                 with blackboard:
                     behaviour.tick_once()
-            status = behaviour.status
         finally:
             with blackboard:
                 _stop_and_shut_down(behaviour)
             values = {port: blackboard.storage.pop(key, None) for port, key in keys.items()}
-        if status is Status.FAILURE:
-            raise self.failure("failed", _explain_failure(behaviour))
-        if status is not Status.SUCCESS:
-            advice = "update() must return RUNNING, SUCCESS or FAILURE"
-            raise Fault(f"its status is INVALID after a tick; {advice}")
-        for name, port in self.ports.items():
-            # A required output without a value remains unset: the caller then reports a fault of the skill.
-            if port.direction is Direction.OUT and (values[name] is not None or port.default is None):
-                setattr(self, get_attribute_name(name), values[name])
+        outputs = {name: values[name] for name in values if self.ports[name].direction is Direction.OUT}
+        message = _explain_failure(behaviour) if behaviour.status is Status.FAILURE else ""
+        yield BehaviourStep(behaviour.status.name, message, blackboard.shared_values | outputs)
 
     def _make_arguments(self) -> dict[str, Any]:
         values = {name: self._values[name] for name in self.params if name in self._values}
@@ -117,16 +133,13 @@ def make_behaviour_skill(name: str, behaviour_type: type[Behaviour]) -> type[Beh
             raise InputError(f'has an argument or port with the reserved name "{each}"; rename it')
         if each in params and each in ports:
             raise InputError(f'has an argument and a port with the same name "{each}"; rename one of them')
-    is_known = (
-        behaviour_type.__module__ == _REPLAYABLE_MODULE and behaviour_type is not ProbabilisticBehaviour
-    )
-    is_replayable = getattr(behaviour_type, "is_replayable", is_known)
+    # The other behaviours of this module depend only on their arguments and the blackboard.
+    senses = behaviour_type.__module__ != "py_trees.behaviours" or behaviour_type is ProbabilisticBehaviour
     members = {
         "__doc__": inspect.getdoc(behaviour_type), "__module__": behaviour_type.__module__,
         "behaviour_type": behaviour_type, "arguments": arguments, "params": params, "ports": ports,
         "is_condition": getattr(behaviour_type, "is_condition", False),
-        # A behaviour that is not replayable may read sensors.
-        "is_replayable": is_replayable, "senses": not is_replayable,
+        "senses": getattr(behaviour_type, "senses", senses),
     }  # fmt: skip
     return cast("type[BehaviourSkill]", type(name, (BehaviourSkill,), members))
 

@@ -11,8 +11,10 @@ from weakref import WeakKeyDictionary
 
 from py_trees.blackboard import Blackboard
 
-from executive.cell.protocols import Clock
+from executive.cell.protocols import BehaviourStep, Clock
 
+PORT_PREFIX = "/ports of behaviours/"
+"""Start of the keys of ports on the blackboard."""
 _LOCK = threading.RLock()
 """Lock on the class attributes of `Blackboard`, because another thread may execute another run."""
 _STORAGE_BY_CLOCK: WeakKeyDictionary[Clock, dict[str, object]] = WeakKeyDictionary()
@@ -35,6 +37,18 @@ class RunBlackboard:
     def __init__(self, clock: Clock) -> None:
         self.storage = _STORAGE_BY_CLOCK.setdefault(clock, {})
         self._attributes = {"storage": self.storage, "metadata": {}, "clients": {}, "activity_stream": None}
+
+    @property
+    def shared_values(self) -> dict[str, object]:
+        """Copy of the values by key, without the ports, each of which belongs to one behaviour."""
+        return {key: value for key, value in self.storage.items() if not key.startswith(PORT_PREFIX)}
+
+    def restore(self, step: BehaviourStep) -> BehaviourStep:
+        """Replace the shared values by those of a step, which a replay did not execute; return the step."""
+        for key in self.shared_values:
+            del self.storage[key]
+        self.storage.update({key: value for key, value in step.values.items() if key.startswith("/")})
+        return step
 
     def __enter__(self) -> None:
         _LOCK.acquire()

@@ -7,8 +7,8 @@ hardware. No call blocks: a skill sends a request, yields, and reads the result 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
 
 from executive.cell.arm import Arm
 from executive.cell.bins import Bin
@@ -155,6 +155,32 @@ class Operator(Protocol):
         """
 
 
+class BehaviourStep(NamedTuple):
+    """Result of one step of a behaviour of another project.
+
+    Attributes:
+        status: Status after the step: `RUNNING`, `SUCCESS`, `FAILURE` or `INVALID`.
+        message: Explanation of a failure, or "".
+        values: All values on the blackboard of py_trees after the step, by key (`/count`), and after the
+            last step the values of the output ports, by name (`mean`).
+    """
+
+    status: str
+    message: str
+    values: Mapping[str, object]
+
+
+class Behaviours:
+    """Behaviours of other projects, which may read clocks, random numbers, files or networks.
+
+    A run records the result of each step, so that a replay executes no behaviour.
+    """
+
+    def execute(self, name: str, step: Callable[[], BehaviourStep]) -> BehaviourStep:  # noqa: ARG002
+        """Execute a step of a behaviour of the skill `name`, under which a run records the result."""
+        return step()
+
+
 class MinTimes(Protocol):
     """Minimum times of actions in a cell; an action with a shorter timeout always fails."""
 
@@ -195,6 +221,7 @@ class Cell:
         descent_speed: Tool speed of the slow part of the guarded descent [m/s].
         report_selection: Function that reports a selected target and the name of its bin to the run.
         quotas: Maximum numbers of objects in the bins, from the mission.
+        behaviours: Behaviours of other projects.
     """
 
     clock: Clock
@@ -214,3 +241,4 @@ class Cell:
     descent_speed: float
     report_selection: Callable[[Target, str], None]
     quotas: Quotas
+    behaviours: Behaviours = field(default_factory=Behaviours)

@@ -12,7 +12,7 @@ from typing import Any
 
 from executive.cell.arm import Arm, Planning
 from executive.cell.ledger import Ledger
-from executive.cell.protocols import Camera, Cell, Detector, Localizer, Operator, Request, Tool
+from executive.cell.protocols import Behaviours, Camera, Cell, Detector, Localizer, Operator, Request, Tool
 
 _PROTOCOLS: Mapping[str, type] = {
     "arm": Arm,
@@ -24,6 +24,7 @@ _PROTOCOLS: Mapping[str, type] = {
     "ledger": Ledger,
     "operator": Operator,
     "localizer": Localizer,
+    "behaviours": Behaviours,
 }
 """Protocol by role: role of a part of the cell, or of an object that a part returns."""
 _RETURNED_ROLES = {"arm.plan": "plan", "detector.request": "request"}

@@ -10,8 +10,9 @@ from pydantic import JsonValue
 
 from executive import events
 from executive.errors import InputError, escape_control_characters, shorten_quotations
-from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent
+from executive.events import NodeEnded, NodeStarted, TimedEvent
 from executive.mission.load import LoadedMission
+from executive.record.journal import find_run_end
 from executive.record.recorded_mission import read_mission_of_run
 from executive.record.timeline.activation import get_skill_name
 from executive.replay.input_log import InputLog
@@ -115,7 +116,7 @@ class _Comparison:
         # The iterator yields the recorded decisions that have not been compared.
         self._recorded_decisions = filter(None, (_to_decision(timed, edited) for timed in log.events))
         # If the journal lacks the end of the run, its last control step may be incomplete and is ignored.
-        self._has_recorded_end = any(isinstance(timed.event, RunEnded) for timed in log.events)
+        self._has_recorded_end = find_run_end(log.events) is not None
         self._has_found_difference = False
 
     def __call__(self, timed: TimedEvent) -> None:
@@ -127,7 +128,7 @@ class _Comparison:
             self.result.decisions += 1
             return
         self._has_found_difference = True
-        self.result.unanswered = self.run.replayed_cell.missing_input_message
+        self.result.unanswered = self.run.replayed_cell.missing_input_message or self._log.find_lost_value()
         # After the last recorded step, the replay only halts its skills.
         self.result.is_complete = decision.tick > self._log.last_tick
         if self._has_recorded_end or any(map(self._is_in_complete_step, filter(None, (recorded, decision)))):

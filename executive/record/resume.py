@@ -63,10 +63,12 @@ def resume_run(
         # The control step of a halt or fault is not compared, because a corrected skill may act differently.
         compared_log = log if log.halt is None else log.select_before(log.halt.tick)
         replay = replay_and_compare(loaded, compared_log, start.seed)
+        if not lacks_only_result and (lost_value := compared_log.find_lost_value()):
+            raise InputError(f'the run in "{path}" cannot be resumed: {lost_value}; run the mission again')
         if not replay.is_equal:
             problem = f'the run in "{path}" cannot be resumed: {replay.difference}'
-            advice = "install the earlier version, or run the mission again"
-            raise InputError(f"{problem}. The executive or a skill has changed since the run; {advice}")
+            cause = "The executive or a skill has changed since the run, or a skill has unrecorded inputs"
+            raise InputError(f"{problem}. {cause}; install the earlier version, or run the mission again")
         options = replace(options, seed=start.seed, requests=start.requests, scene=directory.scene)
         run = assemble_resumed(
             loaded, options, log, directory.world_log,

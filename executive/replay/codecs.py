@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
@@ -11,9 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic_core import from_json, to_json
 
 from executive.cell.detection import Answer, Detection, ErrorRates, Observation
 from executive.cell.frame import Frame
+from executive.cell.protocols import BehaviourStep
 from executive.geometry import Array, Pose
 
 MAX_PIXELS = 10**8
@@ -134,6 +137,30 @@ def decode_observations(value: Any) -> list[Observation]:
     ]
 
 
+def encode_behaviour_step(step: BehaviourStep) -> dict[str, Any]:
+    """Return the attributes of a step of a behaviour.
+
+    Each value is in a list. The name of its type takes the place of a value that JSON cannot represent.
+    """
+    return step._asdict() | {"values": {name: _encode_value(value) for name, value in step.values.items()}}
+
+
+def decode_behaviour_step(value: Any) -> BehaviourStep:
+    """Return the step that `encode_behaviour_step` encoded, without the values that JSON cannot represent."""
+    values = {name: entry[0] for name, entry in value["values"].items() if isinstance(entry, list)}
+    return BehaviourStep(value["status"], value["message"], values)
+
+
+def _encode_value(value: object) -> list[Any] | str:
+    plain_value = value.item() if isinstance(value, np.generic) else value
+    # The value may be an object of another project, whose methods may raise any exception.
+    with contextlib.suppress(Exception):
+        copy = from_json(to_json(plain_value), allow_inf_nan=False)
+        if type(copy) is type(plain_value) and copy == plain_value:
+            return [copy]
+    return type(value).__name__
+
+
 def _encode_mask(mask: NDArray[np.bool_]) -> str:
     """Return a mask as compressed bits in base64; "" if all pixels are True, to keep the journal short."""
     if mask.all():
@@ -160,5 +187,6 @@ POSE = Codec(encode_pose, decode_pose)
 FRAME = Codec(encode_frame, decode_frame)
 ANSWER = Codec(encode_answer, decode_answer)
 OBSERVATIONS = Codec(encode_observations, decode_observations)
+BEHAVIOUR_STEP = Codec(encode_behaviour_step, decode_behaviour_step)
 MOTION = Codec(attrgetter("duration"), RecordedMotion)
 """Codec of planned motions; the other codecs are named after the type that they convert."""

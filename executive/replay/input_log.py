@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from executive.events import (
     InputRead,
@@ -111,6 +111,14 @@ class InputLog:
         """Last action of the tool, `open` or `close`; "" without an action."""
         events = (timed.event for timed in reversed(self.events))
         return next((event.action for event in events if isinstance(event, ToolCommanded)), "")
+
+    def find_lost_value(self) -> str:
+        """Return a clause about the first output or blackboard value that is not in the journal, or ""."""
+        readings = (timed.event for timed in self.events if isinstance(timed.event, InputRead))
+        steps: list[Any] = [each.value for each in readings if each.name.startswith("behaviour.")]
+        values = (value for step in steps if isinstance(step, dict) for value in step["values"].items())
+        names = (f'"{key}" ({entry})' for key, entry in values if isinstance(entry, str))
+        return next((f"JSON cannot restore the value of {name}" for name in names), "")
 
     def make_final_interruption(
         self, step_count: int, last_command_tick: int = 0, *, is_complete: bool = True

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import zlib
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -60,6 +59,7 @@ INPUT_FORMATS: Mapping[str, InputFormat] = {
     "operator.ask": InputFormat("operator"),
     "localizer.locate": InputFormat("localizer", codecs.ARRAY),
     "localizer.localize": InputFormat("observations", codecs.OBSERVATIONS),
+    "behaviours.execute": InputFormat("behaviour.{0}", codecs.BEHAVIOUR_STEP),
 }
 """Format of the recorded input of each access that is not a command, by `Access.name`."""
 
@@ -68,7 +68,7 @@ COMMANDS = frozenset(
 )
 """Accesses that command the cell, by `Access.name`; a replay executes no command."""
 
-RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer")
+RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer", "behaviours")
 """Roles of the parts of a cell with recorded inputs; a replay needs no inputs from other parts."""
 
 _CODEC_BY_PATTERN = {
@@ -95,7 +95,7 @@ def check_input(name: str, value: JsonValue) -> None:
     matching_codecs = (codec for pattern, codec in _CODEC_BY_PATTERN.items() if fnmatchcase(name, pattern))
     try:
         next(matching_codecs, codecs.IDENTITY).decode(value)
-    except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, zlib.error) as error:
+    except Exception as error:
         problem = f"{type(error).__name__}: {error}"
         raise ValueError(f'"value" does not have the format of the input "{name}" ({problem})') from error
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import random
+import time
 from collections.abc import Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Dummy, Failure, Running, Success
+from py_trees.blackboard import Blackboard
 from py_trees.common import Access, ParallelPolicy, Status
 from py_trees.composites import Parallel
 from py_trees.decorators import Inverter
@@ -66,7 +69,6 @@ class Logged(Behaviour):
     """Note every call; run for two ticks, then end with `last`."""
 
     calls: ClassVar[list[str]] = []
-    is_replayable = True
 
     def __init__(self, name: str, last: Status = Status.SUCCESS, broken: str = "") -> None:
         super().__init__(name)
@@ -145,8 +147,6 @@ class Quiet(Inverter):
 class Counter(Behaviour):
     """Add one to `/count` on the blackboard; fail above `most`."""
 
-    is_replayable = True
-
     def __init__(self, name: str, most: int = 100) -> None:
         super().__init__(name)
         self.most = most
@@ -163,7 +163,6 @@ class Counter(Behaviour):
 class Double(BehaviourWithPorts):
     """Double a number."""
 
-    is_replayable = True
     INPUT_PORTS: ClassVar = {
         "number": PortInformation(float, description="number to double"),
         "offset": PortInformation(float, default_value=0.5, description="offset of the result"),
@@ -221,3 +220,32 @@ class Odd(Behaviour):
 
     def update(self) -> Status:
         return None  # type: ignore[return-value]
+
+
+class Draw(BehaviourWithPorts):
+    """Draw a number after a random time; `/drawing` exists meanwhile, `count` counts the draws."""
+
+    INPUT_PORTS: ClassVar = {}
+    OUTPUT_PORTS: ClassVar = {"number": PortInformation(float)}
+    count: ClassVar = 0
+
+    def __init__(self, name: str, most_ticks: int = 20) -> None:
+        super().__init__(name)
+        Draw.count += 1
+        self.end = time.time() + random.uniform(0.0, most_ticks / 2000)
+
+    def update(self) -> Status:
+        Blackboard.set("/drawing", True)
+        self._set_output("number", random.random())
+        return Status.RUNNING if time.time() < self.end else Status.SUCCESS
+
+    def terminate(self, new_status: Status) -> None:
+        Blackboard.unset("/drawing")
+
+
+class Keep(Behaviour):
+    """Keep a value on the blackboard that JSON cannot restore."""
+
+    def update(self) -> Status:
+        Blackboard.set("/kept", (1, 2))
+        return Status.SUCCESS

@@ -15,7 +15,7 @@ from executive.behaviours.behaviour_skill import make_behaviour_skill
 from executive.behaviours.run_blackboard import RunBlackboard
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
-from executive.skill import Direction, Skill
+from executive.skill import Direction
 from executive.testing.conformance import list_conformance_checks
 from executive.testing.run_skill import SkillResult, run_skill
 
@@ -166,16 +166,12 @@ def test_a_behaviour_that_no_mission_can_use_is_refused(behaviour: type[Behaviou
         make_behaviour_skill(behaviour.__name__, behaviour)
 
 
-def test_only_known_behaviours_are_replayable() -> None:
-    def is_replayable(behaviour: type[Behaviour]) -> bool:
-        return make_behaviour_skill(behaviour.__name__, behaviour).is_replayable
-
-    assert Skill.is_replayable
-    assert is_replayable(behaviours.TickCounter)
-    assert is_replayable(foreign.Double), "it declares it"
-    assert not is_replayable(foreign.Painter)
-    assert not is_replayable(timers.Timer)
-    assert not is_replayable(behaviours.ProbabilisticBehaviour)
+@pytest.mark.parametrize(
+    ("behaviour", "senses"),
+    [(behaviours.TickCounter, False), (behaviours.ProbabilisticBehaviour, True), (timers.Timer, True)],
+)
+def test_only_known_behaviours_get_no_new_information(behaviour: type[Behaviour], senses: bool) -> None:
+    assert make_behaviour_skill(behaviour.__name__, behaviour).senses == senses
 
 
 def test_a_skill_is_made_once() -> None:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
+import foreign
 import jsonschema
 import pytest
 from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
+from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cells.fake.cell import FakeCell
+from executive.errors import InputError
 from executive.events import NodeEnded, TimedEvent
 from executive.mission.findings import MissionError
 from executive.mission.load import load_mission
@@ -21,13 +25,13 @@ from executive.plugins import load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replayed_run import replay_run
-from executive.record.resume import resume_run
 from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions, assemble
-from executive.run.run import Run
 from executive.testing.run_mission import MissionResult, run_mission
 from executive.testing.substitutes import make_failing
 from executive.tree.node_registry import load_control_nodes
+from tests.benchmarks import kills
+from tests.record.test_resume import Cut, Cutter, redecided, resumed
 
 PROJECT = """\
 [project]
@@ -37,6 +41,7 @@ Never = "foreign:Never"
 Denied = "foreign:Denied"
 Double = "foreign:Double"
 Tally = "foreign:Counter"
+Draw = "foreign:Draw"
 """
 
 Write = Callable[..., Path]
@@ -81,6 +86,19 @@ COUNT = """\
       - Tally: {most: 3}
       - PyTree: {class: py_trees.behaviours:TickCounter, duration: 2, completion_status: SUCCESS}
 """
+
+
+RANDOM = """\
+      - {PyTree: {class: "py_trees.timers:Timer", duration: 0.004}}
+      - retry: {attempts: 99, do: {PyTree: {class: py_trees.behaviours:ProbabilisticBehaviour}}}
+      - parallel: {do: [{Draw: {number: $drawn}}, {Draw: {most_ticks: 40}, as: other}]}
+      - try: {timeout: {seconds: 0.1, do: {Draw: {most_ticks: 999999}, as: long}}}
+        catch: [{on: timeout.timeout, do: succeed}]
+      - [Tally, {IsEqual: {value: $drawn, to: $drawn}}]
+"""
+DRAW_THRICE = "  for_each:\n    each: turn\n    in: [1, 2, 3]\n    do:\n" + RANDOM
+CARRY = "      - [{use: find, as: found}, {use: carry}]\n"
+SORT = f"  repeat:\n    until: found.no_candidate\n    do:\n{RANDOM}{CARRY}\n"
 
 
 def test_five_behaviours_of_py_trees_run_as_leaves(write: Write) -> None:
@@ -211,45 +229,62 @@ def record(path: Path, tmp_path: Path) -> Path:
     return find_run("latest", tmp_path / "runs")
 
 
-def test_a_run_is_replayed(write: Write, tmp_path: Path) -> None:
-    run = record(
-        write(FIVE + COUNT.replace("  repeat:", "  - repeat:").replace("\n    ", "\n      ")), tmp_path
-    )
+def test_a_replay_executes_no_behaviour(write: Write, tmp_path: Path) -> None:
+    run = record(write(DRAW_THRICE), tmp_path)
+    foreign.Draw.count = 0
     result = replay_run(run, read_journal(run / "journal.jsonl"), load_skills())
-    assert (result.is_equal, result.difference) == (True, "")
-    assert result.decisions > 20
+    assert (result.is_equal, result.difference, foreign.Draw.count) == (True, "", 0)
+    assert result.decisions > 40
 
 
-class _Cut(BaseException):
-    """Ends a run as a kill does."""
-
-
-class _Cutter:
-    """A view that ends the process in a control step."""
-
-    def open(self, run: Run) -> None:
-        """Begin."""
-
-    def __call__(self, timed: TimedEvent) -> None:
-        if timed.tick >= 4:
-            raise _Cut
-
-    def close(self) -> None:
-        """End."""
-
-    def show_message(self, message: str) -> None:
-        """Ignore the message."""
+def cut(path: Path, tmp_path: Path, tick: int) -> Path:
+    """Begin a run that is cut off in a control step, and return its directory."""
+    loaded, options = load_mission(path, load_skills()), RunOptions(0, (), make_cell=FakeCell)
+    with pytest.raises(Cut):
+        record_run(loaded, options, tmp_path / "runs", RecordOptions([Cutter(tick)], False))
+    return find_run("latest", tmp_path / "runs")
 
 
 def test_an_interrupted_run_continues_with_its_blackboard(write: Write, tmp_path: Path) -> None:
-    loaded, options = load_mission(write(COUNT), load_skills()), RunOptions(0, (), make_cell=FakeCell)
-    with pytest.raises(_Cut):
-        record_run(loaded, options, tmp_path / "runs", RecordOptions([_Cutter()], False))
-    run = find_run("latest", tmp_path / "runs")
-    result = resume_run(run, load_skills(), options, RecordOptions(saves_pictures=False))
-    assert result.status == "SUCCESS"
+    run = cut(write(COUNT), tmp_path, 4)
+    assert resumed(run).status == "SUCCESS"
     ends = find_ends(list(read_journal(run / "journal.jsonl")))
     assert ends.count(("Tally", "SUCCESS")) == 3, "the count goes on where it was"
+
+
+@pytest.mark.parametrize("tick", [1, 30, 60])
+def test_a_twice_interrupted_run_keeps_its_random_results(write: Write, tmp_path: Path, tick: int) -> None:
+    run = cut(write(DRAW_THRICE), tmp_path, tick)
+    with pytest.raises(Cut):
+        resumed(run, views=[Cutter(tick + 10)])
+    assert (resumed(run).status, redecided(run)) == ("SUCCESS", "")
+
+
+@pytest.mark.slow
+def test_decisions_and_books_survive_random_interruptions(write: Write, tmp_path: Path) -> None:
+    keys = "library: library/sorting.yaml\nroutes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}\n"
+    loaded = load_mission(write(SORT, keys), load_skills())
+    subject = MissionUnderTest(loaded, FakeCell, "fake", seed=0)
+    count = int(os.environ.get("INTERRUPTIONS", "10"))
+    assert kills.measure(subject, tmp_path, count, changed=0, halted=count // 2)["problems"] == []
+
+
+def test_what_a_halted_behaviour_wrote_is_restored(write: Write, tmp_path: Path) -> None:
+    tree = """\
+  - try: {timeout: {seconds: 0.1, do: {Draw: {most_ticks: 999999}}}}
+    catch: [{on: timeout.timeout, do: succeed}]
+  - Wait: {seconds: 1}
+  - PyTree: {class: py_trees.behaviours:CheckBlackboardVariableExists, variable_name: drawing}
+"""
+    result = resumed(cut(write(tree), tmp_path, 60))
+    assert result.reason == "CheckBlackboardVariableExists.failed"
+
+
+def test_a_value_that_json_cannot_restore_prevents_a_resumption(write: Write, tmp_path: Path) -> None:
+    run = cut(write("  - PyTree: {class: foreign:Keep}\n  - Wait: {seconds: 1}\n"), tmp_path, 4)
+    assert redecided(run) == ""
+    with pytest.raises(InputError, match=r'"/kept" \(tuple\)'):
+        resumed(run)
 
 
 def test_the_failure_of_a_recorded_run_is_explained(write: Write, tmp_path: Path) -> None:

@@ -1,8 +1,9 @@
-"""A mission killed at random moments and resumed, with a changed world or an unchanged one.
+"""A mission killed or halted at random moments and resumed, with a changed world or an unchanged one.
 
-Each run takes place in a forked child that gets SIGKILL after a random time, possibly in the middle of a
-control step or while a journal line or a picture is written. Another child resumes the run from the disk.
-This process never builds a cell, because a fork would copy the locks of the threads of its detector.
+Each run takes place in a forked child that gets SIGKILL, or SIGINT as from Ctrl-C, after a random time,
+possibly in the middle of a control step or while a journal line or a picture is written. Another child
+resumes the run from the disk. This process never builds a cell, because a fork would copy the locks of the
+threads of its detector.
 """
 
 from __future__ import annotations
@@ -46,9 +47,12 @@ CHANGES = ("moved", "removed", "dropped")
 
 
 def measure(
-    subject: MissionUnderTest, runs_folder: Path, kills: int = 20, changed: int | None = None
+    subject: MissionUnderTest, runs_folder: Path, kills: int = 20, changed: int | None = None, halted: int = 0
 ) -> Figures:
-    """Kill MISSION at random moments and resume it each time; runs with a problem stay in `runs/kills`."""
+    """Kill MISSION at random moments and resume it each time; runs with a problem stay in `runs/kills`.
+
+    The first `halted` runs are halted instead of killed.
+    """
     random, runs = np.random.default_rng(subject.seed), runs_folder / "kills"
     changed = kills // 4 if changed is None else changed
     began = time.monotonic()
@@ -59,7 +63,8 @@ def measure(
         is_changed = number * changed // kills < (number + 1) * changed // kills
         change = str(random.choice(CHANGES)) if is_changed else ""
         folder = runs / str(number)
-        while not run_and_kill(subject, subject.seed + number, folder, float(random.uniform(0.0, duration))):
+        cause, seed = signal.SIGINT if number < halted else signal.SIGKILL, subject.seed + number
+        while not run_and_kill(subject, seed, folder, float(random.uniform(0.0, duration)), cause):
             pass
         done.append(resume_killed_run(subject, subject.seed + number, folder, change))
         if not done[-1]["problems"]:
@@ -90,19 +95,20 @@ def begin_run(subject: MissionUnderTest, seed: int, runs: Path) -> int:
     return child
 
 
-def run_and_kill(subject: MissionUnderTest, seed: int, runs: Path, delay: float) -> bool:
-    """Begin a run, kill it after `delay` [s], and return True if it had begun and not yet ended."""
+def run_and_kill(
+    subject: MissionUnderTest, seed: int, runs: Path, delay: float, cause: int = signal.SIGKILL
+) -> bool:
+    """Begin a run, send it the signal `cause` after `delay` [s]; return True if the run can be resumed."""
     child = begin_run(subject, seed, runs)
     time.sleep(delay)
-    os.kill(child, signal.SIGKILL)
-    _, status = os.waitpid(child, 0)
-    if not os.WIFSIGNALED(status):
-        return False
+    os.kill(child, cause)
+    os.waitpid(child, 0)
     try:
         entries = read_journal(find_run(LATEST_LINK, runs) / "journal.jsonl")
     except ExecutiveError:
         return False
-    return InputLog(entries).start_event is not None and find_run_end(entries) is None
+    end = find_run_end(entries)
+    return InputLog(entries).start_event is not None and (end is None or end.status == "HALTED")
 
 
 def resume_killed_run(subject: MissionUnderTest, seed: int, runs: Path, change: str) -> Figures:
@@ -214,6 +220,9 @@ if __name__ == "__main__":
         ),
         click.option(
             "--changed", type=click.IntRange(min=0), help="Kills with a changed world.  [default: a quarter]"
+        ),
+        click.option(
+            "--halted", type=click.IntRange(min=0), default=0, help="Kills that are replaced by Ctrl-C."
         ),
         runs_option,
     )

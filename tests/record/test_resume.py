@@ -58,7 +58,7 @@ class Cutter:
     def __call__(self, timed: TimedEvent) -> None:
         if timed.tick >= self._tick:
             self._nth -= 1
-            if self._nth <= 0:
+            if self._nth == 0:
                 raise Cut
 
     def close(self) -> None:
@@ -389,6 +389,8 @@ def test_what_was_rejected_is_tried_again(missions: Path, tmp_path: Path) -> Non
     again = resumed(path, make_cell=unwilling(lets_go=False))
     assert (again.status, again.items.placed, again.items.rejected) == ("INCOMPLETE", 5, 1)
     assert redecided(path) == ""
+    with pytest.raises(Cut):
+        resumed(path, make_cell=unwilling(lets_go=True), views=[Cutter(again.ticks + 100)])
     result = resumed(path, make_cell=unwilling(lets_go=True))
     assert (result.status, result.items.placed, result.items.seen) == ("SUCCESS", 6, 6)
     assert result.audit.agrees

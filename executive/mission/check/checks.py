@@ -24,7 +24,6 @@ Check = Callable[[CheckContext], Iterator[Finding]]
 CHECKS: tuple[Check, ...] = (
     skill_settings.find_unknown_skills,
     skill_settings.check_settings,
-    skill_settings.find_unreplayable_skills,
     control_nodes.check_constants,
     reasons.check_labels,
     routes.check_names,

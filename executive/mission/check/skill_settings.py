@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from executive.mission.check.context import CheckContext
 from executive.mission.check.variables import list_skills_with_output
-from executive.mission.findings import Finding, make_error, make_warning, suggest_choice
+from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model.conversion import find_problem
 from executive.mission.model.nodes import SkillNode
 from executive.mission.model.values import Literal, Reference
@@ -64,17 +64,6 @@ def _check_reference(
     elif not declaration.accepts_variable or reference.name not in context.written_variables:
         message = f"{name} must be a constant, but ${reference.name} is neither a param nor an argument"
         yield make_error(reference.span, "unknown-param", message, context.make_unknown_param_hint(reference))
-
-
-def find_unreplayable_skills(context: CheckContext) -> Iterator[Finding]:
-    """Yield a warning for every skill that may have inputs besides the cell, because no run records them."""
-    for node, skill in context.find_installed_skills(context.iterate_nodes()):
-        if not skill.is_replayable:
-            message = f"{node.skill} may have inputs that no run records, such as a clock"
-            hint = f"A replay or a resumed run executes {node.skill} again."
-            if not skill.__module__.startswith("py_trees."):
-                hint += f" If {node.skill} has no such inputs, set is_replayable = True."
-            yield make_warning(node.span, "not-recorded", message, hint)
 
 
 def _check_value(
