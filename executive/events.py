@@ -13,7 +13,7 @@ from typing import Annotated, ClassVar, TypeAlias
 from pydantic import ConfigDict, Field, JsonValue
 
 JOURNAL_FORMAT = 3
-"""Version of the journal format; journals of format 1 contain no version."""
+"""Version of the journal format."""
 
 RunStatus: TypeAlias = Annotated[str, Field(pattern="^(SUCCESS|INCOMPLETE|FAILURE|FAULT|HALTED)$")]
 """Final status of a run; INCOMPLETE if the tree succeeded but items were rejected."""

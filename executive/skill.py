@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_args, g
 from executive.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from executive.cell.protocols import Cell, MinTimes
+    from executive.cell.protocols import Cell
 
 T = TypeVar("T")
 """Type of the value of a port."""
@@ -168,7 +168,7 @@ class Skill:
         tool_state: Required state of the tool (ANY: no requirement); state after success (ANY: unchanged).
         tool_state_after_failure: State of the tool after a failure, by reason, and after a halt, by the key
             `halt`; ANY if unknown. A failure or halt without a key leaves the state unchanged.
-        waits: Name of the param that contains the minimum time until success [s], or "".
+        waits: Name of the param whose duration passes before every success, or "".
     """
 
     params: ClassVar[Mapping[str, Param]] = {}
@@ -241,17 +241,6 @@ class Skill:
         has_steps = inspect.isgeneratorfunction(cls.run)
         annotation = cls.run.__annotations__.get("return", "")
         return cls.is_condition or (not has_steps and annotation in ("None", None))
-
-    @classmethod
-    def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
-        """Return the minimum time until success [s]; by default, the value of the param named in `waits`.
-
-        Args:
-            min_times: Minimum times of actions in the cell.
-            values: Values of the params, and of the inputs with a constant value in the mission.
-        """
-        del min_times
-        return float(values.get(cls.waits, 0.0))
 
     def failure(self, reason: str, message: str) -> SkillFailed:
         """Return the exception for a failure with a declared reason.

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 from executive.cell.arm import Goal
 from executive.cell.objects import ObjectClass, Target
-from executive.cell.protocols import Cell, MinTimes, Steps, Tool
+from executive.cell.protocols import Cell, Steps, Tool
 from executive.manipulation.motions import follow, plan
 from executive.manipulation.tool_goals import (
     OVERTRAVEL,
@@ -48,12 +47,6 @@ class Approach(Skill):
     uses = ("arm", "tool")
     moves = True
     tool_state = (EMPTY, EMPTY)
-
-    @classmethod
-    def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
-        """Return the time of the guarded descent only [s], as the arm may already be above the target."""
-        del values
-        return min_times.descent_time
 
     def run(self, cell: Cell) -> Steps:
         """Move to the target and descend until the cup touches something."""

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from executive.cell.objects import Item
-from executive.cell.protocols import Cell, MinTimes, Steps
+from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import transport
 from executive.manipulation.tool_goals import DROP_HEIGHT, explain_uncertain_bin, make_bin_goal
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port
@@ -30,11 +27,6 @@ class Transit(Skill):
     moves = True
     tool_state = (HOLDING, HOLDING)
     tool_state_after_failure = {"dropped": EMPTY, "halt": ANY}
-
-    @classmethod
-    def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
-        """Return the minimum time of a transport to `bin` [s], or to the nearest bin if `bin` is unknown."""
-        return min_times.get_transport_time(values.get("bin"))
 
     def run(self, cell: Cell) -> Steps:
         """Plan the motion, and follow it while the seal holds."""

@@ -74,7 +74,6 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("executive.skill", "skill.py", ""),
         ("param(...)", "skill.py", "Param"),
         ("port(...)", "skill.py", "Port"),
-        ("min_times", "cell/protocols.py", "MinTimes"),
     ],
     "Functions that skills share": [
         ("executive.manipulation.motions", "manipulation/motions.py", ""),

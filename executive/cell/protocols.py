@@ -181,21 +181,8 @@ class Behaviours:
         return step()
 
 
-class MinTimes(Protocol):
-    """Minimum times of actions in a cell; an action with a shorter timeout always fails."""
-
-    @property
-    def descent_time(self) -> float:
-        """Minimum time of the guarded descent at the end of an approach to an object on the table [s]."""
-
-    def get_transport_time(self, bin: str | None) -> float:
-        """Return the minimum time of a transport from the workspace to a bin [s], from rest to rest.
-
-        If `bin` is None, the transport is to the nearest bin. The time of an unknown bin is 0.
-        """
-
-    def get_answer_time(self, detector: str) -> float:
-        """Return the minimum time from a frame to an answer of a detector [s]; "": the first detector."""
+MinTimes = object
+"""Type in signatures of `min_time`, which skills of third parties may still define; nothing calls it."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from executive.cell.protocols import Cell, MinTimes, Operator, Routes
+from executive.cell.protocols import Cell, Operator, Routes
 from executive.cell.quotas import Quotas
 from executive.cell.visuals import Visuals
 from executive.events import Emit, ItemChanged
@@ -145,9 +145,6 @@ class CellKind(Protocol):
         The labels of a detector are None if they are unknown before its first answer. Errors in the file are
         ignored, because `check` reports errors.
         """
-
-    def min_times(self, config: Any) -> MinTimes:
-        """Return the minimum times of actions in a cell; `check` has found no error in the cell file."""
 
 
 class CellWrapper:

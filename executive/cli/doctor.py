@@ -28,7 +28,6 @@ MIN_PYTHON, MAX_PYTHON = (3, 10), (3, 11)
 """Oldest and newest Python version for which every required package has wheels."""
 EXTRAS = {
     "view": "watch a run in the browser",
-    "export": "export the results of a sweep to Parquet",
     "cluster": "run a sweep on several computers",
     "train": "train a detector of your own",
 }

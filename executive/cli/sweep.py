@@ -30,13 +30,11 @@ if TYPE_CHECKING:
     help='Exit with code 1 if the runs do not meet EXPR, such as "success>=0.99 and p95(robot_time_s)<20".',
 )  # fmt: skip
 @click.option("--junit", type=options.FILE, help="Write a report in the JUnit XML format to this file.")
-@click.option("--export", type=options.FOLDER, help="Write the tables of runs, items and skills as Parquet.")
 @click.pass_context
 def command(
     ctx: click.Context, mission: str | None, seeds: range | None, variations: dict[str, tuple[str, ...]],
     resume: Path | None, workers: int, cluster: str | None, save_images: bool, overrides: dict[str, str],
-    scene: Path | None, runs_folder: Path, require: str | None, junit: Path | None, export: Path | None,
-    as_json: bool,
+    scene: Path | None, runs_folder: Path, require: str | None, junit: Path | None, as_json: bool,
 ) -> int:  # fmt: skip
     """Run a mission once for every seed and variant, and summarize the runs.
 
@@ -53,7 +51,6 @@ def command(
     )  # fmt: skip
     options.check_disjoint(overrides, "--vary", variations)
     with keep_stdout_clean():
-        from executive.campaign.results.export import check_pyarrow_installed, export_tables
         from executive.campaign.results.junit import write_junit
         from executive.campaign.results.requirement import describe_unmet_conditions, parse_requirement
         from executive.campaign.results.results_page import write_page
@@ -64,8 +61,6 @@ def command(
         from executive.cli.sweep_tables import render_summary
 
         conditions = parse_requirement(require) if require else ()
-        if export is not None:
-            check_pyarrow_installed()
         if resume is not None:
             database = open_sweep(resume)
         else:
@@ -82,8 +77,6 @@ def command(
             if junit is not None:
                 make_command = functools.partial(make_repeat_command, results.settings)
                 write_junit(junit, results.settings.mission_name, results.runs, make_command)
-            if export is not None:
-                export_tables(database, export)
         unmet_conditions = describe_unmet_conditions(conditions, results.runs, results.summaries)
         for message in unmet_conditions:
             click.echo(message, err=True)

@@ -26,22 +26,21 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option("--fold", is_flag=True, help="Expand each subtree only at its first use.")
 @click.option("--svg", "as_svg", is_flag=True, help="Print the tree as an SVG image.")
-@click.option("--dot", "as_dot", is_flag=True, help="Print the tree in the DOT language of Graphviz.")
 @click.option(
-    "--format", "format_name", type=click.Choice(("svg", "dot", "json", "btcpp")),
-    help="The same as --svg, --dot or --json; btcpp: XML for BehaviorTree.CPP 4 and its editor Groot2.",
+    "--format", "format_name", type=click.Choice(("svg", "json", "btcpp")),
+    help="The same as --svg or --json; btcpp: XML for BehaviorTree.CPP 4 and its editor Groot2.",
 )  # fmt: skip
 @json_option
 def command(
     mission: str, overrides: dict[str, str], ports: bool, reasons: bool, fold: bool, as_svg: bool,
-    as_dot: bool, format_name: str | None, as_json: bool,
+    format_name: str | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Print the behaviour tree of a mission.
 
     MISSION is a file or the name of a shipped mission. All subtrees are expanded, except in the format btcpp,
     in which each subtree is a tree of its own.
     """
-    flags = {"--svg": as_svg, "--dot": as_dot, "--json": as_json, f"--format {format_name}": format_name}
+    flags = {"--svg": as_svg, "--json": as_json, f"--format {format_name}": format_name}
     formats = [flag for flag, is_given in flags.items() if is_given]
     details = list(compress(("--ports", "--reasons"), (ports, reasons)))
     conflict_message = f"{' and '.join(formats)} exclude each other; give one of them"
@@ -55,7 +54,7 @@ def command(
         from executive.plugins import load_skills
         from executive.record.recorded_mission import format_tree
         from executive.tree.blackboard import Blackboard
-        from executive.view.tree import btcpp, dot, svg, tree_text
+        from executive.view.tree import btcpp, svg, tree_text
 
         loaded = load_mission(mission, load_skills(), overrides)
         # No node of the tree is executed, so that none needs a clock or a ledger.
@@ -65,8 +64,6 @@ def command(
         match "".join(formats).removeprefix("--format ").removeprefix("--"):
             case "svg":
                 output = svg.make_svg(nodes, loaded.mission.name)
-            case "dot":
-                output = dot.format_dot(nodes, loaded.mission.name)
             case "json":
                 output, as_json = json.loads(format_tree(nodes)), True
             case "btcpp":

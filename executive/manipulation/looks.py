@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
-from typing import Any, ClassVar
+from collections.abc import Generator
+from typing import ClassVar
 
 from executive.cell.detection import Detections
-from executive.cell.protocols import Cell, MinTimes
+from executive.cell.protocols import Cell
 from executive.errors import Crowded, Unavailable
 from executive.skill import Skill, param
 
@@ -19,11 +19,6 @@ class LookingSkill(Skill):
     reasons: ClassVar[tuple[str, ...]] = ("unavailable", "crowded", "camera_moved")
     uses = ("camera",)
     senses = True
-
-    @classmethod
-    def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
-        """Return the minimum time from the frame to the answer of the detector [s]."""
-        return min_times.get_answer_time(values["detector"])
 
     def capture_and_detect(self, cell: Cell) -> Generator[None, None, Detections]:
         """Capture a frame, yield until the detector has answered, and return its detections.

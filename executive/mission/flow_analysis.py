@@ -85,8 +85,7 @@ class FlowAnalysis:
         precondition, postcondition = skill.tool_state
         state = state.apply_precondition(precondition, node.path)
         outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
-        final_state = state.with_arm_moved() if skill.moves else state
-        success_state = final_state.with_variables(outputs)
+        success_state = state.with_variables(outputs)
         apply_success = success_state.apply_observation if skill.is_condition else success_state.apply_success
         # A condition grasps no object: a tool that was empty before the condition failed is still empty.
         may_be_holding = state.tool_states is None or state.find_tool_state(HOLDING) is not None
@@ -94,7 +93,7 @@ class FlowAnalysis:
             skill.tool_state_after_failure if may_be_holding or not skill.is_condition else {}
         )
         end_states = {
-            key: final_state.apply_failure(tool_states_after_failure.get(key), node.path)
+            key: state.apply_failure(tool_states_after_failure.get(key), node.path)
             for key in (*skill.reasons, HALT_KEY)
         }
         failures = {PossibleFailure(node.skill, key, node.path): end_states[key] for key in skill.reasons}

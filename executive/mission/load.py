@@ -108,7 +108,7 @@ def load_mission(
     mission, cell, findings = files.mission, files.cell, list(files.findings)
     skills = {**skills, **files.behaviours}
     config = cell.config if cell else None
-    cell_kind, classes_by_detector, min_times = None, {}, None
+    cell_kind, classes_by_detector = None, {}
     if cell is not None and config is not None:
         findings += _warn_about_calibration(cell, config)
     if cell is not None and config is not None and find_cell_kind is not None:
@@ -119,15 +119,13 @@ def load_mission(
         else:
             folder = cell.path.parent
             errors = cell_kind.check(config, folder)
-            cell_findings = [cell.make_error(keys, "robot", message) for keys, message in errors]
-            findings += cell_findings
+            findings += [cell.make_error(keys, "robot", message) for keys, message in errors]
             classes_by_detector = dict(cell_kind.labels(config, folder))
-            min_times = None if cell_findings else cell_kind.min_times(config)
     expansion = expand(mission, skills, _make_predefined_lists(mission, config) if config else {})
     mission = replace(mission, quotas=expansion.quotas)
     tree = assign_paths(expansion.tree or InvalidNode(files.source.make_span(), label=""))
     context = CheckContext(
-        mission, tree, expansion.unused_subtrees, skills, node_classes, config, classes_by_detector, min_times
+        mission, tree, expansion.unused_subtrees, skills, node_classes, config, classes_by_detector
     )
     findings += (*expansion.findings, *run_checks(context))
     has_errors = expansion.tree is None or any(finding.severity == "error" for finding in findings)

@@ -44,7 +44,7 @@ class OutlineNode:
         depth: Number of ancestors.
         detail: Summary of the node's settings in the mission.
         kind: `skill`, or the keyword of a control node.
-        symbol, shape: Symbol and Graphviz shape of a control node in drawings; "" for a skill.
+        symbol: Symbol of a control node in drawings; "" for a skill.
         title: Label of the node; for a node without label, name of the skill or keyword.
         parent_key: Key under which the parent has the node: `do`, `recover`, `catch 1`; "" in a list.
         trigger: Failures after which the handler of a catch runs: `on Grasp.missed`; "" for other nodes.
@@ -76,7 +76,6 @@ class OutlineNode:
     senses: bool = False
     uses: tuple[str, ...] = ()
     symbol: str = ""
-    shape: str = ""
 
     @property
     def joined_subtrees(self) -> str:
@@ -119,7 +118,7 @@ def _iterate_outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) 
     else:
         # A py_trees behaviour that is no node of a mission is drawn in the default style.
         style = node if isinstance(node, ControlNode) else ControlNode
-        yield replace(outline_node, symbol=style.symbol, shape=style.shape)
+        yield replace(outline_node, symbol=style.symbol)
     for child in node.children:
         yield from _iterate_outline(child, node, depth + 1)
 

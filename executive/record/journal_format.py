@@ -106,13 +106,14 @@ def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
     """Return the events in the lines of a journal.
 
     Raises:
-        InputError: A line contains no event, or the time of an event contradicts its control step.
+        InputError: The journal has another format, a line contains no event, or the time of an event
+            contradicts its control step.
     """
     events: list[TimedEvent] = []
     control_period = clock_offset = 0.0
     for line_number, line in enumerate(lines, start=1):
-        if line_number == 1 and (message := _describe_old_format(line)):
-            raise InputError(f"{file_name}: {message}")
+        if line_number == 1:
+            _check_format(line, file_name)
         try:
             timed = decode_event(line)
             event = timed.event
@@ -136,23 +137,16 @@ def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
     return events
 
 
-def _describe_old_format(line: bytes) -> str:
-    """Return a message if the first line of a journal is the start of a run in another format, else ""."""
+def _check_format(line: bytes, file_name: str) -> None:
+    """Raise an InputError if the first line of a journal names another format."""
     try:
         entry = from_json(line)
     except ValueError:
-        return ""
-    if not isinstance(entry, dict) or entry.get("kind") not in ("run", RunStarted.__name__):
-        return ""
-    # Journals of format 1 contain no format.
-    journal_format = 1 if entry["kind"] == "run" else entry.get("format")
-    if not isinstance(journal_format, int) or journal_format == JOURNAL_FORMAT:
-        return ""
-    versions = entry.get("versions")
-    version = versions.get("executive", "0.1") if isinstance(versions, dict) else "0.1"
-    problem = f"this journal has format {journal_format}, written by executive {version}"
-    advice = f"read the journal with executive {version}, or run the mission again"
-    return f"{problem}; this version reads format {JOURNAL_FORMAT}; {advice}"
+        return  # `decode_event` describes the mistake.
+    journal_format = entry.get("format", JOURNAL_FORMAT) if isinstance(entry, dict) else JOURNAL_FORMAT
+    if journal_format != JOURNAL_FORMAT:
+        problem = f"this journal has format {journal_format}, and this version reads format {JOURNAL_FORMAT}"
+        raise InputError(f"{file_name}: {problem}; run the mission again")
 
 
 def _to_json_type(value: object) -> object:

@@ -71,8 +71,7 @@ def read_tree(path: Path) -> list[OutlineNode]:
     Raises:
         InputError: The file cannot be read or contains no outline.
     """
-    advice = "since version 0.1 every run writes this file beside its journal"
-    with explain_os_errors(InputError, f'cannot read the tree "{path}"', advice):
+    with explain_os_errors(InputError, f'cannot read the tree "{path}"'):
         content = path.read_bytes()
     try:
         return _NODES_ADAPTER.validate_json(content)

@@ -16,7 +16,6 @@ class ConditionList(KeyOwner):
     Conditions decide within one tick, so the key `memory` would have no effect.
     """
 
-    shape: ClassVar[str] = "ellipse"
     is_condition: ClassVar[bool] = True
     memory = True
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.tree.inspection import MinTimeFunction, PropagatedFailure
+from executive.tree.inspection import PropagatedFailure
 from executive.tree.keys import Child, Children, key
 from executive.tree.ordered import OrderedNode
 
@@ -27,7 +27,7 @@ class Fallback(OrderedNode):
 
     keyword = "fallback"
     keyword_hints: ClassVar = {"selector": "Write fallback."}
-    symbol, shape = "?", "octagon"
+    symbol = "?"
     continue_status = Status.FAILURE
     unreachable_reason = "an earlier child never fails"
 
@@ -38,10 +38,6 @@ class Fallback(OrderedNode):
         if index > 0:
             failure = self.get_failure(self.do[index - 1])
             self.report_choice(f"choice {index + 1} of {len(self.do)}", failure)
-
-    def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the shortest minimum time of a child [s]."""
-        return min(map(get_min_time, self.do))
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the cause of a failure: all children failed. The text contains the handled failures."""

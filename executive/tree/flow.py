@@ -23,13 +23,11 @@ class PossibleToolState:
         state: EMPTY or HOLDING.
         cause: Path of the skill that caused the state; "" for the start of the run.
         handled_failure: Last failure that a control node handled in this state of the tool, or "".
-        has_arm_moved: True if the arm may have moved in this state of the tool.
     """
 
     state: ToolState
     cause: str = ""
     handled_failure: str = ""
-    has_arm_moved: bool = False
 
 
 ToolStates = frozenset[PossibleToolState] | None
@@ -84,18 +82,10 @@ class FlowState:
             return self
         failure_name = str(failure)
         # Merge the states that differ only in `handled_failure`; tuples are hashed faster than dataclasses.
-        merged_states = {(state.state, state.cause, state.has_arm_moved) for state in self.tool_states}
+        merged_states = {(state.state, state.cause) for state in self.tool_states}
         return self.with_tool_states(
-            frozenset(
-                PossibleToolState(state, cause, failure_name, has_arm_moved)
-                for state, cause, has_arm_moved in merged_states
-            )
+            frozenset(PossibleToolState(state, cause, failure_name) for state, cause in merged_states)
         )
-
-    def with_arm_moved(self) -> FlowState:
-        """Return the state after a motion of the arm."""
-        states = [replace(state, has_arm_moved=True) for state in self.tool_states or ()]
-        return self if self.tool_states is None else self.with_tool_states(frozenset(states))
 
     def apply_precondition(self, required_state: ToolState, path: str) -> FlowState:
         """Return the state at the start of the skill at `path`, which requires a state of the tool.

@@ -8,7 +8,7 @@ from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.generator_node import NodeRun
-from executive.tree.inspection import MinTimeFunction, PropagatedFailure
+from executive.tree.inspection import PropagatedFailure
 from executive.tree.keys import Child, Elements, VariableName, key
 from executive.tree.loop import Loop
 
@@ -94,10 +94,6 @@ class ForEach(Loop):
             {failure: end.without_variable(self.each) for failure, end in body.failures.items()},
             halted and halted.without_variable(self.each),
         )
-
-    def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time of all iterations [s]; 0 if the number of iterations is unknown."""
-        return len(self.in_) * get_min_time(self.do) if isinstance(self.in_, tuple) else 0.0
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the element at which the body failed."""

@@ -11,11 +11,10 @@ from executive.skill import HOLDING
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.inspection import Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, key
-from executive.tree.node import BodyNode
 from executive.tree.reactive_node import ReactiveNode
 
 
-class Guard(ReactiveNode, BodyNode):
+class Guard(ReactiveNode):
     """Run the body while a condition holds; when the condition fails, halt the body and fail with `broken`.
 
     Every tick checks the condition before it ticks the body. If the condition fails at the first tick, the

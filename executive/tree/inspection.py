@@ -12,7 +12,7 @@ from executive.tree.flow import Flow, FlowState
 from executive.tree.keys import Child
 
 MinTimeFunction: TypeAlias = Callable[[Child], float]
-"""Function that returns a lower bound of the time in which a child can succeed [s]."""
+"""Type in signatures of `min_time`, which nodes of third parties may still define; nothing calls it."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class NodeFinding:
     Attributes:
         place: Place of the mistake: a key of the node, a reason under a key, or a child; "" for the node
             itself.
-        code: Code of the finding, such as `short-timeout`.
+        code: Code of the finding, such as `endless`.
         message: Description of the mistake, one sentence.
         hint: Description of a remedy, or "".
         is_warning: True if the mission can run nevertheless.
@@ -63,12 +63,6 @@ class NodeAnalysis(Protocol):
 
     def is_written_as_constant(self, key: str) -> bool:
         """Return True if the value of a key is written at the node itself, not in a param or an argument."""
-
-    def get_min_time(self, child: Child) -> float:
-        """Return a lower bound of the time in which a child can succeed [s]."""
-
-    def list_skill_times(self, child: Child) -> Sequence[tuple[str, float]]:
-        """Return the name and the minimum time [s] of each skill in the subtree of a child."""
 
     def list_skills(self, child: Child | None = None) -> Mapping[str, type[Skill] | None]:
         """Return the class of each skill in the subtree of `child`, by name; None if not installed.

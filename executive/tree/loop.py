@@ -14,7 +14,7 @@ class Loop(GeneratorNode):
     never blocks a tick. After a longer iteration, the next iteration begins in the same tick.
     """
 
-    symbol, shape = "↻", "hexagon"
+    symbol = "↻"
 
     def start(self) -> None:
         """Begin the first iteration."""

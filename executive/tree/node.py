@@ -1,8 +1,8 @@
 """Base class of the control nodes of a tree.
 
 A control node is a class that an entry point registers. The class declares its keys in the
-mission file, and implements `start` and `step` for the run, `compute_flow` and `min_time` for the checker,
-and `explain` for the diagnosis.
+mission file, and implements `start` and `step` for the run, `compute_flow` for the checker, and `explain`
+for the diagnosis.
 """
 
 from __future__ import annotations
@@ -19,14 +19,7 @@ from executive.events import BranchChosen, NodeEnded, NodeStarted
 from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.halting import halt
-from executive.tree.inspection import (
-    Advice,
-    Counterpart,
-    MinTimeFunction,
-    NodeAnalysis,
-    NodeFinding,
-    PropagatedFailure,
-)
+from executive.tree.inspection import Advice, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeyKind, KeyOwner, KeySection
 from executive.tree.tree_node import NodeContext, TreeNode
 
@@ -38,7 +31,6 @@ class ControlNode(KeyOwner, TreeNode):
         keyword: Name of the node in missions, and source of the failures that the node itself causes.
         reasons: Declared reasons of the failures that the node itself causes.
         symbol: Character before the name of the node in drawings.
-        shape: Shape of the node in Graphviz drawings.
         remedy: Beginning of the advice to handle a failure with this node, such as `add a retry around`; the
             name of the failing node is appended. "" if this node handles no failures.
         is_condition: True if the node counts as a condition; its keys must then accept only conditions.
@@ -50,7 +42,6 @@ class ControlNode(KeyOwner, TreeNode):
     keyword: ClassVar[str] = ""
     reasons: ClassVar[tuple[str, ...]] = ()
     symbol: ClassVar[str] = "◇"
-    shape: ClassVar[str] = "ellipse"
     remedy: ClassVar[str] = ""
     is_condition: ClassVar[bool] = False
     keyword_hints: ClassVar[Mapping[str, str]] = {}
@@ -96,10 +87,6 @@ class ControlNode(KeyOwner, TreeNode):
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the outcomes that are possible from a state; `get_flow` returns the outcomes of a child."""
         raise NotImplementedError
-
-    def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return a lower bound of the time to success [s]; `get_min_time` returns the bound for a child."""
-        return 0.0
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield mistakes in the use of this control node in the mission."""
@@ -262,16 +249,6 @@ class ControlNode(KeyOwner, TreeNode):
                     error = min(invalid.errors(), key=lambda error: "than" not in error["type"])
                     message = f"{self.keyword}.{key.name} cannot be {value!r}: {error['msg']}"
                     raise InputError(f"{self.path}: {message}") from None
-
-
-class BodyNode(ControlNode):
-    """Control node that succeeds only when its body `do` has succeeded."""
-
-    do: Child
-
-    def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time of the body [s]."""
-        return get_min_time(self.do)
 
 
 def _find_nodes(value: object) -> list[Child]:

@@ -17,7 +17,7 @@ from executive.tree.flow import (
     find_end_tool_states,
     join_states,
 )
-from executive.tree.inspection import Counterpart, MinTimeFunction, PropagatedFailure
+from executive.tree.inspection import Counterpart, PropagatedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
 
@@ -48,7 +48,7 @@ class Parallel(ControlNode):
     """
 
     keyword = "parallel"
-    symbol, shape = "⇉", "parallelogram"
+    symbol = "⇉"
 
     wait_for: Literal["all", "any", "lead"] | int = key(
         default="all", ge=1, max_key="do",
@@ -164,12 +164,6 @@ class Parallel(ControlNode):
             names = (name for end in successes for name in end.written_variables or ())
             success = success.with_variables(names)
         return success.with_tool_states(combine_tool_states(state.tool_states, ends))
-
-    def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time [s] until the lead succeeds or, without a lead, enough children succeed."""
-        if self._has_lead:
-            return get_min_time(self.do[0])
-        return sorted(map(get_min_time, self.do))[self._required_count - 1]
 
     @property
     def concurrent_children(self) -> Children:

@@ -9,13 +9,7 @@ from executive.skill import ANY, EMPTY, HOLDING
 from executive.tree.failure import Reason, format_reasons
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.generator_node import NodeRun
-from executive.tree.inspection import (
-    Counterpart,
-    MinTimeFunction,
-    NodeAnalysis,
-    NodeFinding,
-    PropagatedFailure,
-)
+from executive.tree.inspection import Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeySection, key
 from executive.tree.loop import Loop
 
@@ -124,10 +118,6 @@ class Repeat(Loop):
         success = join_states((*expected_ends, *last_ends))
         failures = {cause: end for cause, end in body.failures.items() if not cause.must_match(reasons)}
         return Flow(success, failures, join_states((body.halted, entry)))
-
-    def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time of all iterations [s]; 0 with `until`, which may end the loop earlier."""
-        return 0.0 if self.until else (self.times or 0) * get_min_time(self.do)
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield an error if only a limit of `placed` can end the loop, and the body places no item."""

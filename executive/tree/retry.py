@@ -13,7 +13,6 @@ from executive.tree.generator_node import NodeRun
 from executive.tree.inspection import Advice, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeySection, Reasons, key
 from executive.tree.loop import Loop
-from executive.tree.node import BodyNode
 
 _GIVE_UP = "give up: the recovery failed"
 """Choice that a retry reports after a failure of its recovery."""
@@ -39,7 +38,7 @@ class Backoff(KeySection):
             return self.max
 
 
-class Retry(Loop, BodyNode):
+class Retry(Loop):
     """Run the body again after a failure.
 
     Failures that `on` does not list, and the failure of the last attempt, are passed on. Before every further

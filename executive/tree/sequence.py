@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.inspection import MinTimeFunction
 from executive.tree.keys import Child, Children, key
 from executive.tree.ordered import OrderedNode
 
@@ -22,15 +21,11 @@ class Sequence(OrderedNode):
     """
 
     keyword = "sequence"
-    symbol, shape = "→", "box"
+    symbol = "→"
     continue_status = Status.SUCCESS
     unreachable_reason = "an earlier child never succeeds"
 
     do: Children = key(shorthand=True, doc="Nodes to run, in order.")
-
-    def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the sum of the minimum times of all children [s]."""
-        return sum(map(get_min_time, self.do))
 
     @property
     def first_child(self) -> Child | None:

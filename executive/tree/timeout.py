@@ -8,15 +8,12 @@ from py_trees.common import Status
 
 from executive.skill import Seconds
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure
-from executive.tree.inspection import Advice, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
+from executive.tree.inspection import Advice, Counterpart, PropagatedFailure
 from executive.tree.keys import Child, key
-from executive.tree.node import BodyNode
-
-CLOCK_TOLERANCE = 0.005
-"""Maximum time by which `Clock.sleep` ends too early [s]: half of a control step of 10 ms."""
+from executive.tree.node import ControlNode
 
 
-class Timeout(BodyNode):
+class Timeout(ControlNode):
     """Fail with the reason `timeout` if the body takes longer than a limit on the clock of the run.
 
     A body that ends in the same tick in which the clock reaches the limit is in time.
@@ -60,18 +57,6 @@ class Timeout(BodyNode):
         if flow.halted is not None:
             failures[PossibleFailure(self.keyword, "timeout", self.path)] = flow.halted
         return Flow(flow.success, failures, flow.halted)
-
-    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
-        """Yield an error if the limit is shorter than the minimum time of the body."""
-        body_time = analysis.get_min_time(self.do)
-        if self.seconds >= body_time - CLOCK_TOLERANCE:
-            return
-        message = f"timeout.seconds is {self.seconds:g} s, but its body takes at least {body_time:.2f} s"
-        skill_times = [(name, time) for name, time in analysis.list_skill_times(self.do) if time > 0]
-        hint = f"Minimum times: {', '.join(f'{name} {time:.2f} s' for name, time in skill_times)}."
-        # The minimum times explain the finding only if their sum is the time of the body, as in a sequence.
-        has_hint = abs(sum(time for _, time in skill_times) - body_time) <= 1e-9
-        yield NodeFinding("seconds", "short-timeout", message, hint if has_hint else "")
 
     @property
     def first_child(self) -> Child | None:

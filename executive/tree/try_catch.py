@@ -8,7 +8,7 @@ from typing import ClassVar
 from executive.tree.failure import Failure, Reason, format_reasons
 from executive.tree.flow import Flow, FlowFunction, FlowState, join_states
 from executive.tree.generator_node import GeneratorNode, NodeRun
-from executive.tree.inspection import Advice, MinTimeFunction, NodeAnalysis, NodeFinding, PropagatedFailure
+from executive.tree.inspection import Advice, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeySection, Reasons, key
 
 
@@ -86,11 +86,6 @@ class TryCatch(GeneratorNode):
             failures.update(flow.failures)
         flow = Flow(success, failures, halted)
         return flow if self.finally_ is None else _append_finally(self.finally_, flow, get_flow)
-
-    def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time of the body or the fastest handler, plus the time of `finally` [s]."""
-        body_time = min(get_min_time(child) for child in (self.do, *(handler.do for handler in self.catch)))
-        return body_time + (get_min_time(self.finally_) if self.finally_ else 0.0)
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield a warning for each reason whose failures are all caught by earlier reasons."""

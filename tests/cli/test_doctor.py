@@ -25,13 +25,9 @@ INSTALLED = {
     "opencv-python-headless": "4.12", "opencv-python": "5.0",
 }  # fmt: skip
 NEEDED = {
-    "": ("pybullet", "av"), "view": ("viser", "aiohttp"), "export": ("pyarrow",),
+    "": ("pybullet", "av"), "view": ("viser", "aiohttp"),
     "cluster": ("dask",), "train": ("torch", "onnx"),
 }  # fmt: skip
-EXPORT = (
-    "note export: not installed: pyarrow; to export the results of a sweep to Parquet, "
-    "run `uv sync --extra export`"
-)
 CLUSTER = (
     "note cluster: not installed: dask; to run a sweep on several computers, run `uv sync --extra cluster`"
 )
@@ -89,12 +85,12 @@ MISSING = [f"problem packages: {name} is missing; run `uv sync`" for name in ("e
 @pytest.mark.parametrize(
     ("missing", "opencv", "expected"),
     [
-        ((), ["opencv-python-headless"] * 2, [NEEDED_ARE_THERE, ONE_CV2, VIEW, EXPORT, CLUSTER, TORCH, FILM]),
-        (("executive", "pybullet", "av", "aiohttp"), [], [*MISSING, NO_VIEW, EXPORT, CLUSTER, TORCH]),
+        ((), ["opencv-python-headless"] * 2, [NEEDED_ARE_THERE, ONE_CV2, VIEW, CLUSTER, TORCH, FILM]),
+        (("executive", "pybullet", "av", "aiohttp"), [], [*MISSING, NO_VIEW, CLUSTER, TORCH]),
         (
             (),
             ["opencv-python-headless", "opencv-python"],
-            [NEEDED_ARE_THERE, TWO_CV2, VIEW, EXPORT, CLUSTER, TORCH, FILM],
+            [NEEDED_ARE_THERE, TWO_CV2, VIEW, CLUSTER, TORCH, FILM],
         ),
     ],
 )
@@ -247,10 +243,10 @@ def test_everything_is_examined_whatever_fails(monkeypatch):
     monkeypatch.setattr(doctor, "measure_frame_time", lambda renderer: (9.0, ""))
     found = shown(doctor.run_checks())
     assert [line.split(": ")[0].split(" ")[1] for line in found] == [
-        "python", "display", "packages", "opencv", "view", "export", "cluster", "train", "film",
+        "python", "display", "packages", "opencv", "view", "cluster", "train", "film",
         "plugins", "renderer", "egl", "roboflow",
     ]  # fmt: skip
-    assert found[9] == "problem plugins: the skill is broken; correct it"
+    assert found[8] == "problem plugins: the skill is broken; correct it"
     assert found[-1].startswith(
         "problem roboflow: cannot be checked: import of executive.perception.detectors.r"
     )

@@ -110,7 +110,4 @@ def test_what_has_no_report_is_refused_with_what_helps(run: Path) -> None:
         "writable folder, and write the report of the copy\n"
     )
     (run / "tree.json").unlink()
-    assert refused(str(run)) == (
-        f'cannot read the tree "{run / "tree.json"}": no such file or directory; since version 0.1 '
-        "every run writes this file beside its journal\n"
-    )
+    assert refused(str(run)) == f'cannot read the tree "{run / "tree.json"}": no such file or directory\n'

@@ -289,22 +289,10 @@ def test_a_line_that_is_no_event_is_an_error_with_its_number(path, line, why):
     )
 
 
-@pytest.mark.parametrize(
-    ("first", "number", "version"),
-    [
-        (b'{"tick": 0, "kind": "run", "versions": {"executive": "0.1.0"}}', 1, "0.1.0"),
-        (b'{"kind": "run"}', 1, "0.1"),
-        (FIRST.replace(b'"format": 3', b'"format": 2').strip(), 2, "0.1"),
-    ],
-)
-def test_a_journal_of_an_old_format_is_named(path, first, number, version):
-    path.write_bytes(first + b"\n" + FIRST)
-    with pytest.raises(InputError) as raised:
+def test_a_journal_of_another_format_is_named(path):
+    path.write_bytes(FIRST.replace(b'"format": 3', b'"format": 2'))
+    with pytest.raises(InputError, match="journal has format 2, and this version reads format 3"):
         read_journal(path)
-    assert str(raised.value) == (
-        f"{path}: this journal has format {number}, written by executive {version}; this version reads "
-        f"format 3; read the journal with executive {version}, or run the mission again"
-    )
 
 
 @pytest.mark.parametrize(

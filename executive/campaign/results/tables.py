@@ -120,7 +120,7 @@ def _get_value(values: Mapping[str, object], column: Column) -> SqlValue:
         value = value[name] if isinstance(value, Mapping) else None
     if column.is_json:
         return json.dumps(value, ensure_ascii=False)
-    # SQLite has no Boolean type; the Parquet files have the column types of SQLite.
+    # SQLite has no Boolean type.
     return int(value) if isinstance(value, bool) else value  # type: ignore[return-value]
 
 

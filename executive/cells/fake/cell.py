@@ -7,19 +7,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from executive.cell.config import CellConfig
-from executive.cell.layout import build_bin, compute_travel_height
-from executive.cell.protocols import MinTimes, Routes
+from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions, KeyPath
-from executive.cells.fake.arm import MAX_TOOL_SPEED, FakeArm, FakeTool, find_places_out_of_reach
+from executive.cells.fake.arm import FakeArm, FakeTool, find_places_out_of_reach
 from executive.cells.fake.camera import FakeCamera, FakeDetector
 from executive.cells.fake.state_log import FakeStateLog, restore_world
 from executive.cells.fake.visuals import FakeVisuals
-from executive.cells.fake.world import TOUCH_DISTANCE, FakeWorld, describe_lack_of_room, put_random_objects
+from executive.cells.fake.world import FakeWorld, describe_lack_of_room, put_random_objects
 from executive.cells.ground_truth import FinalObject, count_outcomes
-from executive.cells.min_times import CellMinTimes
 from executive.cells.table_views import find_view_errors
 from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import InputError
@@ -138,11 +134,6 @@ class FakeCell(CellWithoutHardware):
         del cell_folder
         return dict.fromkeys(config.detectors)
 
-    @staticmethod
-    def min_times(config: CellConfig) -> MinTimes:
-        """Return the minimum times of descent, transport and detection in the cell of a cell file."""
-        return FakeMinTimes(config, TOUCH_DISTANCE)
-
     def log_to(self, path: Path) -> None:
         """Write the state of the world to a log file, now and after every control step."""
         self._log = FakeStateLog(path)
@@ -181,18 +172,6 @@ class FakeCell(CellWithoutHardware):
         """Close the log."""
         if self._log is not None:
             self._log.close()
-
-
-class FakeMinTimes(CellMinTimes):
-    """Durations of straight paths at the maximum speed of the fake arm; implements `MinTimes`."""
-
-    def _compute_min_transport_time(self, bin: str) -> float:
-        """Return the time [s] to lift the tallest object to travel height and to move to the nearest slot."""
-        slots = build_bin(bin, self._config.bins[bin]).slots
-        low, high = np.array([self._config.table.x, self._config.table.y]).T
-        distance = float(np.linalg.norm(slots - np.clip(slots, low, high), axis=1).min())
-        min_lift = compute_travel_height(self._config) - self._config.max_object_height
-        return (min_lift + distance) / MAX_TOOL_SPEED
 
 
 @functools.cache

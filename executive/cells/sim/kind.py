@@ -8,7 +8,6 @@ from pathlib import Path
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions, KeyPath, Workcell
-from executive.cells.sim.min_times import SimMinTimes
 from executive.cells.sim.models import find_model_errors
 from executive.cells.sim.object_positions import find_object_count_errors
 from executive.cells.sim.poses import find_places_out_of_reach, find_pose_errors
@@ -44,11 +43,6 @@ class SimCellChecks:
     def labels(config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
         """Return the classes that each detector knows, or None if unknown; no detector model is loaded."""
         return find_detectable_labels(config.detectors, cell_folder)
-
-    @staticmethod
-    def min_times(config: CellConfig) -> SimMinTimes:
-        """Return the minimum times of descent, transport and detection in a cell of this configuration."""
-        return SimMinTimes(config)
 
 
 class SimCellKind(SimCellChecks):

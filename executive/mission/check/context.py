@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 from executive.cell.config import CellConfig
-from executive.cell.protocols import MinTimes
 from executive.mission.findings import suggest_choice
 from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model.mission import Mission
@@ -52,7 +51,6 @@ class CheckContext:
         node_classes: Installed control nodes by keyword.
         cell: Content of the cell file, or None if the file has errors.
         classes_by_detector: Classes that each detector of the cell can detect; None if unknown.
-        min_times: Lower bounds of the times of actions in the cell, or None if unknown.
     """
 
     mission: Mission
@@ -62,7 +60,6 @@ class CheckContext:
     node_classes: ControlNodes
     cell: CellConfig | None
     classes_by_detector: Mapping[str, tuple[str, ...] | None]
-    min_times: MinTimes | None
 
     @cached_property
     def flow_analysis(self) -> FlowAnalysis:

@@ -7,7 +7,6 @@ from typing import cast
 
 from executive.mission.check.conditions import find_non_conditions
 from executive.mission.check.context import CheckContext
-from executive.mission.check.node_min_times import compute_min_time
 from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, make_error, make_warning, suggest_word
 from executive.mission.flow_analysis import FlowAnalysis
@@ -138,15 +137,6 @@ class CheckerAnalysis:
         """Return True if the mission has a constant at a key of the node, not a param or an argument."""
         value = self._node.values.get(key)
         return isinstance(value, Literal) and not value.origin
-
-    def get_min_time(self, child: Child) -> float:
-        """Return a lower bound of the time in which a child can succeed [s]."""
-        return compute_min_time(self._context, get_mission_node(child))
-
-    def list_skill_times(self, child: Child) -> Sequence[tuple[str, float]]:
-        """Return the names and minimum times [s] of the skills in and below a child."""
-        skills = [node for node in get_mission_node(child).walk() if isinstance(node, SkillNode)]
-        return [(node.skill, compute_min_time(self._context, node)) for node in skills]
 
     def list_skills(self, child: Child | None = None) -> Mapping[str, type[Skill] | None]:
         """Return the class of each skill in the subtree of a child or of the node; None if not installed."""

@@ -52,17 +52,6 @@ def make_instance(node: InnerNode, context: NodeContext, build_child: BuildChild
     return node.declaring_class(context, **_make_attributes(node, build_child))
 
 
-def has_valid_constants(node: InnerNode) -> bool:
-    """Return True if the mission gives valid values for all constants of a node."""
-    try:
-        for key in node.declaring_class.keys.values():
-            if key.kind is KeyKind.CONSTANT and (key.is_required or key.name in node.values):
-                _convert_constant(node, key, node.values.get(key.name))
-    except ValueProblem:
-        return False
-    return True
-
-
 def find_upper_bound(owner: KeyedValues, key: Key) -> int | None:
     """Return the maximum of a constant: the number of nodes under `key.max_key`; None for no maximum."""
     return len(list_nodes(owner.values[key.max_key])) if key.max_key in owner.values else None

@@ -1,4 +1,4 @@
-"""Rules for the declarations and the source code of a skill, which are checked without a run.
+"""Rules for the declarations and the imports of a skill, which are checked without a run.
 
 Each public function is a rule: its docstring states the rule, and the function yields one text per violation.
 """
@@ -12,8 +12,8 @@ from dataclasses import replace
 
 from executive.mission.model.conversion import find_problem
 from executive.skill import Param, Port
-from executive.testing.conformance import source_code
 from executive.testing.conformance.skill_runs import SkillRuns
+from executive.testing.conformance.source_files import find_source_files
 
 RESOURCES = ("arm", "tool", "camera")
 """Values that `uses` of a skill may contain."""
@@ -50,18 +50,10 @@ def has_allowed_defaults(runs: SkillRuns) -> Iterator[str]:
 
 
 def declares_reasons(runs: SkillRuns) -> Iterator[str]:
-    """The reasons are a tuple, and the code fails only with declared reasons."""
+    """The reasons are a tuple."""
     reasons = runs.skill.reasons
     if isinstance(reasons, str):
         yield f'{runs.name}.reasons is the string "{reasons}". Write a tuple: ("{reasons}",).'
-        return
-    for function in source_code.walk_functions(runs.skill):
-        for reason, node in _find_failure_reasons(function.syntax_tree):
-            if reason not in reasons:
-                yield (
-                    f'{function.locate(node)} fails with "{reason}", which {runs.name} does not declare. '
-                    f"Add it to the reasons, which are: {', '.join(reasons) or 'none'}."
-                )
 
 
 def declares_resources(runs: SkillRuns) -> Iterator[str]:
@@ -81,7 +73,7 @@ def declares_resources(runs: SkillRuns) -> Iterator[str]:
 
 def imports_allowed_modules(runs: SkillRuns) -> Iterator[str]:
     """The file imports no package with a clock, with threads, or for only one kind of cell."""
-    for path in filter(lambda path: path.is_file(), source_code.find_source_files(runs.skill)):
+    for path in filter(lambda path: path.is_file(), find_source_files(runs.skill)):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             for package in _find_imported_packages(node):
                 if package in FORBIDDEN_PACKAGES:
@@ -89,18 +81,6 @@ def imports_allowed_modules(runs: SkillRuns) -> Iterator[str]:
                         f"{path.name}:{getattr(node, 'lineno', 0)} imports {package}. "
                         "A skill must get the time from cell.clock, and act only through cell."
                     )
-
-
-def calls_take_effect(runs: SkillRuns) -> Iterator[str]:
-    """Each call has an effect: generators are executed with `yield from`, and failures are raised."""
-    for function in source_code.walk_functions(runs.skill):
-        for call in _find_unused_calls(function):
-            callee, text = function.resolve(call.func), f"{ast.unparse(call.func)}(...)"
-            place = function.locate(call)
-            if source_code.returns_steps(callee):
-                yield f'{place} calls {text} without executing its steps. Write "yield from {text}".'
-            elif source_code.returns_failure(callee):
-                yield f'{place} calls {text} without raising the failure. Write "raise {text}".'
 
 
 def _describe_default_problem(param: Param) -> str:
@@ -113,15 +93,6 @@ def _describe_default_problem(param: Param) -> str:
         return str(problem)
 
 
-def _find_failure_reasons(syntax_tree: ast.AST) -> Iterator[tuple[str, ast.expr]]:
-    """Yield reason and call of each `self.failure("reason", ...)` in the syntax tree of a function."""
-    for node in ast.walk(syntax_tree):
-        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("self.failure", "skill.failure"):
-            reason = node.args[0] if node.args else None
-            if isinstance(reason, ast.Constant) and isinstance(reason.value, str):
-                yield reason.value, node
-
-
 def _find_imported_packages(node: ast.AST) -> Sequence[str]:
     """Return the top-level packages that a statement imports; empty if it is not an import."""
     if isinstance(node, ast.Import):
@@ -129,20 +100,3 @@ def _find_imported_packages(node: ast.AST) -> Sequence[str]:
     if isinstance(node, ast.ImportFrom) and node.module and not node.level:
         return [node.module.partition(".")[0]]
     return []
-
-
-def _find_unused_calls(function: source_code.FunctionSource) -> Iterator[ast.Call]:
-    """Yield the calls in a function whose return value is not used."""
-    nodes = list(ast.walk(function.syntax_tree))
-    read_names = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
-    # The executive ignores the return value of a generator `run`; other functions may return a value.
-    is_run = function.function.__name__ == "run" and inspect.isgeneratorfunction(function.function)
-    for node in nodes:
-        match node:
-            case ast.Expr(ast.Call() as call):
-                yield call
-            case ast.Return(ast.Call() as call) if is_run:
-                yield call
-            case ast.Assign(targets, ast.Call() as call):
-                if all(isinstance(target, ast.Name) and target.id not in read_names for target in targets):
-                    yield call

@@ -21,7 +21,7 @@ from executive.errors import Fault
 from executive.events import NodeStarted, TimedEvent
 from executive.skill import Skill, SkillFailed
 from executive.testing.conformance.situations import Arrange, Situation, prepare_scene
-from executive.testing.conformance.source_code import find_skill_line
+from executive.testing.conformance.source_files import find_skill_line
 from executive.testing.faults import FaultyCell, during
 from executive.testing.faults.effect import Effect
 from executive.tree.skill_run import SkillRun

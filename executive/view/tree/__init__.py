@@ -1,1 +1,1 @@
-"""Drawings of a behaviour tree: text for a terminal, SVG picture, and Graphviz text."""
+"""Drawings of a behaviour tree: text for a terminal, and SVG picture."""

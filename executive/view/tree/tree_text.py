@@ -139,5 +139,5 @@ def _make_use_node(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
     outer_subtrees = node.subtrees[: node.subtrees.index(subtree)]
     return OutlineNode(
         node.path, node.name, node.depth, detail, USE_KEYWORD, subtree, node.parent_key, node.trigger,
-        outer_subtrees, symbol="…", shape="ellipse",
+        outer_subtrees, symbol="…",
     )  # fmt: skip

@@ -18,12 +18,9 @@ from executive.mission.parse.cell_file import load_cell
 from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.run_skill import run_skill
-from skills.approach import Approach
 from skills.detect import Detect
-from skills.grasp import Grasp
 from skills.localize import Localize
 from skills.move_to_scan import MoveToScan
-from skills.transit import Transit
 
 Load = Callable[..., CellConfig]
 
@@ -136,28 +133,6 @@ def test_more_objects_than_places_are_reported(load: Load) -> None:
         "19 objects find no room on the workspace of cell overhead, which has 18 places 0.083 m apart; "
         "ask for fewer or widen table.x and table.y"
     )
-
-
-def test_nothing_is_done_sooner_than_the_least_times_say(load: Load) -> None:
-    fake, least = FakeCell(), FakeCell.min_times(load())
-    # The corner of the workspace that is nearest to the red bin.
-    fake.world.put("sphere", 0.42, -0.22)
-    look = run_skill(Detect(), fake)
-    (target,) = run_skill(Localize(detections=look.outputs["detections"]), fake).outputs["targets"]
-    approach = run_skill(Approach(target=target), fake)
-    held = run_skill(Grasp(target=target), fake).outputs["held"]
-    transit = run_skill(Transit(held=held, bin="red_bin"), fake)
-    step = fake.cell.clock.step
-    assert 0 < least.get_answer_time("") == least.get_answer_time("embedded") <= look.ticks * step
-    assert 0 <= least.descent_time <= approach.ticks * step
-    assert (
-        0.2
-        < least.get_transport_time("red_bin")
-        <= transit.ticks * step
-        < 3 * least.get_transport_time("red_bin")
-    )
-    assert least.get_transport_time(None) == min(least.get_transport_time(name) for name in load().bins)
-    assert (least.get_transport_time("no_bin"), least.get_answer_time("no_detector")) == (0.0, 0.0)
 
 
 def test_a_mission_is_rehearsed_in_a_cell_of_kind_fake_and_its_trays_fill_evenly(tmp_path: Path) -> None:

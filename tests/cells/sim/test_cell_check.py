@@ -90,7 +90,6 @@ def test_a_check_loads_no_model_and_none_of_what_runs_one(missions: Path) -> Non
         "import sys; from pathlib import Path; from executive.mission.parse.cell_file import load_cell; "
         "from executive.cells.sim.cell import SimCell; path = Path(sys.argv[1]); config = load_cell(path); "
         "SimCell.check(config, path.parent); SimCell.labels(config, path.parent); "
-        "SimCell.min_times(config).get_transport_time(None); "
         "loaded = {'onnxruntime', 'PIL', 'supervision', 'rich', 'torch'} & set(sys.modules); "
         # What pybullet prints on stdout may come out after everything else.
         "print('loaded:', *sorted(loaded), file=sys.stderr)"

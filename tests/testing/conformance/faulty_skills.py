@@ -10,7 +10,7 @@ from executive.cell.arm import Goal
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import follow, make_task, plan, transport
-from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Out, Seconds, Skill, SkillFailed, param, port
+from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Out, Seconds, Skill, param, port
 
 
 class Push(Skill):
@@ -48,25 +48,6 @@ class GraspTarget(Skill):
     tool_state: ClassVar = (EMPTY, HOLDING)
 
 
-class Careful(Pause):
-    """Wait."""
-
-    def run(self, cell: Cell) -> Steps:
-        """Keep steps and a failure until they are wanted; `follow` is a local name here."""
-        steps, waiting, follow = cell.clock.sleep(0.01), self._rest(cell), list[int].append
-        failure = self.failure("tired", "after 1 step")
-        follow([], 1)
-        yield from steps
-        yield from waiting
-        try:
-            raise failure
-        except SkillFailed:
-            return
-
-    def _rest(self, cell: Cell) -> Steps:
-        return cell.clock.sleep(0.01)
-
-
 class Undocumented(Pause):
     gap: Metres = param(0.1)
     target: In[Target]
@@ -84,8 +65,8 @@ class BadDefaults(Pause):
 class RaisesUndeclared(Pause):
     def run(self, cell: Cell) -> Steps:
         yield
-        if not cell.bins:
-            raise self.failure("no_bins", "there are no bins")
+        if cell.bins:
+            raise self.failure("too_many", "there are bins")
 
 
 class TextForTuple(Pause):
@@ -99,28 +80,10 @@ class BadResources(Pause):
     tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": EMPTY, "tired": EMPTY}
 
 
-class StepsNotTaken(Push):
+class StartsGenerator(Push):
     def run(self, cell: Cell) -> Steps:
-        motion = yield from plan(self, cell.arm, lambda: ("aside", make_task(cell)))
-        follow(self, cell, motion)
-        steps = follow(self, cell, motion)  # noqa: F841
-        cell.clock.sleep(1.0)
-        self._rest(cell)
-        _wait(cell)
-        self._tire()
-        self.failure("blocked", "after 1 step")
-        return follow(self, cell, motion)
-
-    def _rest(self, cell: Cell) -> Steps:
-        return cell.clock.sleep(1.0)
-
-    def _tire(self) -> SkillFailed:
-        return self.failure("blocked", "after 1 step")
-
-
-def _wait(cell: Cell) -> Steps:
-    cell.clock.sleep(1.0)
-    yield
+        cell.arm.start(plan(self, cell.arm, lambda: ("aside", make_task(cell))))  # type: ignore[arg-type]
+        yield
 
 
 class AlwaysFails(Pause):

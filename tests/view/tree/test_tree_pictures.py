@@ -1,4 +1,4 @@
-"""The tree as a picture: SVG and Graphviz text."""
+"""The tree as an SVG picture."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from executive.mission.outline import Connection, OutlineNode
 from executive.tree.node import ControlNode
 from executive.tree.node_registry import load_control_nodes
 from executive.view.text import replace_invalid_xml_characters
-from executive.view.tree.dot import format_dot
 from executive.view.tree.node_texts import make_node_texts
 from executive.view.tree.svg import NodeResult, make_group_id, make_svg
 
@@ -23,7 +22,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 def control(path: str, depth: int, word: str, **more) -> OutlineNode:
     kind = load_control_nodes().get(word, ControlNode)
     detail, title = more.pop("detail", ""), more.pop("title", word)
-    return OutlineNode(path, word, depth, detail, word, title, symbol=kind.symbol, shape=kind.shape, **more)
+    return OutlineNode(path, word, depth, detail, word, title, symbol=kind.symbol, **more)
 
 
 def skill(path: str, depth: int, name: str, **more) -> OutlineNode:
@@ -115,7 +114,6 @@ def test_a_word_that_nobody_knows_is_drawn_like_any_other():
     node = control("tree/dance", 0, "dance")
     (group,) = groups(parsed([node])).values()
     assert (texts(group, "symbol"), texts(group, "title")) == ([ControlNode.symbol], ["dance"])
-    assert "shape=ellipse" in format_dot([node], "x")
 
 
 def test_the_picture_needs_nothing_else_and_its_colours_come_from_the_style_sheet_alone():
@@ -137,42 +135,6 @@ def test_text_from_a_mission_cannot_leave_its_place_in_the_svg():
     assert texts(group, "edge-label") == [replace_invalid_xml_characters(NASTY)]
     assert NASTY[:24] in tooltip(group)
     make_svg([node], NASTY).encode()
-
-
-def test_text_from_a_mission_cannot_leave_its_place_in_the_dot():
-    text = format_dot(
-        [skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, subtrees=(NASTY,))], NASTY
-    )
-    text.encode()
-    outside = re.sub(r'"(?:[^"\\]|\\.)*"', "_", text).splitlines()
-    assert (outside[0], outside[3:]) == (
-        "digraph _ {",
-        ["  subgraph _ {", "  label=_; style=dashed; color=gray;",
-         "  _ [label=_, shape=box, style=_, tooltip=_];", "  }", "}"],
-    )  # fmt: skip
-    assert "&amp;amp;" in text
-
-
-def test_the_dot_has_every_node_and_every_line():
-    assert [re.sub(r", tooltip=.*", "", line.strip()) for line in format_dot(NODES, "sort").splitlines()] == [
-        'digraph "sort" {',
-        'ordering=out; nodesep=0.15; fontname="sans-serif"; fontsize=11;',
-        'node [fontname="sans-serif", fontsize=11]; edge [fontname="sans-serif", fontsize=9];',
-        '"tree/try" [label="↯ try", shape=ellipse',
-        r'"tree/try/retry" [label="↻ retry\nup to 3 attempts,\non Grasp.missed,\nGrasp.blocked", '
-        "shape=hexagon",
-        '"tree/try/retry/do/Grasp" [label="Grasp\\nsettle: 0.2", shape=box, style="rounded"',
-        '"tree/try/retry" -> "tree/try/retry/do/Grasp" [label="do"];',
-        '"tree/try" -> "tree/try/retry" [label="do"];',
-        'subgraph "cluster tree/try/catch/1/look" {',
-        'label="look"; style=dashed; color=gray;',
-        '"tree/try/catch/1/look" [label="→ sequence\\non Grasp.missed", shape=box',
-        '"tree/try/catch/1/look/2:Detect" [label="again\\nDetect, view: full", shape=box, style="rounded"',
-        '"tree/try/catch/1/look" -> "tree/try/catch/1/look/2:Detect";',
-        "}",
-        '"tree/try" -> "tree/try/catch/1/look" [label="catch 1"];',
-        "}",
-    ]
 
 
 def test_a_skill_has_two_lines_of_params_at_most():
