@@ -126,7 +126,10 @@ KeyPath = tuple[str | int, ...]
 
 
 class CellKind(Protocol):
-    """Factory of work cells. Each entry point of the group `executive.cells` is such a factory."""
+    """Factory of work cells. Each entry point of the group `executive.cells` is such a factory.
+
+    A kind may have a method `compute_mass`, which returns the mass [kg] of a class without a declared mass.
+    """
 
     def __call__(
         self, config: Any, *, seed: int, routes: Routes, emit: Emit, options: CellOptions

@@ -15,6 +15,7 @@ from executive.cell.workcell import CellKind
 from executive.errors import InputError
 from executive.mission.check.checks import run_checks
 from executive.mission.check.context import CheckContext
+from executive.mission.check.routed_classes import check_slots, check_weights
 from executive.mission.expand import expand
 from executive.mission.findings import Finding, MissionError, make_warning, sort_findings
 from executive.mission.flow_analysis import UnhandledFailure, find_unhandled_failures
@@ -119,8 +120,13 @@ def load_mission(
         else:
             folder = cell.path.parent
             errors = cell_kind.check(config, folder)
-            findings += [cell.make_error(keys, "robot", message) for keys, message in errors]
+            cell_findings = [cell.make_error(keys, "robot", message) for keys, message in errors]
+            findings += cell_findings
             classes_by_detector = dict(cell_kind.labels(config, folder))
+            # Kinds of other packages may have no `compute_mass`; it would fail for an invalid model.
+            compute_mass = None if cell_findings else getattr(cell_kind, "compute_mass", None)
+            findings += check_weights(cell, config, mission, compute_mass)
+            findings += check_slots(cell, config, mission)
     expansion = expand(mission, skills, _make_predefined_lists(mission, config) if config else {})
     mission = replace(mission, quotas=expansion.quotas)
     tree = assign_paths(expansion.tree or InvalidNode(files.source.make_span(), label=""))

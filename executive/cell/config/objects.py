@@ -25,10 +25,12 @@ class ObjectConfig(Section):
     """A class of objects, with a URDF or a mesh as its model in simulation."""
 
     urdf: str = ""
-    """Path of a URDF, relative to the cell file or to pybullet_data."""
+    """Path of a URDF, relative to the cell file or to pybullet_data. The URDF has one link with a mass, whose
+    shapes are boxes, cylinders, spheres, capsules, or meshes (`.obj`, `.stl` or `.dae`)."""
     mesh: str = ""
-    """Path of a Wavefront mesh (`.obj`), relative to the cell file or to pybullet_data. The collision shape
-    of each group (`o`) is the convex hull of the group: a part with a hole needs several groups."""
+    """Path of a mesh (`.obj`, `.stl` or `.dae`), relative to the cell file or to pybullet_data. The collision
+    shape is the convex hull of the mesh, but of each group (`o`) of an `.obj` mesh: a part with a hole needs
+    several groups."""
     mass: float | None = Field(None, ge=1e-4, le=1000)
     """Mean mass of the objects [kg]. If not given, a weight is no evidence about the class, and a simulation
     uses the mass in the URDF, or 0.05 kg for a mesh."""

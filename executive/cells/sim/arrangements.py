@@ -8,16 +8,13 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-import pybullet
 from numpy.random import Generator
-from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.bins import BIN_THICKNESS, Bin
-from executive.cell.clock import STEP
 from executive.cell.config import CameraConfig, CellConfig, Colour, ObjectConfig
 from executive.cell.layout import build_bins
 from executive.cells.ground_truth import UNKNOWN_LABEL
-from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, load_mesh
+from executive.cells.sim.models import add_body, build_drop_world, load_mesh, locate_object
 from executive.cells.sim.renderer import Region
 from executive.cells.sim.variations import draw_object_colour
 from executive.cells.sim.world import World, add_bin
@@ -173,13 +170,8 @@ def simulate_fall(config: CellConfig, objects: Sequence[SceneObject]) -> list[Sc
 
     Each call uses a new physics world, so that the result depends only on the initial poses.
     """
-    client = BulletClient(pybullet.DIRECT)
+    client = build_drop_world()
     try:
-        client.setGravity(0, 0, -9.81)
-        client.setTimeStep(STEP)
-        client.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
-        table_shape = client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[2, 2, 0.5])
-        client.createMultiBody(0, table_shape, basePosition=[0, 0, -0.5])
         for bin in config.bins.values():
             add_bin(client, bin)
         bodies = [add_body(client, scene_object.model, scene_object.X_WO) for scene_object in objects]
@@ -187,9 +179,8 @@ def simulate_fall(config: CellConfig, objects: Sequence[SceneObject]) -> list[Sc
             client.stepSimulation()
         final_objects = []
         for body, scene_object in zip(bodies, objects, strict=True):
-            X_WI = Pose.of(*client.getBasePositionAndOrientation(body))
-            X_OI = compute_upright_pose(scene_object.model) @ get_inertial_pose(client, body)
-            final_objects.append(replace(scene_object, X_WO=X_WI @ X_OI.inverse()))
+            X_WO = locate_object(client, body, scene_object.model)
+            final_objects.append(replace(scene_object, X_WO=X_WO))
         return final_objects
     finally:
         client.disconnect()

@@ -8,7 +8,7 @@ from pathlib import Path
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions, KeyPath, Workcell
-from executive.cells.sim.models import find_model_errors
+from executive.cells.sim.models import compute_mass, find_model_errors
 from executive.cells.sim.object_positions import find_object_count_errors
 from executive.cells.sim.poses import find_places_out_of_reach, find_pose_errors
 from executive.events import Emit
@@ -18,6 +18,8 @@ from executive.perception.detectors.detector_registry import find_detectable_lab
 
 class SimCellChecks:
     """Checks of a cell file; base class of the simulated cell and of its kind."""
+
+    compute_mass = staticmethod(compute_mass)
 
     @staticmethod
     def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:

@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
+import io
+import math
 import os
+import re
+import tempfile
+import warnings
+import zipfile
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import numpy as np
 import pybullet_data
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
-from executive.geometry import Array
+from executive.geometry import Array, Pose, rotate_about_z
 
 MAX_MODEL_SIZE = 20_000_000
 """Maximum size of a model file [byte], to limit the duration of the check."""
 MAX_TRIANGLE_COUNT = 20_000
 """Maximum number of triangles of a mesh: a collision in PyBullet takes 3 s with 20,000, 60 s with 300,000."""
+MESH_KINDS = {".obj": "Wavefront", ".stl": "STL", ".dae": "COLLADA"}
+"""Formats of mesh files by suffix."""
+
+Triangles = tuple[Array, NDArray[np.intp]]
+"""Vertices `(N, 3)` [m], and the indices of the vertices of each triangle `(M, 3)`."""
 
 
 def find_model(name: str) -> Path:
@@ -37,7 +49,7 @@ def find_model(name: str) -> Path:
     raise InputError(f"there is no model {name}, neither beside the cell file nor in pybullet_data")
 
 
-def read_urdf(path: Path) -> ElementTree.Element:
+def read_urdf(path: Path) -> Element:
     """Return the root element of the URDF of an object.
 
     Raises:
@@ -55,95 +67,193 @@ def read_urdf(path: Path) -> ElementTree.Element:
         if "filename" in element.attrib:
             _normalize_name(path, element.attrib["filename"])
         if element.tag == "mesh":
-            find_mesh(path, element)
+            read_mesh(find_mesh(path, element))
     return root
 
 
-def find_mesh(urdf: Path, mesh: ElementTree.Element) -> Path:
-    """Return the path of the mesh file of a `mesh` element of a URDF.
+def read_shapes(path: Path, tag: str) -> Triangles:
+    """Return vertices and triangles of all `visual` or `collision` of a URDF, in the frame of its link.
 
     Raises:
-        InputError: The mesh is no file in the folder of the URDF, is too large, or has too many triangles.
+        InputError: There is none, a shape is unknown or invalid, or the URDF has several links.
     """
-    path = find_model(str(urdf.parent / _normalize_name(urdf, mesh.get("filename", ""))))
-    _check_triangle_count(path, _count_triangles(path))
-    return path
+    root = read_urdf(path)
+    vertices: list[Array] = []
+    triangles: list[NDArray[np.intp]] = []
+    for element in root.iterfind(f"link/{tag}"):
+        origin = next(element.iter("origin"), Element("origin"))
+        xyz, rpy = (parse_numbers(path, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
+        for shape in element.iterfind("geometry/*"):
+            points, faces = _read_shape(path, shape)
+            triangles.append(faces + sum(map(len, vertices)))  # indices count the vertices of earlier shapes
+            vertices.append(Pose(make_rotation(*rpy), np.array(xyz)).apply(points))
+    if (link_count := len(root.findall("link"))) != 1 or not vertices:
+        problem = f"the model {path.name} has {link_count} links and {len(vertices)} shapes as <{tag}>"
+        raise InputError(f"{problem}; an object is one <link> with at least one <visual> and <collision>")
+    return np.concatenate(vertices), np.concatenate(triangles)
 
 
-def _normalize_name(urdf: Path, name: str) -> str:
-    """Return a file name without `package://`; raise `InputError` for a file outside of the URDF's folder."""
-    name = name.removeprefix("package://")
-    if is_outside_path(name) or has_outside_link(urdf.parent, name):
-        raise InputError(f'the model {urdf.name} names the file "{name}", which is outside of its folder')
-    return name
+def _read_shape(path: Path, shape: Element) -> Triangles:
+    """Return vertices and triangles of an element below `geometry` of a URDF."""
+    if shape.tag == "mesh":
+        points, faces = read_mesh(find_mesh(path, shape))
+        return points * parse_numbers(path, shape, "scale", (1.0, 1.0, 1.0), 0.0), faces
+    if shape.tag not in ("box", "cylinder", "sphere", "capsule"):
+        problem = f"the model {path.name} has the geometry <{shape.tag}>"
+        raise InputError(f"{problem}; possible are box, cylinder, sphere, capsule and mesh")
+    from trimesh import creation  # the import takes a second
+
+    if shape.tag == "box":
+        mesh = creation.box(parse_numbers(path, shape, "size", (0.0, 0.0, 0.0), 0.0))
+    else:
+        (radius,) = parse_numbers(path, shape, "radius", (0.0,), 0.0)
+        (length,) = (0.0,) if shape.tag == "sphere" else parse_numbers(path, shape, "length", (0.0,), 0.0)
+        make = creation.cylinder if shape.tag == "cylinder" else creation.capsule
+        mesh = make(radius=radius, height=length)
+    return mesh.vertices, mesh.faces
 
 
 @lru_cache(maxsize=64)
-def _count_triangles(path: Path) -> int:
-    """Return the number of triangles of a Wavefront or STL file; raise `InputError` if unreadable."""
+def convert_model(path: Path) -> str:
+    """Return the path of a URDF or mesh that contains Wavefront meshes only.
+
+    PyBullet crashes, ignores units or reads nothing for some STL and COLLADA meshes. The files of converted
+    models exist until the end of the process.
+    """
+    if path.suffix == ".obj":
+        return str(path)
+    if path.suffix.lower() in MESH_KINDS:
+        import trimesh  # the import takes a second
+
+        content = str(trimesh.Trimesh(*read_mesh(path), process=False).export(file_type="obj")).encode()
+    else:
+        root = read_urdf(path)
+        files = [(mesh, find_mesh(path, mesh)) for mesh in root.iter("mesh")]
+        if all(file.suffix == ".obj" and "package:" not in mesh.attrib["filename"] for mesh, file in files):
+            return str(path)
+        for mesh, file in files:
+            mesh.set("filename", convert_model(file))
+        content = ElementTree.tostring(root)
+    suffix = ".obj" if path.suffix.lower() in MESH_KINDS else ".urdf"
+    with tempfile.NamedTemporaryFile(suffix=suffix, dir=_make_folder().name, delete=False) as target:
+        target.write(content)
+    return target.name
+
+
+@lru_cache(maxsize=1)
+def _make_folder() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="models_")
+
+
+def find_mesh(urdf: Path, mesh: Element) -> Path:
+    """Return the path of the mesh file of a `mesh` element of a URDF.
+
+    Raises:
+        InputError: The mesh is no file in the folder of the URDF, or is too large.
+    """
+    return find_model(str(urdf.parent / _normalize_name(urdf, mesh.get("filename", ""))))
+
+
+def _normalize_name(urdf: Path, name: str) -> str:
+    """Return a file name without `package://` or `package://NAME/`, relative to the URDF's folder.
+
+    Raises:
+        InputError: The file is outside of the folder.
+    """
+    path = name.removeprefix("package://")
+    if path != name and not (urdf.parent / path).exists():
+        path = path.partition("/")[2]
+    if is_outside_path(path) or has_outside_link(urdf.parent, path):
+        raise InputError(f'the model {urdf.name} names the file "{path}", which is outside of its folder')
+    return path
+
+
+@lru_cache(maxsize=64)
+def read_mesh(path: Path) -> Triangles:
+    """Return vertices and triangles of a Wavefront, STL or COLLADA file; polygons are split into triangles.
+
+    Raises:
+        InputError: The file has another suffix, contains no valid mesh, or has too many triangles.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in MESH_KINDS:
+        raise InputError(f"the model {path.name} is no mesh; convert it to one of: {', '.join(MESH_KINDS)}")
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"the model {path.name} cannot be read: {error.strerror}") from error
-    if path.suffix.lower() == ".stl":
-        # A binary STL file has a header of 80 bytes, the number of triangles, and 50 bytes for each triangle.
-        count = int.from_bytes(content[80:84], "little")
-        return count if len(content) == 84 + 50 * count else content.count(b"endfacet")
-    # A line "f" of a Wavefront file lists the vertices of a polygon, two more than its triangles.
-    lines = (line.split() for line in content.splitlines())
-    return sum(max(len(words) - 3, 0) for words in lines if words[:1] == [b"f"])
-
-
-def _check_triangle_count(path: Path, count: int) -> None:
-    """Raise `InputError` if the number of triangles of a file exceeds `MAX_TRIANGLE_COUNT`."""
-    if count > MAX_TRIANGLE_COUNT:
+        vertices, triangles = _read_wavefront(path) if suffix == ".obj" else _read_with_trimesh(path, suffix)
+        points, faces = np.array(vertices, dtype=float), np.array(triangles, dtype=np.intp).reshape(-1, 3)
+        if not len(faces):
+            raise ValueError("it has no faces" + (" (lines beginning with f)" if suffix == ".obj" else ""))
+        if points.shape != (len(points), 3) or not np.isfinite(points).all():
+            raise ValueError("a vertex needs three finite numbers")
+        if faces.min() < 0 or faces.max() >= len(points):
+            raise ValueError(f"a face names a vertex that is not there; there are {len(points)}")
+    except Exception as error:  # trimesh raises errors of many types
+        reason = "it has no scene, or a wrong reference" if isinstance(error, AttributeError) else error
+        raise InputError(f"the model {path.name} is no {MESH_KINDS[suffix]} mesh: {reason}") from None
+    if len(faces) > MAX_TRIANGLE_COUNT:
         problem = f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles"
         raise InputError(f"{problem}; simplify the mesh")
+    return points, faces
 
 
-def read_wavefront(path: Path) -> tuple[Array, NDArray[np.intp]]:
-    """Return vertices `(N, 3)` and triangles `(M, 3)` of a Wavefront file; polygons are split into triangles.
-
-    Raises:
-        InputError: The file contains no valid mesh.
-    """
+def _read_wavefront(path: Path) -> tuple[ArrayLike, ArrayLike]:
     vertices: list[list[float]] = []
     triangles: list[tuple[int, int, int]] = []
-    try:
-        for line in path.read_text(encoding="utf-8").splitlines():
-            keyword, *words = line.split() or [""]
-            if keyword == "v":
-                vertices.append([float(word) for word in words[:3]])
-            elif keyword == "f":
-                # A word such as 3/1/2 starts with a vertex number, from 1 or, if negative, from the end.
-                numbers = [int(word.split("/")[0]) for word in words]
-                indices = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
-                triangles += [(indices[0], *pair) for pair in pairwise(indices[1:])]
-        _check_triangle_count(path, len(triangles))
-        points, faces = np.array(vertices, dtype=float), np.array(triangles, dtype=np.intp).reshape(-1, 3)
-        if not triangles:
-            raise ValueError("it has no faces (lines beginning with f)")
-        if points.shape != (len(vertices), 3) or not np.isfinite(points).all():
-            raise ValueError("a vertex (lines beginning with v) needs three finite numbers")
-        if faces.min() < 0 or faces.max() >= len(vertices):
-            raise ValueError(f"a face names a vertex that is not there; there are {len(vertices)}")
-        return points, faces
-    except (OSError, ValueError, IndexError, OverflowError) as error:
-        raise InputError(f"the model {path.name} is no Wavefront mesh: {error}") from None
+    for line in path.read_text(encoding="utf-8").splitlines():
+        keyword, *words = line.split() or [""]
+        if keyword == "v":
+            vertices.append([float(word) for word in words[:3]])
+        elif keyword == "f":
+            # A word such as 3/1/2 starts with a vertex number, from 1 or, if negative, from the end.
+            numbers = [int(word.split("/")[0]) for word in words]
+            indices = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
+            triangles += [(indices[0], *pair) for pair in pairwise(indices[1:])]
+    return vertices, triangles
 
 
-def parse_numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the numbers in the text of a URDF attribute, or `default` if the attribute is missing.
+def _read_with_trimesh(path: Path, suffix: str) -> tuple[ArrayLike, ArrayLike]:
+    """Read an STL or COLLADA file, the latter with its unit, but, like PyBullet, without its `up_axis`."""
+    import trimesh  # the import takes a second
+
+    content = path.read_bytes()
+    if suffix == ".stl":
+        # A binary file has a header of 80 bytes, the number of triangles, and 50 bytes for each triangle.
+        content = content[: 84 + 50 * int.from_bytes(content[80:84], "little")]
+    elif zipfile.is_zipfile(path) or re.search(rb"\bnan\b", content, re.IGNORECASE):
+        # trimesh would unpack an archive of any size, and replace NaN by 0.
+        raise ValueError("it is an archive, or contains NaN")
+    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
+        warnings.simplefilter("error", DeprecationWarning)  # NumPy warns about text that is no number
+        scene = trimesh.load_scene(io.BytesIO(content), suffix[1:], process=False)
+        if scene.units:
+            scene = scene.convert_units("meters")
+        corners = scene.to_mesh().triangles.reshape(-1, 3)
+    return np.unique(corners, axis=0, return_inverse=True)
+
+
+def make_rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation matrix for the angles in a URDF [rad]: about the fixed axes x, then y, then z."""
+    (cr, cp), (sr, sp) = np.cos([roll, pitch]), np.sin([roll, pitch])
+    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    return np.asarray(rotate_about_z(yaw) @ about_y @ about_x)
+
+
+def parse_numbers(
+    path: Path, element: Element, key: str, default: tuple[float, ...], minimum: float = -math.inf
+) -> tuple[float, ...]:
+    """Return the numbers in an attribute of a URDF, or `default` if the attribute is missing.
 
     Raises:
-        InputError: The text does not contain as many finite numbers as `default`.
+        InputError: The numbers are not as many finite numbers as in `default`, or not above `minimum`.
     """
-    if text is None:
-        return default
+    text = element.get(key)
     try:
-        numbers = tuple(map(float, text.split()))
+        numbers = default if text is None else tuple(map(float, text.split()))
     except ValueError:
         numbers = ()
-    if len(numbers) != len(default) or not np.isfinite(numbers).all():
-        raise InputError(f'a URDF has "{text}" instead of {len(default)} finite number(s)')
+    if len(numbers) != len(default) or not (np.isfinite(numbers) & (np.array(numbers) > minimum)).all():
+        problem = f'the model {path.name} has {key}="{text or ""}" in a <{element.tag}>'
+        limit = f" above {minimum:g}" if minimum > -math.inf else ""
+        raise InputError(f"{problem}; write {len(default)} finite number(s){limit}")
     return numbers

@@ -3,29 +3,50 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from pathlib import Path
 
 import numpy as np
 import pybullet
+import pybullet_data
 from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
+from executive.cell.clock import STEP
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.layout import build_object_class
 from executive.cell.objects import ObjectClass
 from executive.cell.workcell import KeyPath
-from executive.cells.sim.model_files import find_mesh, find_model, parse_numbers, read_urdf, read_wavefront
+from executive.cells.sim import model_files
+from executive.cells.sim.model_files import find_model, make_rotation
 from executive.errors import InputError
 from executive.geometry import Array, Pose
+from executive.mission.text.file_search import get_shipped_folder
+from executive.processes import build_command
 
 DEFAULT_MESH_MASS = 0.05
 """Mass of a mesh for which the cell file declares no mass [kg]."""
+MIN_MASS, MAX_MASS = 1e-4, 1000.0
+"""Minimum and maximum mass of an object in a URDF [kg]; the same as of a mass in a cell file."""
+MAX_ORIGIN_OFFSET = 0.5
+"""Maximum horizontal distance between centre and origin of a URDF, relative to the radius."""
 SIZE_TOLERANCE = 0.003
 """Maximum difference between a size in a cell file and the size of the model [m]."""
 ROLLING_FRICTION = 0.0005
 """Coefficient of rolling and spinning friction; without it, balls would never come to rest."""
+TRIAL_TIMEOUT = 30
+"""Maximum duration of the trial of a model [s]."""
+DROP_HEIGHT = 0.002
+"""Height above the table at which the model is released [m]."""
+STEP_COUNT = 360
+"""Number of physics steps of a trial."""
+MAX_REST_ERROR = 0.005
+"""Maximum distance of visual, collision shape and declared heights from each other at rest [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +96,9 @@ class Mesh:
         lengths = np.linalg.norm(normals, axis=1)
         has_area = lengths > 0  # triangles without an area have no normal
         normals, a = normals[has_area] / lengths[has_area, None].clip(1e-12), a[has_area]
-        distances = self.vertices @ normals.T - (a * normals).sum(axis=1)
-        return bool(distances.max() < 1e-4)
+        # A matrix of all distances would take 2 GB for 20,000 triangles.
+        planes = zip(a, normals, strict=True)
+        return all(((self.vertices - point) @ normal).max() < 1e-4 for point, normal in planes)
 
 
 def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
@@ -95,11 +117,12 @@ def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
 
 def _add_urdf(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
     """Add the object of a URDF, with the frame L of the file at the pose `X_WL`, and return the body."""
-    path = str(find_model(config.urdf))
     try:
+        path = model_files.convert_model(find_model(config.urdf))
         return int(client.loadURDF(path, X_WL.position, X_WL.quaternion, globalScaling=config.scale))
     except pybullet.error as error:
-        raise InputError(f"PyBullet cannot load the model {config.urdf}: {error}") from error
+        problem = f"PyBullet cannot load the model {Path(config.urdf).name}: {error}"
+        raise InputError(f"{problem} Name <robot> and <link>, and give <inertial> an <inertia>.") from error
 
 
 def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
@@ -107,7 +130,7 @@ def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
 
     PyBullet replaces each group (`g`) of a Wavefront file by its convex hull, enlarged by 1 mm.
     """
-    shape = {"fileName": str(find_model(config.mesh)), "meshScale": [config.scale] * 3}
+    shape = {"fileName": model_files.convert_model(find_model(config.mesh)), "meshScale": [config.scale] * 3}
     centroid = compute_upright_pose(config).inverse().apply(load_mesh(config).centroid)
     collision = client.createCollisionShape(pybullet.GEOM_MESH, **shape)
     visual = client.createVisualShape(pybullet.GEOM_MESH, **shape)
@@ -116,11 +139,20 @@ def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
 
 
 def compute_mass(config: ObjectConfig) -> float:
-    """Return the mass of a simulated object [kg], from the cell file or its URDF."""
+    """Return the mass of a simulated object [kg], from the cell file or its URDF.
+
+    Raises:
+        InputError: The mass in the URDF is missing, or out of range.
+    """
     if config.mass is not None or config.mesh:
         return config.mass or DEFAULT_MESH_MASS
-    masses = read_urdf(find_model(config.urdf)).iterfind(".//inertial/mass")
-    return sum(sum(parse_numbers(mass.get("value"), (0.0,))) for mass in masses)
+    path = find_model(config.urdf)
+    masses = model_files.read_urdf(path).iterfind(".//inertial/mass")
+    mass = sum(sum(model_files.parse_numbers(path, mass, "value", (0.0,))) for mass in masses)
+    if not MIN_MASS <= mass <= MAX_MASS:
+        problem = f"the <inertial> of the model {path.name} has a mass of {mass:g} kg"
+        raise InputError(f"{problem}; write {MIN_MASS:g} to {MAX_MASS:g} kg, or give the class a mass")
+    return mass
 
 
 def build_simulated_class(label: str, config: ObjectConfig) -> ObjectClass:
@@ -129,26 +161,27 @@ def build_simulated_class(label: str, config: ObjectConfig) -> ObjectClass:
 
 
 def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each model of a cell file that is missing, invalid, or of a wrong size."""
+    """Yield key and message for each model of a cell file that is missing, invalid, or of a wrong size.
+
+    A child process tries each model that is not shipped with the executive or PyBullet.
+    """
     for label, object_config in config.objects.items():
-        check: Callable[[ObjectConfig], object] = load_mesh if object_config.mesh else compute_mass
         try:
-            check(object_config)
+            compute_mass(object_config)
+            mesh = load_mesh(object_config)
+            errors = [*_find_wrong_sizes(label, object_config, mesh)]
+            if not errors:
+                _try_in_child_process(object_config)
+            yield from errors
         except InputError as error:
             yield ("objects", label, "mesh" if object_config.mesh else "urdf"), str(error)
-        else:
-            yield from _find_wrong_sizes(label, object_config)
 
 
-def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPath, str]]:
+def _find_wrong_sizes(label: str, config: ObjectConfig, mesh: Mesh) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message if the declared height or radius of a class differs from that of its model.
 
     The executive computes the centre, the top and the free space of an object from height and radius.
     """
-    try:
-        mesh = load_mesh(config)
-    except InputError:
-        return  # the size of a model without a Wavefront mesh is unknown
     for name, model_size in (("height", mesh.top - mesh.bottom), ("radius", mesh.radius)):
         declared_size = getattr(config, name)
         if not abs(declared_size - model_size) <= SIZE_TOLERANCE:  # also True for NaN
@@ -156,18 +189,79 @@ def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPat
             yield ("objects", label, name), message + f"correct {name}, scale or upright_deg"
 
 
+def _try_in_child_process(config: ObjectConfig) -> None:
+    """Call `try_model` in a child process, which the engine may crash; skip shipped models.
+
+    Raises:
+        InputError: The engine crashed, or `try_model` failed.
+    """
+    path = find_model(config.mesh or config.urdf)
+    shipped_folders = (Path(pybullet_data.getDataPath()), get_shipped_folder() / "cells" / "fasteners")
+    if any(path.is_relative_to(folder.resolve()) for folder in shipped_folders):
+        return
+    command = build_command(__name__, config.model_dump_json())
+    trial = subprocess.run(command, capture_output=True, text=True, check=False)
+    if trial.returncode:
+        message = trial.stderr.partition("InputError: ")[2].strip()
+        raise InputError(
+            message or f"PyBullet crashes or hangs on the model {path.name}; simplify its meshes"
+        )
+
+
+def try_model(config: ObjectConfig) -> None:
+    """Drop a model on a table, and compare its shapes at rest with its class.
+
+    Raises:
+        InputError: PyBullet cannot load the model, or the model does not lie as its class declares.
+    """
+    client = build_drop_world()
+    mesh = load_mesh(config)
+    _place_mesh(config, Pose.identity(), "collision")  # refuses shapes that PyBullet would ignore
+    body = add_body(client, config, Pose.of([0, 0, DROP_HEIGHT - mesh.bottom]))
+    for _ in range(STEP_COUNT):
+        client.stepSimulation()
+    vertices = locate_object(client, body, config).apply(mesh.vertices)
+    visual = np.array([vertices.min(axis=0), vertices.max(axis=0)])
+    collision = np.array(client.getAABB(body))
+    centre_of_mass, _ = client.getBasePositionAndOrientation(body)
+    is_inside = (visual[0] <= centre_of_mass).all() and (centre_of_mass <= visual[1]).all()
+    max_error = max(np.abs(visual[:, 2] - [0, config.height]).max(), np.abs(collision - visual).max())
+    if not (is_inside and max_error <= MAX_REST_ERROR):  # also True for NaN
+        problem = f"the model {Path(config.mesh or config.urdf).name} does not lie on the table as declared: "
+        problem += f"z of its <visual> is {visual[:, 2].round(3).tolist()}, not [0, {config.height:g}], "
+        raise InputError(f"{problem}or <collision> or <inertial> is elsewhere; correct them or upright_deg")
+
+
+def build_drop_world() -> BulletClient:
+    """Return a physics world with nothing but a table top, at height 0."""
+    client = BulletClient(pybullet.DIRECT)
+    client.setGravity(0, 0, -9.81)
+    client.setTimeStep(STEP)
+    client.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
+    table_shape = client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[2, 2, 0.5])
+    client.createMultiBody(0, table_shape, basePosition=[0, 0, -0.5])
+    return client
+
+
 @lru_cache(maxsize=64)
 def compute_upright_pose(config: ObjectConfig) -> Pose:
     """Return `X_OL`, the pose of the frame L of the model file in the frame O of the upright object.
 
     The z axis of O points up. The origin of O is the origin of a URDF, but the centre of the bounding box of
-    a mesh, because meshes have arbitrary origins.
+    a mesh, because meshes have arbitrary origins; also of a URDF whose origin is far from its centre.
     """
-    X_OL = Pose(_make_rotation(*(math.radians(angle) for angle in config.upright_deg)), np.zeros(3))
-    if not config.mesh:
-        return X_OL
-    vertices = X_OL.apply(read_wavefront(find_model(config.mesh))[0] * config.scale)
-    return Pose(X_OL.rotation, -(vertices.min(axis=0) + vertices.max(axis=0)) / 2)
+    X_OL = Pose(make_rotation(*(math.radians(angle) for angle in config.upright_deg)), np.zeros(3))
+    mesh = _place_mesh(config, X_OL)
+    centre = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    is_near_origin = math.hypot(*centre[:2]) <= MAX_ORIGIN_OFFSET * mesh.radius
+    return X_OL if config.urdf and is_near_origin else Pose(X_OL.rotation, -centre)
+
+
+def locate_object(client: BulletClient, body: int, config: ObjectConfig) -> Pose:
+    """Return the pose `X_WO` of the upright frame O of an object."""
+    X_WI = Pose.of(*client.getBasePositionAndOrientation(body))
+    X_WL = X_WI @ get_inertial_pose(client, body).inverse()
+    return X_WL @ compute_upright_pose(config).inverse()
 
 
 def get_inertial_pose(client: BulletClient, body: int) -> Pose:
@@ -180,35 +274,18 @@ def load_mesh(config: ObjectConfig) -> Mesh:
     """Return the scaled visual mesh of an object class in the upright frame O.
 
     Raises:
-        InputError: The model has no visual mesh in Wavefront format.
+        InputError: The model is missing or invalid, or has no visual.
     """
-    if config.mesh:
-        points, faces = read_wavefront(find_model(config.mesh))
-        return Mesh(compute_upright_pose(config).apply(points * config.scale), faces)
-    path = find_model(config.urdf)
-    vertices: list[Array] = []
-    triangles: list[NDArray[np.intp]] = []
-    for visual in read_urdf(path).iter("visual"):
-        mesh = visual.find("geometry/mesh")
-        if mesh is None or not mesh.get("filename", "").endswith(".obj"):
-            raise InputError(f"{path}: only visuals made of .obj meshes can be labelled")
-        points, faces = read_wavefront(find_mesh(path, mesh))
-        scale = np.array(parse_numbers(mesh.get("scale"), (1.0, 1.0, 1.0)))
-        origin = visual.find("origin")
-        rpy = parse_numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0))
-        xyz = parse_numbers(None if origin is None else origin.get("xyz"), (0.0, 0.0, 0.0))
-        X_LV = Pose(_make_rotation(*rpy), np.array(xyz) * config.scale)
-        triangles.append(faces + sum(map(len, vertices)))  # indices count the vertices of earlier visuals
-        vertices.append((compute_upright_pose(config) @ X_LV).apply(points * scale * config.scale))
-    if not vertices:
-        raise InputError(f"the model {path.name} has no visual, so no camera would see it")
-    return Mesh(np.concatenate(vertices), np.concatenate(triangles))
+    return _place_mesh(config, compute_upright_pose(config))
 
 
-def _make_rotation(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation matrix for the angles in a URDF [rad]: about the fixed axes x, then y, then z."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    return np.asarray(about_z @ about_y @ about_x)
+def _place_mesh(config: ObjectConfig, X_OL: Pose, tag: str = "visual") -> Mesh:
+    """Return the scaled `visual` or `collision` mesh of an object class whose model frame L is at `X_OL`."""
+    path = find_model(config.mesh or config.urdf)
+    points, faces = model_files.read_mesh(path) if config.mesh else model_files.read_shapes(path, tag)
+    return Mesh(X_OL.apply(points * config.scale), faces)
+
+
+if __name__ == "__main__":
+    signal.alarm(TRIAL_TIMEOUT)  # the signal ends the process
+    try_model(ObjectConfig.model_validate_json(sys.argv[1]))

@@ -21,7 +21,7 @@ from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, list_bin_boxes
 from executive.cells.sim import command_log
 from executive.cells.sim.command_log import CommandLog
 from executive.cells.sim.model_files import find_model
-from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose
+from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, locate_object
 from executive.cells.sim.robot_models import ROBOT_MODELS, RobotModel
 from executive.cells.sim.table_top import TableTop
 from executive.geometry import Array, Pose
@@ -131,9 +131,7 @@ class World:
 
     def get_object_pose(self, body: int) -> Pose:
         """Return the pose `X_WO` of the upright frame O of a loose object."""
-        X_WI = Pose.of(*self.client.getBasePositionAndOrientation(body))
-        X_WL = X_WI @ get_inertial_pose(self.client, body).inverse()
-        return X_WL @ compute_upright_pose(self.models[body]).inverse()
+        return locate_object(self.client, body, self.models[body])
 
     def place_object(self, body: int, X_WO: Pose) -> None:
         """Move a loose object to `X_WO`, at rest."""

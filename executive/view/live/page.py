@@ -39,7 +39,7 @@ SHUTDOWN_TIMEOUT = 3.0
 """Maximum time to wait for the end of the server process [s]."""
 MAX_QUEUED_MESSAGES = 32
 """Length of the message queue at which images (about 1 MB each) and poses are dropped."""
-REQUIRED_PACKAGES = ("aiohttp", "trimesh", "viser")
+REQUIRED_PACKAGES = ("aiohttp", "viser")
 """Optional dependencies of the project that the live page needs."""
 
 

@@ -41,6 +41,12 @@ def reaching(config: CellConfig, *place: float) -> Sequence[float]:
     return tuple(np.degrees(reach(kinematics, place, home)))
 
 
+def test_the_mass_of_a_class_is_declared_or_in_its_urdf(overhead: CellConfig) -> None:
+    sphere = overhead.objects["sphere"]
+    assert SimCell.compute_mass(sphere) == 0.1
+    assert SimCell.compute_mass(sphere.model_copy(update={"mass": 0.3})) == 0.3
+
+
 @pytest.mark.parametrize("name", ["overhead", "wrist", "depth"])
 def test_nothing_is_wrong_with_a_shipped_cell(missions: Path, name: str) -> None:
     assert list(SimCell.check(shipped_cell(name), missions / "cells")) == []

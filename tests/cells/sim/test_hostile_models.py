@@ -24,8 +24,14 @@ BOMB = f"<!DOCTYPE r [<!ENTITY a0 'ha'>{LEVELS}]><robot name='&a9;'/>"
         (BOMB, "the model m.urdf is no URDF: "),
         ("<svg/>", "the model m.urdf is no URDF: its root is <svg>, not <robot>"),
         ("<?xml version='1.0' encoding='none'?><robot/>", "the model m.urdf is no URDF: "),
-        ("<robot><inertial><mass value='nan'/></inertial></robot>", 'a URDF has "nan" instead of 1 finite'),
-        ("<robot><inertial><mass value='1 2'/></inertial></robot>", 'a URDF has "1 2" instead of 1 finite'),
+        (
+            "<robot><inertial><mass value='nan'/></inertial></robot>",
+            'the model m.urdf has value="nan" in a <mass>',
+        ),
+        (
+            "<robot><inertial><mass value='1 2'/></inertial></robot>",
+            'the model m.urdf has value="1 2" in a <mass>',
+        ),
     ],
     ids=["garbage", "empty", "XML bomb", "other XML", "encoding", "not finite", "two numbers"],
 )
@@ -86,7 +92,10 @@ def test_no_element_of_a_urdf_names_a_file_outside_of_its_folder(
 
 @pytest.mark.parametrize(
     "content",
-    [b"\0" * 80 + (20_001).to_bytes(4, "little") + b"\0" * 50 * 20_001, b"solid\n" + b"endfacet\n" * 20_001],
+    [
+        b"\0" * 80 + (20_001).to_bytes(4, "little") + b"\0" * 50 * 20_001,
+        b"solid\n" + b"vertex 0 0 0\n" * 60_003 + b"endsolid",
+    ],
     ids=["binary", "text"],
 )
 def test_an_stl_mesh_of_more_than_20000_triangles_is_refused(content: bytes, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig, ObjectConfig
-from executive.cells.sim.model_files import read_wavefront
+from executive.cells.sim.model_files import read_mesh
 from executive.cells.sim.models import find_model_errors, load_mesh
 from executive.cells.sim.world import World
 from executive.errors import InputError
@@ -105,8 +105,8 @@ def test_a_mesh_stands_around_its_middle_and_weighs_about_the_middle_of_its_volu
     ("text", "complaint"),
     [
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", r"it has no faces \(lines beginning with f\)"),
-        ("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "a vertex .* needs three finite numbers"),
-        ("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", "a vertex .* needs three finite numbers"),
+        ("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "a vertex needs three finite numbers"),
+        ("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", "a vertex needs three finite numbers"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "a face names a vertex that is not there; there are 3"),
         ("v 0 0 zero\n", "could not convert string to float: 'zero'"),
         ("solid washer\n", "it has no faces"),
@@ -116,7 +116,7 @@ def test_what_is_no_mesh_is_refused_with_the_reason(text: str, complaint: str, t
     path = tmp_path / "thing.obj"
     path.write_text(text)
     with pytest.raises(InputError, match=rf"the model thing\.obj is no Wavefront mesh: {complaint}"):
-        read_wavefront(path)
+        read_mesh(path)
 
 
 def test_missing_and_broken_meshes_and_wrong_sizes_are_named_with_their_keys(

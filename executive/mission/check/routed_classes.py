@@ -1,0 +1,57 @@
+"""Checks that the tool can carry the classes of the routes, and that they fit into the slots of the bins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from executive.cell.config import CellConfig, ObjectConfig
+from executive.geometry import GRAVITY
+from executive.manipulation.obstacles import MAX_ROLL_DISTANCE
+from executive.mission.findings import Finding, make_error, make_warning
+from executive.mission.model.mission import Mission
+from executive.mission.parse.cell_file import CellFile
+from executive.motion.payload import MIN_LIFT_ACCELERATION, SAFETY_FACTOR
+
+
+def check_weights(
+    cell: CellFile, config: CellConfig, mission: Mission, compute_mass: Callable[[ObjectConfig], float] | None
+) -> Iterator[Finding]:
+    """Yield an error for each routed class that is too heavy for the tool, or a warning if it may be dropped.
+
+    The planner limits the accelerations so that the seal withstands twice the force, but it never lifts with
+    less than `MIN_LIFT_ACCELERATION`. `compute_mass` returns the mass of a simulated object [kg]; if it is
+    None, only classes with a declared mass are checked.
+    """
+    force = config.tool.force
+    for label in sorted({route.label for route in mission.routes} & config.objects.keys()):
+        section = config.objects[label]
+        mass = compute_mass(section) if compute_mass else section.mass or 0.0
+        weight, pull = (mass * a for a in (GRAVITY, GRAVITY + MIN_LIFT_ACCELERATION))
+        problem = f"a {label} of {mass:g} kg"
+        key = "mass" if section.mass is not None else "urdf" if section.urdf else "mesh"
+        span = cell.find_span(("objects", label, key))
+        hint = "Correct the mass, delete the route, or use a tool with a larger force."
+        if weight > force:
+            message = f"{problem} weighs {weight:.1f} N, more than the {force:g} N that the tool withstands"
+            yield make_error(span, "too-heavy", message, hint)
+        elif pull > force / SAFETY_FACTOR:
+            message = f"{problem} pulls with {pull:.1f} N in the slowest lift, more than half of the "
+            yield make_warning(span, "too-heavy", f"{message}{force:g} N that the tool withstands", hint)
+
+
+def check_slots(cell: CellFile, config: CellConfig, mission: Mission) -> Iterator[Finding]:
+    """Yield an error for each class and bin of a route if walls or objects beside a slot block transits."""
+    # `list_obstacles` represents each object in a bin by a cylinder for the largest class.
+    obstacle_radius = max(section.radius for section in config.objects.values()) + MAX_ROLL_DISTANCE
+    for label, name in [(route.label, bin.name) for route in mission.routes for bin in route.bins]:
+        bin, section = config.bins.get(name), config.objects.get(label)
+        if bin is None or section is None:
+            continue  # `routes.check_names` reports the name
+        radius = section.radius + section.ring + config.motion.margin
+        for axis, size, count in zip("xy", bin.size, bin.slots, strict=False):
+            min_size = radius + max(radius, obstacle_radius if count > 1 else 0.0)
+            if size / count < min_size:
+                message = f"a slot of {name} is {size / count:.4f} m long along {axis}, but a {label} "
+                message += f"with its clearance needs {min_size:.4f} m"
+                hint = "Give the bin fewer slots or a larger size."
+                yield make_error(cell.find_span(("bins", name, "slots")), "layout", message, hint)

@@ -1,0 +1,141 @@
+"""URDFs and meshes of other people: what the check accepts lies on the table, the rest is named."""
+
+from __future__ import annotations
+
+import struct
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from executive.cell.config import CellConfig, ObjectConfig
+from executive.cells.sim import models
+from executive.cells.sim.model_files import read_mesh
+from executive.cells.sim.models import find_model_errors, load_mesh, try_model
+from executive.errors import InputError
+
+CORNERS = 0.025 * np.array([*product((-1, 1), repeat=3)])
+FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6),
+         (0, 6, 4), (1, 5, 7), (1, 7, 3)]  # fmt: skip
+TRIANGLES = CORNERS[np.array(FACES)]
+BINARY_STL = bytes(80) + struct.pack("<I", 12) + b"".join(
+    struct.pack("<12fH", 0, 0, 0, *corners.ravel(), 0) for corners in TRIANGLES
+)  # fmt: skip
+VERTICES = "\n".join(f"vertex {x} {y} {z}" for x, y, z in TRIANGLES.reshape(-1, 3))
+TEXT_STL = f"solid s\n{VERTICES}\nendsolid s"
+COLLADA = f"""<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit meter="0.001"/></asset><library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a">{" ".join(map(str, 1000 * CORNERS.ravel()))}</float_array>
+<technique_common><accessor source="#a" count="8" stride="3">
+<param name="X"/><param name="Y"/><param name="Z"/></accessor>
+</technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<polylist><input semantic="VERTEX" source="#v" offset="0"/>
+<vcount>{"3 " * 12}</vcount><p>{" ".join(map(str, np.ravel(FACES)))}</p></polylist>
+</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id="s"><node>
+<translate>0 0 9</translate><rotate>0 0 1 90</rotate><scale>1 1 2</scale>
+<matrix>1 0 0 0 0 1 0 0 0 0 .5 0 0 0 0 1</matrix>
+<instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+BOX, AWAY = '<box size="0.05 0.05 0.05"/>', '<origin xyz="0.5 0 0"/>'
+STL, DAE = '<mesh filename="package://parts/p.stl"/>', '<mesh filename="p.dae"/>'
+INERTIAL = '<mass value="0.1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+
+
+def write(
+    folder: Path, visual: str, collision: str = "", inertial: str = INERTIAL, origin: str = ""
+) -> ObjectConfig:
+    """Write a URDF with its meshes, and return its class, which is 5 cm wide and high."""
+    (folder / "p.stl").write_bytes(BINARY_STL)
+    (folder / "text.stl").write_text(TEXT_STL)
+    (folder / "p.dae").write_text(COLLADA)
+    shapes = f"<visual>{origin}<geometry>{visual}</geometry></visual>"
+    shapes += f"<collision>{origin}<geometry>{collision or visual}</geometry></collision>"
+    (folder / "m.urdf").write_text(
+        f"<robot name='r'><link name='l'><inertial>{inertial}</inertial>{shapes}</link></robot>"
+    )
+    return ObjectConfig(urdf=str(folder / "m.urdf"), height=0.05, radius=0.0354)
+
+
+@pytest.mark.parametrize("visual", [BOX, STL, DAE, '<mesh filename="text.stl"/>'])
+def test_a_box_in_each_format_lies_on_the_table_as_declared(visual: str, tmp_path: Path) -> None:
+    config = write(tmp_path, visual)
+    assert np.ptp(load_mesh(config).vertices, axis=0) == pytest.approx([0.05, 0.05, 0.05])
+    assert load_mesh(config).is_convex
+    try_model(config)
+    try_model(config.model_copy(update={"urdf": "", "mesh": str(tmp_path / "p.stl")}))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("p.stl", BINARY_STL[:400], "it has no faces"),
+        ("p.stl", TEXT_STL.replace("0.025", "0,025").encode(), "string or file could not be read"),
+        ("p.dae", COLLADA.replace("25.0", "nan", 1).encode(), "NaN"),
+        ("p.dae", COLLADA.partition("<scene>")[0].encode() + b"</COLLADA>", "it has no scene"),
+        ("p.dae", COLLADA[:-3].encode(), "unclosed token"),
+    ],
+)
+def test_a_broken_mesh_is_refused(name: str, content: bytes, reason: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=rf"the model {name} is no (STL|COLLADA) mesh: .*{reason}"):
+        read_mesh(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("shape", "size"),
+    [
+        ('<cylinder radius="0.02" length="0.1"/>', [0.04, 0.04, 0.1]),
+        ('<sphere radius="0.03"/>', [0.06, 0.06, 0.06]),
+        ('<capsule radius="0.02" length="0.1"/>', [0.04, 0.04, 0.14]),
+    ],
+)
+def test_a_primitive_has_its_size_and_a_closed_surface(shape: str, size: list[float], tmp_path: Path) -> None:
+    mesh = load_mesh(write(tmp_path, shape))
+    assert np.ptp(mesh.vertices, axis=0) == pytest.approx(size, rel=0.005)
+    assert mesh.centroid == pytest.approx([0, 0, 0], abs=1e-9)
+    assert mesh.is_convex
+
+
+def test_geometry_far_from_the_origin_is_moved_to_the_object_frame(tmp_path: Path) -> None:
+    config = write(tmp_path, BOX, origin=AWAY, inertial=AWAY + INERTIAL)
+    assert load_mesh(config).vertices.mean(axis=0) == pytest.approx([0, 0, 0], abs=1e-9)
+    try_model(config)
+
+
+@pytest.mark.parametrize(
+    ("parts", "key", "reason"),
+    [
+        ({"inertial": ""}, "urdf", "a mass of 0 kg"),
+        ({"inertial": INERTIAL.replace("0.1", "-1")}, "urdf", "a mass of -1 kg"),
+        ({"inertial": AWAY + INERTIAL}, "urdf", "does not lie on the table"),
+        ({"collision": '<box size="0.05 0.05 0.1"/>'}, "urdf", "does not lie on the table"),
+        ({"visual": '<box size="0.05 0.05 0"/>'}, "urdf", r'size="0\.05 0\.05 0" in a <box>'),
+        ({"visual": '<plane normal="0 0 1"/>'}, "urdf", "geometry <plane>"),
+        ({"visual": '<mesh filename="p.stl" scale="1000 1000 1000"/>'}, "height", "height of 50"),
+        (
+            {"inertial": f"{INERTIAL}</inertial></link><link name='k'><inertial>{INERTIAL}"},
+            "urdf",
+            "has 2 links",
+        ),
+    ],
+)
+def test_a_model_that_no_tool_could_sort_is_refused(
+    overhead: CellConfig, parts: dict[str, str], key: str, reason: str, tmp_path: Path
+) -> None:
+    objects = {"part": write(tmp_path, **{"visual": BOX, **parts})}
+    (keys, message), *_ = find_model_errors(overhead.model_copy(update={"objects": objects}))
+    assert keys == ("objects", "part", key)
+    with pytest.raises(InputError, match=reason):
+        raise InputError(message)
+
+
+def test_a_crash_of_the_engine_is_an_error_of_the_model(
+    overhead: CellConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(models, "build_command", lambda *_: ["sh", "-c", "kill -SEGV $$"])
+    ((_, message),) = find_model_errors(
+        overhead.model_copy(update={"objects": {"part": write(tmp_path, BOX)}})
+    )
+    assert "crashes or hangs on the model m.urdf" in message
