@@ -88,7 +88,7 @@ def read_shapes(path: Path, tag: str) -> Triangles:
             triangles.append(faces + sum(map(len, vertices)))  # indices count the vertices of earlier shapes
             vertices.append(Pose(make_rotation(*rpy), np.array(xyz)).apply(points))
     if (link_count := len(root.findall("link"))) != 1 or not vertices:
-        problem = f"the model {path.name} has {link_count} links and {len(vertices)} shapes as <{tag}>"
+        problem = f"the model {path.name} has {link_count} link(s) and {len(vertices)} shape(s) as <{tag}>"
         raise InputError(f"{problem}; an object is one <link> with at least one <visual> and <collision>")
     return np.concatenate(vertices), np.concatenate(triangles)
 

@@ -117,7 +117,7 @@ def test_geometry_far_from_the_origin_is_moved_to_the_object_frame(tmp_path: Pat
         (
             {"inertial": f"{INERTIAL}</inertial></link><link name='k'><inertial>{INERTIAL}"},
             "urdf",
-            "has 2 links",
+            "has 2 link",
         ),
     ],
 )
