@@ -68,9 +68,10 @@ def at_terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
 
 @pytest.fixture
 def grey(tmp_path: Path) -> Path:
-    """A data set of two images with nothing on them."""
+    """A data set of two grey images."""
     root = tmp_path / "grey"
-    entries = [DatasetEntry("test", f"{name}.jpg", (160, 120), (), ()) for name in "ab"]
+    box = (10.0, 10.0, 60.0, 60.0)
+    entries = [DatasetEntry("test", f"{name}.jpg", (160, 120), ("cube",), (box,)) for name in "ab"]
     for entry in entries:
         save_image(build_image_path(root, "coco", "test", entry.file), np.full((120, 160, 3), 128, np.uint8))
     write_annotations(root, "coco", entries, ("cube", "sphere", "duck"))
@@ -104,6 +105,7 @@ def test_train_shows_batches_and_a_line_per_epoch(
                 progress(done // 2, {"loss": 0.51234})
 
     monkeypatch.setattr("executive.training.train.train", train)
+    monkeypatch.setattr("executive.training.train.load_dataset", lambda _folder: {})
     shown = at_terminal("train", "--dataset", "data", "--out", "out", "--epochs", "2")
     assert shown.exit_code == 0, shown.stderr
     assert "training" in shown.stderr and "4/4" in shown.stderr
