@@ -44,10 +44,11 @@ class Weigh(Skill):
             yield
         fail_if_dropped(self, cell, self.held, "during the weighing")
         self.weight = sum(loads) / len(loads) - cell.ledger.empty_load
-        if len(set(loads)) == 1 or not math.isfinite(self.weight):
-            raise self.failure(
-                "implausible", f"the load cell is broken: it reads {loads[0]:.3f} N all the time"
-            )
+        if not math.isfinite(self.weight):
+            raise self.failure("implausible", f"the load cell is broken: the mean load is {self.weight} N")
+        if len(set(loads)) == 1:
+            readings = f"{loads[0]:.3f} N in {len(loads)} readings"
+            raise self.failure("implausible", f"the load cell is broken: it reads exactly {readings}")
         if contradiction := cell.ledger.record_weight(self.held, self.weight, cell.tool.load_std):
             raise self.failure("contradicted", f"the class of {self.held} is uncertain: {contradiction}")
         self.bin = choose_bin(cell, self.held)

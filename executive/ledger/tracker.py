@@ -42,8 +42,9 @@ class Tracker(LedgerQueries):
         self._bin_recovery: BinRecovery | None = None
         """Recovery of the bin contents between `record_interruption` and `record_bin_contents`, or None."""
         self._last_frame_id = self._deferral_count = 0
-        self._last_stamp = self.empty_load = 0.0
+        self._last_stamp = 0.0
         """Capture time of the last look [s]."""
+        self.empty_load = 0.0
         self.assumption_reasons: list[str] = []
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:

@@ -83,8 +83,10 @@ class CellLocalizer:
 
     def _observe(self, detections: Detections, detection: Detection) -> Observation:
         """Return the observation of one detection: position, standard deviation and contradiction."""
-        frame, contradiction = detections.frame, ""
-        position, is_doubtful = self.locate(detection, frame), detection in detections.doubtful
+        frame = detections.frame
+        contradiction = ""
+        position = self.locate(detection, frame)
+        is_doubtful = detection in detections.doubtful
         std = detections.error_rates.jitter * frame.compute_depth(position) / float(frame.matrix[0, 0])
         if detection.label not in self.classes:
             std = max(std, UNKNOWN_POSITION_STD)

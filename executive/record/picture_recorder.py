@@ -45,6 +45,8 @@ class PictureRecorder:
         self._timeline = Timeline(has_history=False)
         self._last_frame: Frame | None = None
         self._look_by_frame_id: dict[int, StoredLook] = {}
+        self._unknown_labels: set[str] = set()
+        """Labels that are no class of the cell, in all looks."""
         self._selected_frame_id: int | None = None
         self._undrawn_frame_id: int | None = None
         """Number of the frame of the last look; None if a picture shows this frame."""
@@ -66,10 +68,9 @@ class PictureRecorder:
             self._queue(timed, self._timeline.selections.get(event.item), event)
         elif isinstance(event, RunEnded):
             for name, item in self._timeline.items.by_name.items():
-                label, frame_id = item.last_change.label, item.sighting.frame if item.sighting else 0
-                look = self._look_by_frame_id.get(frame_id)
-                if item.last_change.state == "rejected" and look and label in look[1].unknown_labels:
-                    self._queue(timed, TargetSelected(name, label, frame_id, ""), None)
+                label = item.last_change.label
+                if item.last_change.state == "rejected" and item.sighting and label in self._unknown_labels:
+                    self._queue(timed, TargetSelected(name, label, item.sighting.frame, ""), None)
         # The timeline gets the event last, so that the picture shows a failed skill as running.
         self._timeline(timed)
 
@@ -88,6 +89,7 @@ class PictureRecorder:
         if self._last_frame is None or self._last_frame.id != look.frame:
             return
         self._look_by_frame_id[look.frame] = self._last_frame, look
+        self._unknown_labels.update(look.unknown_labels)
         self._undrawn_frame_id = look.frame
         if len(self._look_by_frame_id) > MAX_STORED_LOOKS:
             # The look of the last selection is kept for the picture of a failed attempt to pick the item.

@@ -128,7 +128,7 @@ class _Comparison:
             self.result.decisions += 1
             return
         self._has_found_difference = True
-        self.result.unanswered = self.run.replayed_cell.missing_input_message or self._log.find_lost_value()
+        self.result.unanswered = self.run.replayed_cell.missing_input_message
         # After the last recorded step, the replay only halts its skills.
         self.result.is_complete = decision.tick > self._log.last_tick
         if self._has_recorded_end or any(map(self._is_in_complete_step, filter(None, (recorded, decision)))):

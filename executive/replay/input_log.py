@@ -113,11 +113,18 @@ class InputLog:
         return next((event.action for event in events if isinstance(event, ToolCommanded)), "")
 
     def find_lost_value(self) -> str:
-        """Return a clause about the first output or blackboard value that is not in the journal, or ""."""
+        """Return a clause about the first output or present blackboard value that is not in the journal."""
         readings = (timed.event for timed in self.events if isinstance(timed.event, InputRead))
-        steps: list[Any] = [each.value for each in readings if each.name.startswith("behaviour.")]
-        values = (value for step in steps if isinstance(step, dict) for value in step["values"].items())
-        names = (f'"{key}" ({entry})' for key, entry in values if isinstance(entry, str))
+        values: list[Any] = [each.value for each in readings if each.name.startswith("behaviour.")]
+        steps = [value["values"] for value in values if isinstance(value, dict)]
+        # A step contains all values on the blackboard, whose keys begin with a slash.
+        entries = [
+            (key, entry)
+            for step in steps
+            for key, entry in step.items()
+            if step is steps[-1] or not key.startswith("/")
+        ]
+        names = (f'"{key}" ({entry})' for key, entry in entries if isinstance(entry, str))
         return next((f"JSON cannot restore the value of {name}" for name in names), "")
 
     def make_final_interruption(

@@ -269,7 +269,8 @@ class FakeTool:
     @property
     def load(self) -> float:
         """Weight of the held object by the mass of its class, plus `load_error` and alternating noise [N]."""
-        held, self._noise = self._world.held_object, -self._noise
+        self._noise = -self._noise
+        held = self._world.held_object
         force = self._world.classes[held.label].mass * GRAVITY if held else 0.0
         return force + self.load_error + self._noise
 

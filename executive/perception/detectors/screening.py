@@ -62,7 +62,8 @@ def screen_answer(answer: Answer, frame: Frame, view: str, label_map: Mapping[st
     for detection in answer.confident:
         if frame.compute_visible_fraction(detection.box) < MIN_VISIBLE_FRACTION:
             continue
-        label, is_confident = label_map.get(detection.label), _is_confident(detection, threshold)
+        label = label_map.get(detection.label)
+        is_confident = _is_confident(detection, threshold)
         if label:
             (confident if is_confident else doubtful).append(replace(detection, label=label))
         elif label is None and is_confident:
