@@ -45,11 +45,16 @@ def find_view_errors(
     name, camera = next(iter(config.cameras.items()))
     matrix, X_MC = compute_calibration(camera)
     poses = [pose for pose in camera.scan_poses if pose in config.arm.poses_deg]
-    key, mounts = "calibration" if camera.calibration else "position", [Pose.identity()]
+    if not poses:
+        return  # `read_cell` reports unknown poses.
+    key = "calibration" if camera.calibration else "position"
+    mounts = [Pose.identity()]
     if camera.mount == "wrist":
-        kinematics, X_TF = build_kinematics(config), Pose.of([0.0, 0.0, -config.tool.length])
-        qs = [np.radians(config.arm.poses_deg[pose]) for pose in poses]
-        key, mounts = "scan_poses", [kinematics.compute_tool_pose(q) @ X_TF for q in qs]
+        key = "scan_poses"
+        kinematics = build_kinematics(config)
+        X_TF = Pose.of([0.0, 0.0, -config.tool.length])
+        qs = np.radians([config.arm.poses_deg[pose] for pose in poses])
+        mounts = [kinematics.compute_tool_pose(q) @ X_TF for q in qs]
 
     def find_shown(region: Box, X_MC: Pose) -> Mask:
         return np.array([_find_shown(volume, matrix, X_WM @ X_MC, region) for X_WM in mounts])
@@ -68,23 +73,23 @@ def find_view_errors(
             place = f' from the pose "{poses[index]}"' if len(image_masks) > 1 else ""
             gap = _describe_gap(points, mask)
             message = f"the image of the camera {name}{place} does not show {gap}; {advice}"
-            yield ("cameras", name, key, *([index] if place else [])), message
+            yield ("cameras", name, key, *([camera.scan_poses.index(poses[index])] if place else [])), message
     if not image_masks.all():
         return
     depth = (mounts[0] @ X_MC).inverse().apply(points.mean(axis=0))[2]
     min_radius = min(section.radius for section in config.objects.values())
     if (diameter := 2 * min_radius * matrix.diagonal()[:2].min() / depth) < MIN_OBJECT_DIAMETER:
-        requirement = f"of {MIN_OBJECT_DIAMETER:g}; correct the focal length or the distance of the camera"
         message = (
-            f"the camera {name} shows the smallest class with {diameter:.1f} pixels instead {requirement}"
+            f"the camera {name} shows the smallest class with {diameter:.1f} pixels instead of "
+            f"{MIN_OBJECT_DIAMETER:g}; correct the focal length or the distance of the camera"
         )
         yield ("cameras", name, "calibration" if camera.calibration else "fov_deg"), message
     for mask in view_masks:
         if not (mask.any() if camera.partial_views else mask.all()):
             pixels = np.array([project(matrix, X_WM @ X_MC, volume) for X_WM in mounts])
             low, high = np.floor(pixels.min(axis=(0, 1, 2))), np.ceil(pixels.max(axis=(0, 1, 2)))
-            side, size = (high - low).max(), np.array([camera.width, camera.height])
-            corner = np.clip((low + high - side) // 2, 0, size - side)
+            side = (high - low).max()
+            corner = np.clip((low + high - side) // 2, 0, (camera.width - side, camera.height - side))
             if corner.min() >= 0 and "inverse" not in advice and not camera.partial_views:
                 advice = f"the smallest sufficient view is {[*map(int, (*corner, *(corner + side)))]}"
             message = (

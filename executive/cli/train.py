@@ -37,10 +37,11 @@ def command(dataset: Path, out: Path, model: Path | None, rate: float | None, ep
         from executive.cli.progress import show_progress
         from executive.training.train import Settings, load_dataset, train
 
-        for images in load_dataset(dataset).values():
+        splits = load_dataset(dataset)
+        for images in splits.values():
             click.echo(images.summary, err=True)
         with show_progress("training") as progress:
-            train(dataset, out, Settings(model, rate, epochs, seed), _make_epoch_printer(epochs), progress)
+            train(splits, out, Settings(model, rate, epochs, seed), _make_epoch_printer(epochs), progress)
         click.echo(
             "add these lines to the cell file, with paths relative to the folder of the cell file:\n\n"
             "detectors:\n  trained:\n    kind: rfdetr\n"

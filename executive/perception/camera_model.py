@@ -74,14 +74,15 @@ def find_calibration_doubts(camera: CameraConfig) -> Iterator[tuple[str, str]]:
     """Yield key and message for each entry of a calibration that does not fit the images of a camera."""
     if (calibration := camera.calibration) is None:
         return
-    principal_point, size = np.array(calibration.matrix)[[2, 5]], np.array([camera.width, camera.height])
+    principal_point = np.array(calibration.matrix)[[2, 5]]
     fitting_size = np.round(2 * principal_point + 1)
-    if (np.abs(fitting_size / size - 1) > MAX_CENTRE_ERROR).any():
-        sizes = [f"{width:.0f} x {height:.0f} pixels" for width, height in (size, fitting_size)]
+    if (np.abs(fitting_size / (camera.width, camera.height) - 1) > MAX_CENTRE_ERROR).any():
         message = (
-            f"the principal point {principal_point.tolist()} is far from the centre of {sizes[0]}; the matrix"
+            f"the principal point {principal_point.tolist()} is far from the centre of {camera.width} x "
+            f"{camera.height} pixels; the matrix fits {fitting_size[0]:.0f} x {fitting_size[1]:.0f} pixels: "
+            "correct the size of the image, or scale the matrix"
         )
-        yield "matrix", f"{message} fits {sizes[1]}: correct the size of the image, or scale the matrix"
+        yield "matrix", message
     if any(calibration.distortion):
         yield "distortion", "the matrix is that of undistorted images; undistort them with `cv2.undistort`"
 

@@ -23,8 +23,10 @@ IMAGE_SUFFIXES = (
 """Suffixes of image files, in lower case; the reader refuses HEIC, rather than lose its objects silently."""
 SPLITS = ("test", "valid", "train", "")
 """Names of splits, in the order in which they are preferred for an evaluation; "": images without a split."""
-SPLIT_NAME = re.compile("(?:^|[/_])(test|train|val)(?:ing|id|idation)?(?![a-z])", re.IGNORECASE)
-"""Name of a split in a path or in a key."""
+SPLIT_NAME = re.compile("(?:^|_)(test|train|val)(?:ing|id|idation)?(?![a-z])", re.IGNORECASE)
+"""Name of a split in the name of a file or in a key."""
+SPLIT_FOLDER = re.compile(r"(?i)(?:obj_|images_)?(test|train|val)(ing|id|idation)?(\d*|.(data|images|set))")
+"""Name of the folder of a split; a folder such as `test_tubes` is none."""
 COCO_FILE = re.compile(
     r"(^|/)(_?annotations[^/]*|instances[^/]*|annotations/(test|train|val)[^/]*|result)\.json$"
 )
@@ -179,7 +181,7 @@ def _list_yolo_images(dataset: Path, class_file: Path) -> Iterator[tuple[str, Pa
             yield from ((name, split.find_image(line.strip(), str(source))) for line in lines)
     if not sources:
         for path in _list_images(dataset):
-            yield _name_split(str(path.relative_to(dataset).parent)), path
+            yield _name_split(f"{path.relative_to(dataset).parent.as_posix()}/"), path
 
 
 def _list_images(folder: Path) -> Iterator[Path]:
@@ -206,6 +208,8 @@ def _find_path(folders: list[Path], name: str, required_split: str = "") -> Path
 
 
 def _name_split(path: str) -> str:
-    """Return the name of the split in a path or key, or ""."""
-    match = SPLIT_NAME.search(path)
+    """Return the name of the split in a key or in a path, or ""; the path of a folder ends with "/"."""
+    *folders, name = path.split("/")
+    matches = [*map(SPLIT_FOLDER.fullmatch, folders), SPLIT_NAME.search(name)]
+    match = next(filter(None, matches), None)
     return {"val": "valid"}.get(match[1].lower(), match[1].lower()) if match else ""

@@ -26,6 +26,8 @@ MAX_COCO_FILE_SIZE = 500_000_000
 """Maximum size of a COCO file [byte]; the largest annotation file of COCO 2017 has 470 MB."""
 MAX_NORMALIZED = 2.0
 """Maximum absolute value of a normalized coordinate; 0 to 1 is inside of the image."""
+MAX_PIXELS = 1_000_000
+"""Maximum width, height and absolute coordinate in a COCO file [pixel]; JPEG images have up to 65,535."""
 MIN_BOX_SIZE = 1.0
 """Minimum width and height of the box of an object [pixel]."""
 MAX_COPY_DISTANCE = 1.0
@@ -54,17 +56,19 @@ class ImageAnnotation:
     scale: tuple[float, float]
 
 
-Length = Annotated[FiniteFloat, Field(ge=0)]
+Length = Annotated[FiniteFloat, Field(ge=0, le=MAX_PIXELS)]
 """Width or height of a COCO box [pixel]."""
+Coordinate = Annotated[FiniteFloat, Field(ge=-MAX_PIXELS, le=MAX_PIXELS)]
+"""Left or top side of a COCO box [pixel]."""
 
 
 class _CocoImage(BaseModel):
-    """An image of a COCO file; a width or height of 0 is unknown."""
+    """An image of a COCO file; a width or height of 0 or None is unknown."""
 
     id: int
     file_name: str
-    width: int = Field(0, ge=0)
-    height: int = Field(0, ge=0)
+    width: int | None = Field(0, ge=0, le=MAX_PIXELS)
+    height: int | None = Field(0, ge=0, le=MAX_PIXELS)
 
 
 class _CocoObject(BaseModel):
@@ -72,7 +76,7 @@ class _CocoObject(BaseModel):
 
     image_id: int
     category_id: int
-    bbox: tuple[FiniteFloat, FiniteFloat, Length, Length]
+    bbox: tuple[Coordinate, Coordinate, Length, Length]
     iscrowd: bool = False
 
 
@@ -100,6 +104,7 @@ class LabelledDataset:
         split: `train`, `valid` or `test`; "": the first existing split of `dataset_layout.SPLITS`.
 
     Attributes:
+        folder: Folder of the dataset.
         annotations: Annotations by the path of the image.
         classes: Class names in the order of their numbers.
         notes: Numbers of dropped or changed boxes and images, by description.
@@ -110,6 +115,7 @@ class LabelledDataset:
     """
 
     def __init__(self, folder: Path, split: str = "") -> None:
+        self.folder = folder
         splits = dataset_layout.find_splits(folder)
         split = split or next(iter(splits), "")
         self._name = f"{folder}, split {split}" if split else f"{folder}"
@@ -121,7 +127,8 @@ class LabelledDataset:
         self.notes: Counter[str] = Counter()
         self._relative_boxes = [np.zeros((0, 4))]
         is_coco = self._source.file.suffix == ".json"
-        self._property_folder = self._source.file.parent if is_coco else self._source.images[0].parent.parent
+        path = self._source.file if is_coco else self._source.images[0].parent
+        self._property_folder = folder if path == folder else path.parent
         self.classes = self._read_coco() if is_coco else self._read_yolo()
         if _are_corners(np.concatenate(self._relative_boxes)):
             problem = "many boxes end outside of their images, and seem to be left, top, right and bottom"
@@ -204,7 +211,7 @@ class LabelledDataset:
             corners = np.reshape([coco_object.bbox for coco_object in singles], (-1, 4))
             corners[:, 2:] += corners[:, :2]
             labels = [class_names[coco_object.category_id] for coco_object in singles]
-            self._add(path, labels, corners, (image.width, image.height))
+            self._add(path, labels, corners, (image.width or 0, image.height or 0))
         # Exports of Roboflow contain a parent category, which has no objects.
         parents = {entry.supercategory for entry in content.categories if entry.supercategory != entry.name}
         parents -= {class_names[coco_object.category_id] for coco_object in content.annotations}

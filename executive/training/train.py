@@ -46,7 +46,7 @@ class Settings:
 
 
 def train(
-    dataset: Path, out: Path, settings: Settings,
+    splits: Mapping[str, LabelledDataset], out: Path, settings: Settings,
     report_epoch: ReportEpoch = lambda _number, _metrics: None,
     report_batch: ReportBatch = lambda _finished_count, _total_count: None,
 ) -> None:  # fmt: skip
@@ -57,20 +57,19 @@ def train(
     `metrics.csv` with the metrics of each epoch.
 
     Args:
-        dataset: Folder with a COCO or YOLO dataset with the splits `train` and `valid`.
+        splits: The splits `train` and `valid` of a dataset, from `load_dataset`.
         out: Output folder, which is created if it is missing.
         settings: Settings of the training.
         report_epoch: Called after each epoch.
         report_batch: Called after each batch.
 
     Raises:
-        InputError: The dataset is incomplete or damaged, `start_model` does not exist, or the training
-            packages are not installed.
+        InputError: An image is damaged, `start_model` does not exist, or the training packages are not
+            installed.
     """
     start_model, learning_rate = settings.start_model, settings.learning_rate
     if start_model is not None and not start_model.is_file():
         raise InputError(f"there is no model {start_model} to start from; train one first, or omit --from")
-    splits = load_dataset(dataset)
     try:
         from executive.training.architecture import declare_missing_operators, describe_architecture
 
@@ -88,7 +87,7 @@ def train(
     export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model)
     accuracy = evaluate_model(model, labels, splits["valid"], CARD_THRESHOLD)
     card = render_card(
-        title=f"Small RF-DETR trained on {dataset.name}",
+        title=f"Small RF-DETR trained on {splits['train'].folder.name}",
         summary=f"Detects {', '.join(read_labels(labels))} in square images.",
         settings={
             **describe_architecture(),

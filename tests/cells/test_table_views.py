@@ -11,7 +11,7 @@ from executive.cell.config import CellConfig
 from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.cell import SimCell
 from executive.cells.table_views import find_view_errors
-from executive.mission.parse.cell_file import load_cell
+from executive.mission.parse.cell_file import load_cell, read_cell
 from executive.mission.text.file_search import get_shipped_folder
 
 CELLS = get_shipped_folder() / "cells"
@@ -24,7 +24,9 @@ def changed(cell: str, **values: Any) -> CellConfig:
     """Return a shipped cell with other values of its camera."""
     (name,) = load_cell(CELLS / f"{cell}.yaml").cameras
     overrides = {f"cell.cameras.{name}.{key}": str(value) for key, value in values.items()}
-    return load_cell(CELLS / f"{cell}.yaml", overrides)
+    config = read_cell(CELLS / f"{cell}.yaml", overrides).config
+    assert config is not None
+    return config
 
 
 @pytest.mark.parametrize("path", sorted(CELLS.glob("*.yaml")), ids=lambda path: path.stem)
@@ -46,6 +48,7 @@ def test_the_views_of_shipped_cells_show_the_workspace(path: Path) -> None:
         ("depth", {"calibration": INVERSE.replace("-2.2214, 0]", "-2, 0.3]")}, ["table_view"], "exchange"),
         ("depth", {"calibration": INVERSE.replace("461", "46")}, ["calibration"], "2.3 pixels"),
         ("wrist", {"scan_poses": "[scan, home]"}, ["scan_poses", 1], 'from the pose "home"'),
+        ("wrist", {"scan_poses": "[none, scan, home]"}, ["scan_poses", 2], 'from the pose "home"'),
         ("wrist", {"table_view": [200, 120, 440, 360]}, ["table_view"], "view is [103, 27, 534, 458]"),
         ("wrist", {"mount": "fixed"}, ["position"], "100% of the workspace"),
         ("wrist_halves", {"scan_poses": "[left_half]"}, ["scan_poses"], "y -0.22 to -0.02 m"),
@@ -59,6 +62,11 @@ def test_a_view_without_the_workspace_is_named_with_what_it_lacks(
     key_path, message = next(find_view_errors(changed(cell, **values)))
     assert list(key_path[2:]) == keys
     assert fragment in message
+
+
+@pytest.mark.parametrize("cell", ["wrist", "wrist_halves"])
+def test_unknown_scan_poses_are_left_to_another_check(cell: str) -> None:
+    assert list(find_view_errors(changed(cell, scan_poses="[none]"))) == []
 
 
 @pytest.mark.parametrize("kind", [SimCell, FakeCell])

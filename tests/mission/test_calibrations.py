@@ -63,8 +63,9 @@ def is_expected(camera: CameraConfig) -> bool:
         (NINE, f"{{quaternion_wxyz: [0, 0.7072, -0.7072, 0], translation: {T}}}"),
     ],
 )  # fmt: skip
-def test_every_form_of_a_calibration_is_the_same_camera(matrix: str, pose: str) -> None:
-    assert is_expected(read(matrix, pose))
+def test_every_form_of_a_calibration_is_the_same_camera_in_records(matrix: str, pose: str) -> None:
+    record = read(matrix, pose).model_dump(mode="json")
+    assert is_expected(CameraConfig.model_validate(record))
 
 
 @pytest.mark.parametrize(
@@ -78,6 +79,7 @@ def test_every_form_of_a_calibration_is_the_same_camera(matrix: str, pose: str) 
         ("file: nothing.yaml", FLIP, "c.yaml:8:13: error[no-calibration]"),
         ("file: ../c.yaml", FLIP, "outside the folder"),
         ("file: c.yaml", FLIP, "camera_matrix or K"),
+        ("file: cycle.yaml", FLIP, "cycle.yaml:1:1: error[wrong-type]"),
         (f"{NINE}\n      width: 1280\n      height: 960", FLIP, "for 1280 x 960"),
         (NINE, "rotation: [0.7, -0.7, 0, 0]", "quaternion_xyzw or quaternion_wxyz"),
         (NINE, "quaternion_wxyz: [0, 0.9, -0.9, 0]", "norms of rows: 1.273"),
@@ -87,9 +89,11 @@ def test_every_form_of_a_calibration_is_the_same_camera(matrix: str, pose: str) 
         (NINE, "rotation: [0.9, -0.5, 0, 0.5, 0.9, 0, 0, 0, 1]", "up to 0.06"),
         (NINE, "rotation: [180, 0, 0]", "c.yaml:9:36: error[out-of-range]"),
         (NINE, "rotation: [0, 0, 0], quaternion_wxyz: [1, 0, 0, 0]", "needs exactly one of rotation"),
+        (NINE, "quaternion_xyzw: null", "needs exactly one of rotation"),
     ],
 )
 def test_a_wrong_calibration_is_refused_at_its_place(matrix: str, rotation: str, expected: str) -> None:
+    Path("cycle.yaml").write_text("camera_matrix: {file: cycle.yaml}\n")
     with pytest.raises(MissionError, match=re.escape(expected)):
         read(matrix, f"{{{rotation}, translation: {T}}}")
 
@@ -127,6 +131,14 @@ def test_an_error_in_a_file_is_found_in_the_file(old: str, new: str, expected: s
 def test_distortion_is_doubtful() -> None:
     camera = read(f"{NINE}\n      distortion: [[-0.3, 0.1, 0, 0, 0]]")
     assert [key for key, _ in find_calibration_doubts(camera)] == ["distortion"]
+
+
+def test_only_a_camera_has_a_calibration() -> None:
+    Path("c.yaml").write_text(
+        "base: overhead.yaml\ncell: c\nobjects:\n"
+        "  calibration: {urdf: none.urdf, height: 0.04, radius: 0.02, colours: [[1, 0, 0], [0, 1, 0]]}\n"
+    )
+    assert load_cell(Path("c.yaml")).objects["calibration"].colours == ((1, 0, 0), (0, 1, 0))
 
 
 def test_a_matrix_in_rows_of_an_earlier_record_is_read() -> None:

@@ -51,8 +51,9 @@ def check_equal(images: Any, samples: Any) -> None:
 
 @pytest.mark.parametrize("name", VARIANTS)
 def test_a_dataset_of_another_tool_is_read_like_the_clean_one(tmp_path, samples, name):
-    VARIANTS[name](tmp_path, samples)
-    images = LabelledDataset(tmp_path)
+    (tmp_path / "ignored.json").write_text("a file of others")
+    VARIANTS[name](tmp_path / "data", samples)
+    images = LabelledDataset(tmp_path / "data")
     images.match_classes(CLASSES, "detector eye")
     check_equal(images, samples)
     assert sorted(map(str.lower, images.classes))[:2] == ["cube", "duck"]
@@ -91,6 +92,11 @@ def test_the_summary_states_objects_and_dropped_boxes(tmp_path, samples):
     write_coco(tmp_path, samples, change=COCO["outside"]["change"])
     counts = "2 images; objects: cube 1, duck 2, sphere 1; 4 boxes outside of the image dropped"
     assert LabelledDataset(tmp_path).summary == f"{tmp_path}, split test: {counts}"
+
+
+def test_a_folder_that_starts_like_a_split_is_none(tmp_path, samples):
+    write_yolo(tmp_path, samples, folder="test_tubes", labels="test_tubes")
+    assert f"{tmp_path}: 2 images" in LabelledDataset(tmp_path).summary
 
 
 def test_a_lost_label_file_is_counted_and_an_upper_case_one_is_read(tmp_path, samples):
@@ -142,6 +148,8 @@ NAME, BOX = ("images", 0, "file_name"), ("annotations", 0, "bbox")
         (set_value("images", value=[{}]), "images[0].id: Field required"),
         (set_value("annotations", 0, "image_id", value=9), "annotations[0].image_id: no id 9; ids: 0"),
         (set_value(*BOX, value=[1, 2, 3, float("nan")]), "bbox[3]: Input should be a finite number"),
+        (set_value(*BOX, value=[-1e308, 2, 1e308, 4]), "bbox[0]: Input should be greater than or equal to"),
+        (set_value("images", 0, "width", value=10**400), "images[0].width: Input should be less than"),
         (set_value(*BOX, value=[1, 2, -3, 4]), "bbox[2]: Input should be greater than or equal to 0"),
         (set_value("images", 1, "id", value=0), "have the same id"),
         (set_value(*NAME, value="./a1.png"), "two images have the same file_name"),

@@ -13,19 +13,14 @@ from executive.errors import InputError
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.evaluation.metrics import Distribution, Evaluation
 from executive.training.model_card import read_epochs, render_card
-from executive.training.train import Settings, choose_learning_rate, train
+from executive.training.train import Settings, choose_learning_rate, load_dataset, train
 
 
-@pytest.mark.parametrize(
-    ("start", "text"),
-    [
-        (None, "split train contains no labelled images"),
-        ("old.pth", r"no model .*old\.pth to start from"),
-    ],
-)
-def test_a_training_that_cannot_start_is_refused(tmp_path, start, text):
-    with pytest.raises(InputError, match=text):
-        train(tmp_path, tmp_path / "out", Settings(start and tmp_path / start))
+def test_a_training_that_cannot_start_is_refused(tmp_path):
+    with pytest.raises(InputError, match="split train contains no labelled images"):
+        load_dataset(tmp_path)
+    with pytest.raises(InputError, match=r"no model .*old\.pth to start from"):
+        train({}, tmp_path / "out", Settings(tmp_path / "old.pth"))
 
 
 def test_a_training_goes_on_in_smaller_steps_if_the_checkpoint_knows_its_labels(tmp_path):
@@ -49,7 +44,7 @@ def test_training_without_the_extra_says_how_to_install_it(tmp_path):
         InputError,
         match='package "torch"; install the extra, about 3 GB to download on Linux: uv sync --extra train',
     ):
-        train(tmp_path, tmp_path / "out", Settings())
+        train(load_dataset(tmp_path), tmp_path / "out", Settings())
     assert not (tmp_path / "out").exists()
 
 

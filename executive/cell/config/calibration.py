@@ -45,17 +45,23 @@ class TransformConfig(Section):
     @field_validator("rotation", "quaternion_xyzw", "quaternion_wxyz")
     @classmethod
     def _check_rotation(cls, entries: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        if not entries:  # `_check_keys` reports a missing rotation.
+            return entries
         if info.field_name == "rotation" and len(entries) not in (3, 9):
-            remedy = "name a quaternion by its order, quaternion_xyzw or quaternion_wxyz"
-            raise ValueError(f"needs 3 or 9 numbers, not {len(entries)}; {remedy}")
+            raise ValueError(
+                f"needs 3 or 9 numbers, not {len(entries)}; "
+                "name a quaternion by its order, quaternion_xyzw or quaternion_wxyz"
+            )
         # The rows of R, and a unit quaternion as the only row, are orthonormal.
         rows = np.reshape(entries, (3, 3) if len(entries) == 9 else (1, -1))
         error = np.abs(rows @ rows.T - np.eye(len(rows))).max()
         determinant = np.linalg.det(rows) if len(rows) == 3 else 1.0
         if len(entries) > 3 and (error > MAX_ROTATION_ERROR or determinant < 0):
             norms = ", ".join(f"{norm:.4g}" for norm in np.linalg.norm(rows, axis=1))
-            figures = f"norms of rows: {norms}; determinant: {determinant:.3g}; R Rᵀ - I up to {error:.3g}"
-            raise ValueError(f"must not be scaled, reflected or rounded to few decimals ({figures})")
+            raise ValueError(
+                "must not be scaled, reflected or rounded to few decimals (norms of rows: "
+                f"{norms}; determinant: {determinant:.3g}; R Rᵀ - I up to {error:.3g})"
+            )
         return entries
 
     @model_validator(mode="after")
@@ -114,8 +120,10 @@ class CalibrationConfig(Section):
     def _check_matrix(cls, entries: tuple[float, ...]) -> tuple[float, ...]:
         fixed_entries = entries[1:2] + entries[3:4] + entries[6:]
         if fixed_entries != (0, 0, 0, 0, 1) or min(entries[0], entries[4]) <= 0:
-            requirement = "the camera matrix K, [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with fx and fy above 0"
-            raise ValueError(f"must be {requirement}, and neither transposed nor P, not {list(entries)}")
+            raise ValueError(
+                "must be the camera matrix K, [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with fx and fy above 0, "
+                f"and neither transposed nor P, not {list(entries)}"
+            )
         return entries
 
     @model_validator(mode="after")

@@ -93,12 +93,15 @@ class CameraConfig(Section):
         left, top, right, bottom = self.table_view
         is_inside = 0 <= left < right <= self.width and 0 <= top < bottom <= self.height
         if not is_inside or right - left != bottom - top:
-            requirement = f"a square inside its image of {self.width} x {self.height} pixels"
-            raise ValueError(f"needs a table_view that is {requirement}, not {list(self.table_view)}")
+            raise ValueError(
+                f"needs a table_view that is a square inside its image of {self.width} x {self.height} "
+                f"pixels, not {list(self.table_view)}"
+            )
         present = [key for key in POSE_AND_FOV_KEYS if getattr(self, key) is not None]
         if self.calibration is not None and present:
             raise ValueError(f"must not have {', '.join(present)} besides calibration, which defines them")
-        image, calibration = f"{self.width} x {self.height}", self.calibration
+        image = f"{self.width} x {self.height}"
+        calibration = self.calibration
         if calibration and calibration.width and image != f"{calibration.width} x {calibration.height}":
             raise ValueError(
                 f"has images of {image} pixels, but its calibration is for {calibration.width} x "

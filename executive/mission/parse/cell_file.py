@@ -154,16 +154,20 @@ class _CellFileReader:
             return None
         return root
 
-    def arrange_matrices(self, node: YamlNode, is_calibration: bool = False) -> YamlNode:
-        """Return a tree whose calibrations contain the entries of files, and each matrix as one list."""
+    def arrange_matrices(self, node: YamlNode, keys: KeyPath = ()) -> YamlNode:
+        """Return a tree whose calibrations contain the entries of files, and each matrix as one list.
+
+        `keys` is the path of `node`.
+        """
+        is_calibration = keys[:1] == ("cameras",) and keys[2:3] == ("calibration",)
         if not isinstance(node, YamlMapping):
             return flatten(node) if is_calibration else node
         if is_calibration and (data := node.get("data")):
             return flatten(data)
         entries = []
-        for entry in self._insert_file(node).entries if is_calibration else node.entries:
-            is_inside = is_calibration or entry.key.text == "calibration"
-            entries.append(replace(entry, value=self.arrange_matrices(entry.value, is_inside)))
+        # Only the calibration itself, and none of its parts, can name a file.
+        for entry in self._insert_file(node).entries if is_calibration and len(keys) == 3 else node.entries:
+            entries.append(replace(entry, value=self.arrange_matrices(entry.value, (*keys, entry.key.text))))
         return replace(node, entries=tuple(entries))
 
     def _insert_file(self, calibration: YamlMapping) -> YamlMapping:
