@@ -128,7 +128,8 @@ KeyPath = tuple[str | int, ...]
 class CellKind(Protocol):
     """Factory of work cells. Each entry point of the group `executive.cells` is such a factory.
 
-    A kind may have a method `compute_mass`, which returns the mass [kg] of a class without a declared mass.
+    A kind may have a method `compute_mass(section)`, which returns the mass [kg] of the objects of a class,
+    declared or not, or raises an `InputError`; `section` is an `executive.cell.config.ObjectConfig`.
     """
 
     def __call__(

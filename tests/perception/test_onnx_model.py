@@ -117,7 +117,7 @@ def test_a_model_of_another_kind_is_refused_in_a_sentence(tmp_path, inputs, arra
 
 def test_the_trial_of_a_model_survives_what_the_model_does(tmp_path, monkeypatch):
     path = write(tmp_path, images(1, 3, 8, 8), outputs(), "Nonsense")
-    assert "not a model that onnxruntime can run" in find_model_errors(path, ("cube",), 1)[0]
+    assert "onnxruntime can run: Load model from" in find_model_errors(path, ("cube",), 1)[0]
     abort = [sys.executable, "-c", "import os; os.abort()"]
     monkeypatch.setattr(onnx_model, "build_command", lambda *arguments: abort)
     assert "crashes, or takes over" in find_model_errors(path, ("cube",), 2)[0]

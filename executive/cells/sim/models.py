@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-import signal
+import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -31,8 +32,10 @@ from executive.processes import build_command
 
 DEFAULT_MESH_MASS = 0.05
 """Mass of a mesh for which the cell file declares no mass [kg]."""
-MIN_MASS, MAX_MASS = 1e-4, 1000.0
-"""Minimum and maximum mass of an object in a URDF [kg]; the same as of a mass in a cell file."""
+MIN_MASS = 1e-4
+"""Minimum mass of an object in a URDF [kg]; the same as of a mass in a cell file."""
+MAX_MASS = 1000.0
+"""Maximum mass of an object in a URDF [kg]; the same as of a mass in a cell file."""
 MAX_ORIGIN_OFFSET = 0.5
 """Maximum horizontal distance between centre and origin of a URDF, relative to the radius."""
 SIZE_TOLERANCE = 0.003
@@ -40,7 +43,7 @@ SIZE_TOLERANCE = 0.003
 ROLLING_FRICTION = 0.0005
 """Coefficient of rolling and spinning friction; without it, balls would never come to rest."""
 TRIAL_TIMEOUT = 30
-"""Maximum duration of the trial of a model [s]."""
+"""Maximum duration of the trial of a model, with the start of the process [s]."""
 DROP_HEIGHT = 0.002
 """Height above the table at which the model is released [m]."""
 STEP_COUNT = 360
@@ -163,25 +166,27 @@ def build_simulated_class(label: str, config: ObjectConfig) -> ObjectClass:
 def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message for each model of a cell file that is missing, invalid, or of a wrong size.
 
-    A child process tries each model that is not shipped with the executive or PyBullet.
+    A child process tries each model that is not shipped with the executive or PyBullet; this process reads
+    the model afterwards, because reading may take very long.
     """
+    shipped_folders = (Path(pybullet_data.getDataPath()), get_shipped_folder() / "cells" / "fasteners")
     for label, object_config in config.objects.items():
         try:
+            path = find_model(object_config.mesh or object_config.urdf)
+            if not any(path.is_relative_to(folder.resolve()) for folder in shipped_folders):
+                _try_in_child_process(object_config, path, path.stat().st_mtime_ns)
             compute_mass(object_config)
-            mesh = load_mesh(object_config)
-            errors = [*_find_wrong_sizes(label, object_config, mesh)]
-            if not errors:
-                _try_in_child_process(object_config)
-            yield from errors
+            yield from _find_wrong_sizes(label, object_config)
         except InputError as error:
             yield ("objects", label, "mesh" if object_config.mesh else "urdf"), str(error)
 
 
-def _find_wrong_sizes(label: str, config: ObjectConfig, mesh: Mesh) -> Iterator[tuple[KeyPath, str]]:
+def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message if the declared height or radius of a class differs from that of its model.
 
     The executive computes the centre, the top and the free space of an object from height and radius.
     """
+    mesh = load_mesh(config)
     for name, model_size in (("height", mesh.top - mesh.bottom), ("radius", mesh.radius)):
         declared_size = getattr(config, name)
         if not abs(declared_size - model_size) <= SIZE_TOLERANCE:  # also True for NaN
@@ -189,31 +194,42 @@ def _find_wrong_sizes(label: str, config: ObjectConfig, mesh: Mesh) -> Iterator[
             yield ("objects", label, name), message + f"correct {name}, scale or upright_deg"
 
 
-def _try_in_child_process(config: ObjectConfig) -> None:
-    """Call `try_model` in a child process, which the engine may crash; skip shipped models.
+@lru_cache(maxsize=64)
+def _try_in_child_process(config: ObjectConfig, path: Path, _change_time: int) -> None:
+    """Call `try_model` in a child process, which the model at `path` may crash or keep busy.
+
+    `_change_time` distinguishes versions of the file; the cache contains only models without errors.
 
     Raises:
-        InputError: The engine crashed, or `try_model` failed.
+        InputError: The child process crashed or took too long, or `try_model` failed.
     """
-    path = find_model(config.mesh or config.urdf)
-    shipped_folders = (Path(pybullet_data.getDataPath()), get_shipped_folder() / "cells" / "fasteners")
-    if any(path.is_relative_to(folder.resolve()) for folder in shipped_folders):
-        return
     command = build_command(__name__, config.model_dump_json())
-    trial = subprocess.run(command, capture_output=True, text=True, check=False)
+    crash = f"the model {path.name} crashes PyBullet, or takes over {TRIAL_TIMEOUT} s; simplify its meshes"
+    with tempfile.TemporaryDirectory() as folder:  # a crash would leave the files of `convert_model`
+        environment = {**os.environ, "TMPDIR": folder}
+        try:
+            trial = subprocess.run(
+                command, capture_output=True, text=True, timeout=TRIAL_TIMEOUT, env=environment, check=False
+            )
+        except subprocess.TimeoutExpired:
+            raise InputError(crash) from None
+    if trial.returncode < 0:  # a signal ended the process
+        raise InputError(crash)
     if trial.returncode:
         message = trial.stderr.partition("InputError: ")[2].strip()
-        raise InputError(
-            message or f"PyBullet crashes or hangs on the model {path.name}; simplify its meshes"
-        )
+        reason = trial.stderr.strip().rpartition("\n")[2]
+        raise InputError(message or f"the trial of the model {path.name} failed: {reason}")
 
 
 def try_model(config: ObjectConfig) -> None:
-    """Drop a model on a table, and compare its shapes at rest with its class.
+    """Drop a model of the declared size on a table, and compare its shapes at rest with its class.
 
     Raises:
         InputError: PyBullet cannot load the model, or the model does not lie as its class declares.
     """
+    compute_mass(config)
+    if [*_find_wrong_sizes("", config)]:
+        return  # the caller reports the sizes
     client = build_drop_world()
     mesh = load_mesh(config)
     _place_mesh(config, Pose.identity(), "collision")  # refuses shapes that PyBullet would ignore
@@ -222,14 +238,19 @@ def try_model(config: ObjectConfig) -> None:
         client.stepSimulation()
     vertices = locate_object(client, body, config).apply(mesh.vertices)
     visual = np.array([vertices.min(axis=0), vertices.max(axis=0)])
-    collision = np.array(client.getAABB(body))
-    centre_of_mass, _ = client.getBasePositionAndOrientation(body)
-    is_inside = (visual[0] <= centre_of_mass).all() and (centre_of_mass <= visual[1]).all()
-    max_error = max(np.abs(visual[:, 2] - [0, config.height]).max(), np.abs(collision - visual).max())
-    if not (is_inside and max_error <= MAX_REST_ERROR):  # also True for NaN
-        problem = f"the model {Path(config.mesh or config.urdf).name} does not lie on the table as declared: "
-        problem += f"z of its <visual> is {visual[:, 2].round(3).tolist()}, not [0, {config.height:g}], "
-        raise InputError(f"{problem}or <collision> or <inertial> is elsewhere; correct them or upright_deg")
+    centre, _ = client.getBasePositionAndOrientation(body)
+    lower, upper = (visual.round(3) + 0.0).tolist()  # the sum replaces -0.0 by 0.0
+    problem = f"the model {Path(config.mesh or config.urdf).name} lies on the table with"
+    # Each condition is also true for NaN.
+    if not ((visual[0] <= centre).all() and (centre <= visual[1]).all()):
+        place = f"its centre of mass at {np.round(centre, 3).tolist()} m, outside of its visual"
+        raise InputError(f"{problem} {place}, {lower} to {upper} m; correct <inertial>")
+    if not np.abs(visual[:, 2] - [0, config.height]).max() <= MAX_REST_ERROR:
+        heights = f"z of its visual from {lower[2]:g} to {upper[2]:g} m, not 0 to {config.height:g} m"
+        raise InputError(f"{problem} {heights}; correct <collision>, <inertial> or upright_deg")
+    if not (difference := np.abs(client.getAABB(body) - visual).max()) <= MAX_REST_ERROR:
+        box = f"a box around its collision shape that differs by {difference:.3f} m from that of its visual"
+        raise InputError(f"{problem} {box}, more than {MAX_REST_ERROR:g} m; correct <collision> or <visual>")
 
 
 def build_drop_world() -> BulletClient:
@@ -287,5 +308,4 @@ def _place_mesh(config: ObjectConfig, X_OL: Pose, tag: str = "visual") -> Mesh:
 
 
 if __name__ == "__main__":
-    signal.alarm(TRIAL_TIMEOUT)  # the signal ends the process
     try_model(ObjectConfig.model_validate_json(sys.argv[1]))

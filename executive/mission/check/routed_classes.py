@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from executive.cell.config import CellConfig, ObjectConfig
+from executive.errors import InputError
 from executive.geometry import GRAVITY
 from executive.manipulation.obstacles import MAX_ROLL_DISTANCE
 from executive.mission.findings import Finding, make_error, make_warning
@@ -18,25 +19,31 @@ def check_weights(
 ) -> Iterator[Finding]:
     """Yield an error for each routed class that is too heavy for the tool, or a warning if it may be dropped.
 
-    The planner limits the accelerations so that the seal withstands twice the force, but it never lifts with
-    less than `MIN_LIFT_ACCELERATION`. `compute_mass` returns the mass of a simulated object [kg]; if it is
-    None, only classes with a declared mass are checked.
+    The planner limits the accelerations so that the seal withstands `SAFETY_FACTOR` times the force, but it
+    never lifts with less than `MIN_LIFT_ACCELERATION`. `compute_mass` is that of `CellKind`; if it is None,
+    only classes with a declared mass are checked.
     """
     force = config.tool.force
     for label in sorted({route.label for route in mission.routes} & config.objects.keys()):
         section = config.objects[label]
-        mass = compute_mass(section) if compute_mass else section.mass or 0.0
-        weight, pull = (mass * a for a in (GRAVITY, GRAVITY + MIN_LIFT_ACCELERATION))
-        problem = f"a {label} of {mass:g} kg"
         key = "mass" if section.mass is not None else "urdf" if section.urdf else "mesh"
         span = cell.find_span(("objects", label, key))
         hint = "Correct the mass, delete the route, or use a tool with a larger force."
+        try:
+            mass = compute_mass(section) if compute_mass else section.mass or 0.0
+        except InputError as error:
+            yield make_error(span, "robot", f"the mass of {label} is unknown: {error}", hint)
+            continue
+        problem = f"a {label} of {mass:g} kg"
+        weight = mass * GRAVITY
+        pull = mass * (GRAVITY + MIN_LIFT_ACCELERATION)
         if weight > force:
             message = f"{problem} weighs {weight:.1f} N, more than the {force:g} N that the tool withstands"
             yield make_error(span, "too-heavy", message, hint)
         elif pull > force / SAFETY_FACTOR:
-            message = f"{problem} pulls with {pull:.1f} N in the slowest lift, more than half of the "
-            yield make_warning(span, "too-heavy", f"{message}{force:g} N that the tool withstands", hint)
+            limit = f"{force:g} N / safety factor {SAFETY_FACTOR:g} = {force / SAFETY_FACTOR:.3g} N"
+            message = f"{problem} pulls with {pull:.1f} N in the slowest lift, more than {limit}"
+            yield make_warning(span, "too-heavy", message, hint)
 
 
 def check_slots(cell: CellFile, config: CellConfig, mission: Mission) -> Iterator[Finding]:
@@ -51,7 +58,7 @@ def check_slots(cell: CellFile, config: CellConfig, mission: Mission) -> Iterato
         for axis, size, count in zip("xy", bin.size, bin.slots, strict=False):
             min_size = radius + max(radius, obstacle_radius if count > 1 else 0.0)
             if size / count < min_size:
-                message = f"a slot of {name} is {size / count:.4f} m long along {axis}, but a {label} "
-                message += f"with its clearance needs {min_size:.4f} m"
+                problem = f"a slot of {name} is {size / count:.4f} m long along {axis}"
+                message = f"{problem}, but a {label} with its clearance needs {min_size:.4f} m"
                 hint = "Give the bin fewer slots or a larger size."
                 yield make_error(cell.find_span(("bins", name, "slots")), "layout", message, hint)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -142,8 +143,8 @@ class OnnxModel:
 
 
 def _shorten(error: Exception) -> str:
-    """Return the message of onnxruntime after the name of its C++ function, as one line."""
-    return " ".join(str(error).rpartition(") ")[2].split())
+    """Return the message of onnxruntime as one line, without error code, C++ file and C++ function."""
+    return " ".join(re.sub(r"^\[\w+\] : \d+ : \w+ : |/\S+:\d+ [^(]*\([^)]*\) ", "", str(error)).split())
 
 
 @functools.lru_cache(maxsize=4)

@@ -109,8 +109,9 @@ def test_geometry_far_from_the_origin_is_moved_to_the_object_frame(tmp_path: Pat
     [
         ({"inertial": ""}, "urdf", "a mass of 0 kg"),
         ({"inertial": INERTIAL.replace("0.1", "-1")}, "urdf", "a mass of -1 kg"),
-        ({"inertial": AWAY + INERTIAL}, "urdf", "does not lie on the table"),
-        ({"collision": '<box size="0.05 0.05 0.1"/>'}, "urdf", "does not lie on the table"),
+        ({"inertial": AWAY + INERTIAL}, "urdf", "centre of mass at .* outside of its visual"),
+        ({"collision": '<box size="0.05 0.05 0.1"/>'}, "urdf", r"from 0\.025 to 0\.075 m, not 0 to 0\.05"),
+        ({"collision": '<box size="0.03 0.05 0.05"/>'}, "urdf", r"differs by 0\.010 m"),
         ({"visual": '<box size="0.05 0.05 0"/>'}, "urdf", r'size="0\.05 0\.05 0" in a <box>'),
         ({"visual": '<plane normal="0 0 1"/>'}, "urdf", "geometry <plane>"),
         ({"visual": '<mesh filename="p.stl" scale="1000 1000 1000"/>'}, "height", "height of 50"),
@@ -131,11 +132,24 @@ def test_a_model_that_no_tool_could_sort_is_refused(
         raise InputError(message)
 
 
-def test_a_crash_of_the_engine_is_an_error_of_the_model(
-    overhead: CellConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("script", "reason"),
+    [
+        ("mktemp -t models_XXX; kill -SEGV $$", "model m.urdf crashes PyBullet"),
+        ("exec sleep 9", "takes over 0.2 s"),
+        ("echo MemoryError >&2; exit 1", "trial of the model m.urdf failed: MemoryError"),
+        ("mkdir $0/once", "height of 0.0500 m"),
+    ],
+)
+def test_the_child_process_reads_a_model_first_and_once_and_may_crash(
+    overhead: CellConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, reason: str
 ) -> None:
-    monkeypatch.setattr(models, "build_command", lambda *_: ["sh", "-c", "kill -SEGV $$"])
-    ((_, message),) = find_model_errors(
-        overhead.model_copy(update={"objects": {"part": write(tmp_path, BOX)}})
-    )
-    assert "crashes or hangs on the model m.urdf" in message
+    part = write(tmp_path, BOX).model_copy(update={"height": 0.1})
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr(models, "TRIAL_TIMEOUT", 0.2)
+    monkeypatch.setattr(models, "build_command", lambda *_: ["sh", "-c", script, str(tmp_path)])
+    config = overhead.model_copy(update={"objects": {"part": part}})
+    (_, (_, message)) = [*find_model_errors(config), *find_model_errors(config)]
+    assert reason in message
+    assert not [*tmp_path.glob("models_*")]

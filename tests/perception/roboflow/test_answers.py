@@ -104,6 +104,8 @@ def test_an_oriented_box_becomes_the_box_around_it(angle, x, y):
         ),
         ([NESTED], "60 x 80 pixels, but the sent image has 100 x 80"),
         ([[CUBE], []], "predictions per crop without the place of the crop"),
+        ([IN_CROP, CUBE], "predictions per crop without the place of the crop"),
+        (answer(IN_CROP, CUBE, image={"width": 50, "height": 40}), "50 x 40 pixels, but the sent image"),
         (
             [answer(CUBE, image={"width": 50, "height": 40})],
             "50 x 40 pixels, but the sent image has 100 x 80",
@@ -157,6 +159,7 @@ def test_whatever_a_server_says_only_sound_boxes_get_in(said):
     ("host", "variable", "exempt", "is_named"),
     [
         ("lab", "HTTP_PROXY", "", True), ("lab", "ALL_PROXY", "", True), ("lab", "HTTPS_PROXY", "", False),
+        ("localhost.lan", "HTTP_PROXY", "", True), ("127.lan", "HTTP_PROXY", "", True),
         ("127.0.0.1", "HTTP_PROXY", "", False), ("10.0.0.5", "HTTP_PROXY", "10.0.0.0/8", False),
     ],
 )  # fmt: skip

@@ -6,7 +6,7 @@ inference-sdk does not validate answers: it returns any JSON, for instance `{"fo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -87,11 +87,11 @@ def read_answer(answer: Any, size: tuple[int, int], is_of_crop: bool = False) ->
     except ValidationError as error:
         raise ValueError(_describe_first_error(error)) from None
     # The size of the image in an answer about a crop is the size of the crop.
-    origins = [prediction.origin for prediction in validated.predictions if prediction.origin]
-    images: Sequence[_ImageSize | None] = origins or [validated.image]
-    if is_of_crop and validated.predictions and not any(images):
+    origins = [prediction.origin for prediction in validated.predictions]
+    images = [origin or validated.image for origin in origins]
+    if (is_of_crop or any(origins)) and not all(images):
         raise ValueError("it contains predictions per crop without the place of the crop in the image")
-    image_sizes = {(image.width, image.height) for image in images if image}
+    image_sizes = {(image.width, image.height) for image in images or [validated.image] if image}
     for width, height in image_sizes - {size, (0.0, 0.0)}:
         problem = f"it is for an image of {width:g} x {height:g} pixels"
         raise ValueError(f"{problem}, but the sent image has {size[0]} x {size[1]}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Literal
 from urllib.parse import urlsplit
 from urllib.request import getproxies
@@ -57,7 +58,8 @@ class RoboflowOptions(DetectorOptions):
     @property
     def is_local(self) -> bool:
         """True if the server runs on this computer."""
-        return (urlsplit(self.url).hostname or "").startswith(("localhost", "127.", "0.0.0.0", "::1"))
+        pattern = r"localhost|0\.0\.0\.0|::1|127(\.\d+){1,3}"
+        return re.fullmatch(pattern, urlsplit(self.url).hostname or "") is not None
 
     @property
     def server_origin(self) -> str:
