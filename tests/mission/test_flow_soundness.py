@@ -249,9 +249,7 @@ def sound(tree: Tree) -> CheckContext | None:
     mission, malformed = parse_mission(root, {}, parser), parser.findings
     expanded = expand(mission, SKILLS, {})
     assert expanded.tree is not None
-    case = CheckContext(
-        mission, assign_paths(expanded.tree), (), SKILLS, load_control_nodes(), None, {}, None
-    )
+    case = CheckContext(mission, assign_paths(expanded.tree), (), SKILLS, load_control_nodes(), None, {})
     findings = [*wrong, *malformed, *expanded.findings, *run_checks(case)]
     return None if any(finding.severity == "error" for finding in findings) else case
 
