@@ -170,8 +170,8 @@ why no node in missions/sort_overhead.yaml handled the failure, from the root do
   repeat                this failure is not in until (choice.no_candidate) (line N)
   carry_and_watch: try  caught Transit.blocked (link 5 met a wrench), but the handler failed
                         (missions/library/sorting.yaml:N)
-  put_aside: try        catches only PutDown.dropped (missions/library/sorting.yaml:N)
-  PutDown of cube-1     tree/2:repeat/do/carry_and_watch/try/catch/3/put_aside/try/do/PutDown
+  put_off: try          catches only PutDown.dropped (missions/library/sorting.yaml:N)
+  PutDown of cube-1     tree/2:repeat/do/carry_and_watch/try/catch/3/put_off/try/do/PutDown
                         (missions/library/sorting.yaml:N)
 readings    arm.met = link 5 met a wrench (1.23 s), tool.bears = 7.9 (0.75 s), tool.holding = True (0.74 s)
 last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
