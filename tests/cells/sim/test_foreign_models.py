@@ -104,6 +104,7 @@ def test_geometry_far_from_the_origin_is_moved_to_the_object_frame(tmp_path: Pat
     try_model(config)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("parts", "key", "reason"),
     [
