@@ -92,8 +92,15 @@ MORE: list[tuple[ScheduledFault, str, list[str], str, int]] = [
         during("*/Transit", effects.arm_collides(), activations=(1, 2, 3)),
         "*/Transit",
         ["blocked"] * 3,
+        "SUCCESS",
+        0,
+    ),
+    (
+        during("*/Transit", effects.arm_collides(), activations=tuple(range(1, 37))),
+        "*/Transit",
+        ["blocked"] * 36,
         "INCOMPLETE",
-        1,
+        6,
     ),
     (during("*/Approach", effects.no_path(), activations=2), "*/Approach", ["unreachable"], "INCOMPLETE", 1),
     (
