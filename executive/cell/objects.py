@@ -58,7 +58,7 @@ class KnownItem:
             `rejected`; `skipped`: without a route or beyond a quota; `lost`: dropped and not found since.
         bin: Name of the bin that contains the item, or "".
         position: Last known position of the centre `(3,)` [m] in the world.
-        attempts: Number of failed attempts to pick the item.
+        attempts: Number of failed attempts to pick the item, or another item at its position.
         drops: Number of times that the tool dropped the item.
         deferrals: Number of times that the item was deferred.
         deferral_rank: Rank among the deferred items, in the order of deferral; 0 if the item is not deferred.

@@ -159,16 +159,19 @@ class ItemRecord:
             self.belief.look_count, self.failed_pick_count, self.bin, self.reason,
         )  # fmt: skip
 
-    def make_known_item(self, *, is_skipped: bool) -> KnownItem:
-        """Return the item for skills; `is_skipped`: the mission does not sort the class any more."""
+    def make_known_item(self, *, is_skipped: bool, attempts: int) -> KnownItem:
+        """Return the item for skills; `is_skipped`: the mission does not sort the class any more.
+
+        `attempts` is the number of failed attempts to pick the object at the position of the item.
+        """
         state = self.state.value
         if self.state is State.DROPPED:
             state = State.REJECTED.value if self.reason else State.LOST.value
         elif self.state is State.SEEN:
             state = State.SKIPPED.value if is_skipped else "deferred" if self.deferral_rank else "open"
         return KnownItem(
-            self.item, self.label, state, self.bin, self.position, self.failed_pick_count,
-            self.drop_count, self.deferral_count, self.deferral_rank,
+            self.item, self.label, state, self.bin, self.position, attempts, self.drop_count,
+            self.deferral_count, self.deferral_rank,
         )  # fmt: skip
 
     def distance_to(self, position: Array) -> float:

@@ -14,6 +14,7 @@ from executive.cell.objects import Item, KnownItem, ObjectClass, Target
 from executive.cell.protocols import Routes
 from executive.cell.quotas import Quotas
 from executive.events import Emit
+from executive.geometry import Array
 from executive.ledger.bin_contents import BinContents
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
@@ -57,6 +58,8 @@ class LedgerQueries:
 
     def __post_init__(self) -> None:
         self.unknown_labels: Counter[str] = Counter()
+        self._failed_picks: list[tuple[Item, Array]] = []
+        """Item and position `(3,)` [m] of each failed attempt to pick; see `_count_attempts`."""
         self._records = ItemRecords(self.emit)
         self._certainty = Certainty(self.config, find_classes_distinct_by_touch(self.classes))
         self._bin_contents = BinContents(self.config, self.bins, self.routes, self._records, self.quotas)
@@ -147,7 +150,8 @@ class LedgerQueries:
     def describe(self, item: Item) -> KnownItem:
         """Return the present knowledge about an item."""
         record = self._records.find(item)
-        return record.make_known_item(is_skipped=bool(self._explain_skipped_item(record)))
+        is_skipped = bool(self._explain_skipped_item(record))
+        return record.make_known_item(is_skipped=is_skipped, attempts=self._count_attempts(record))
 
     def list_known_items(self) -> Sequence[KnownItem]:
         """Return all items that exist with a probability of at least 0.5, in the order of detection."""
@@ -172,6 +176,15 @@ class LedgerQueries:
     def explain_skipped_class(self, label: str) -> str:
         """Return the reason why the mission does not sort further objects of a class, or ""."""
         return self._bin_contents.explain_skipped_class(label)
+
+    def _count_attempts(self, record: ItemRecord) -> int:
+        """Return the number of failed attempts to pick an item, or to pick another item at its position.
+
+        Two objects of a class may exchange their items if looks miss one of them.
+        """
+        other_positions = [position for item, position in self._failed_picks if item != record.item]
+        distances = [record.distance_to(position) for position in other_positions]
+        return record.failed_pick_count + sum(distance <= self.config.gate for distance in distances)
 
     def _needs_look(self, record: ItemRecord) -> bool:
         """Return True if too few looks showed an item; no touch proves an item of no class."""

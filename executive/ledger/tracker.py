@@ -94,6 +94,7 @@ class Tracker(LedgerQueries):
             return presence
         if not self._certainty.is_position_empty(record):
             return Presence.UNSURE
+        self._forget_failed_picks(record)
         record.mark_as_taken_away(self.change_count)
         self._records.emit(record)
         return Presence.GONE
@@ -140,7 +141,7 @@ class Tracker(LedgerQueries):
         `found_table` is True if the descent to the item touched nothing above the table.
         """
         record = self._records.find(item)
-        record.failed_pick_count += 1
+        self._count_failed_pick(record)
         record.empty_probe_count += found_table
         self.invalidate_positions()
         self._records.emit(record)
@@ -167,7 +168,7 @@ class Tracker(LedgerQueries):
         record.is_untracked = record.was_taken_away = False
         self._records.change_state(record, State.DROPPED)
         self._bin_contents.set_prior_log_odds(record, landing)
-        record.failed_pick_count += 1
+        self._count_failed_pick(record)
         record.drop_count += 1
         record.change_count = self.change_count
         self.invalidate_positions()
@@ -177,6 +178,7 @@ class Tracker(LedgerQueries):
         record = self._records.find(item)
         if record.state is State.HELD:
             record.reason, record.slot = "", self._bin_contents.find_next_slot_index(bin)
+            self._forget_failed_picks(record)
         # If the item later leaves the bin, an object seen before this time is not taken for the item.
         record.stamp, record.belief.miss_probability = self._last_stamp, 1.0
         record.clear_viewpoints()
@@ -246,6 +248,7 @@ class Tracker(LedgerQueries):
 
     def discard_rejected_and_skipped(self) -> None:
         """Discard all rejected and skipped items; the next look adds a new item for each visible object."""
+        self._failed_picks.clear()
         for record in self._records.filter_by_state(State.REJECTED, State.SKIPPED):
             record.set_state(State.PHANTOM, "the run was resumed; the next look adds the object again")
             self._records.emit(record)
@@ -275,6 +278,16 @@ class Tracker(LedgerQueries):
         elif detections.view == "full":
             self._bin_contents.confirm_placed_items(detections, observations)
             self._bin_contents.mark_dropped_items_as_placed(detections, bin_names)
+
+    def _count_failed_pick(self, record: ItemRecord) -> None:
+        """Count a failed attempt to pick an item, for the item and for its position."""
+        record.failed_pick_count += 1
+        self._failed_picks.append((record.item, record.position))
+
+    def _forget_failed_picks(self, record: ItemRecord) -> None:
+        """Forget the failed attempts at the position of an item that left the position."""
+        picks = self._failed_picks
+        self._failed_picks = [pick for pick in picks if record.distance_to(pick[1]) > self.config.gate]
 
     def _omit_redundant_observations(self, observations: Sequence[Observation]) -> list[Observation]:
         """Return the observations without those of undeclared labels that show no further object to sort.

@@ -291,6 +291,17 @@ def test_a_dropped_item_is_found_beside_the_workspace_in_one_look(bench: Bench) 
     assert bench.ledger.describe("cube-1").position[:2] == pytest.approx([0.70, 0.2])
 
 
+def test_attempts_count_for_an_object_also_if_another_object_takes_its_item(bench: Bench) -> None:
+    bench.look(CUBE)
+    bench.ledger.record_failed_pick("cube-1")
+    bench.look(("cube", 0.60, 0.15))
+    bench.look(CUBE, ("cube", 0.60, 0.15))
+    assert [bench.ledger.describe(item).attempts for item in ("cube-1", "cube-3")] == [1, 1]
+    bench.place("cube-3")
+    bench.look(CUBE, ("cube", 0.60, 0.15))
+    assert bench.ledger.describe("cube-4").attempts == 0, "it lay below the placed object"
+
+
 def test_a_misread_object_is_nobody_who_is_missed_before_its_class_is_sure(bench: Bench) -> None:
     bad = ErrorRates(threshold=0.5, miss_rate=0.2, confusion_rate=0.1, false_detections=0.5, jitter=1.0)
     for _ in range(4):
