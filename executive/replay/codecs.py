@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import contextlib
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from operator import attrgetter
 from typing import Any, NamedTuple
@@ -21,6 +21,9 @@ from executive.geometry import Array, Pose
 
 MAX_PIXELS = 10**8
 """Maximum number of pixels of a recorded image."""
+
+_COLLECTION_TYPES: Mapping[str, type] = {kind.__name__: kind for kind in (tuple, set, frozenset)}
+"""Types that JSON represents as a list, and that a recorded value names."""
 
 
 class Codec(NamedTuple):
@@ -147,18 +150,33 @@ def encode_behaviour_step(step: BehaviourStep) -> dict[str, Any]:
 
 def decode_behaviour_step(value: Any) -> BehaviourStep:
     """Return the step that `encode_behaviour_step` encoded, without the values that JSON cannot represent."""
-    values = {name: entry[0] for name, entry in value["values"].items() if isinstance(entry, list)}
+    entries = {name: entry for name, entry in value["values"].items() if isinstance(entry, list)}
+    values = {name: _decode_value(*entry) for name, entry in entries.items()}
     return BehaviourStep(value["status"], value["message"], values)
 
 
 def _encode_value(value: object) -> list[Any] | str:
+    """Return a value in a list, behind it the type if it is a collection, or only the name of its type."""
     plain_value = value.item() if isinstance(value, np.generic) else value
+    content, type_name = plain_value, type(plain_value).__name__
     # The value may be an object of another project, whose methods may raise any exception.
     with contextlib.suppress(Exception):
-        copy = from_json(to_json(plain_value), allow_inf_nan=False)
-        if type(copy) is type(plain_value) and copy == plain_value:
+        if isinstance(plain_value, tuple):
+            content = list(plain_value)
+        elif isinstance(plain_value, set | frozenset):
+            # The order of a set differs between processes.
+            content = sorted(plain_value, key=repr)
+        copy = from_json(to_json(content), allow_inf_nan=False)
+        is_restored = type(copy) is type(content) and copy == content
+        if is_restored and content is plain_value:
             return [copy]
-    return type(value).__name__
+        if is_restored and type(plain_value) is _COLLECTION_TYPES.get(type_name):
+            return [copy, type_name]
+    return type_name
+
+
+def _decode_value(content: Any, collection_type: str = "") -> Any:
+    return _COLLECTION_TYPES[collection_type](content) if collection_type else content
 
 
 def _encode_mask(mask: NDArray[np.bool_]) -> str:

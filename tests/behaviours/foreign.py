@@ -247,5 +247,5 @@ class Keep(Behaviour):
     """Keep a value on the blackboard that JSON cannot restore."""
 
     def update(self) -> Status:
-        Blackboard.set("/kept", (1, 2))
+        Blackboard.set("/kept", Status.SUCCESS)
         return Status.SUCCESS

@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from executive.cell.detection import Answer, Detection, ErrorRates, Observation
 from executive.cell.frame import Frame
+from executive.cell.protocols import BehaviourStep
 from executive.geometry import Pose, rotate_about_z
 from executive.replay import codecs
 from executive.replay.codecs import Codec, RecordedMotion
@@ -73,3 +74,10 @@ def test_observations_come_back(
     assert np.array_equal(read.position, position)
     others = (read.detection, read.std, read.is_confident, read.contradiction)
     assert others == (detection, std, confident, contradiction)
+
+
+def test_collections_that_a_behaviour_wrote_keep_their_types() -> None:
+    values = {"place": (0.5, [1]), "seen": {"duck", "cube"}, "nested": [(1, 2)]}
+    step = BehaviourStep("SUCCESS", "", values)
+    restored = back(codecs.BEHAVIOUR_STEP, step).values
+    assert restored == {"place": (0.5, [1]), "seen": {"duck", "cube"}}, "JSON cannot restore the nested tuple"
