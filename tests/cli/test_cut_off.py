@@ -93,6 +93,7 @@ def test_a_killed_sweep_resumes_with_the_missing_runs_only(tmp_path: Path) -> No
     assert invoke("sweep", "--resume", str(database)).exit_code == 0, "nothing is missing"
 
 
+@pytest.mark.slow
 def test_a_sweep_whose_mission_changed_is_not_resumed(tmp_path: Path, missions: Path) -> None:
     for name in ("sort_fruit.yaml", "cells", "library"):
         path = missions / name

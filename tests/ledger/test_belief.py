@@ -136,6 +136,7 @@ def test_a_probability_from_log_odds_is_the_logistic_function_to_the_last_bit(lo
     assert compute_probability(log_odds) == pytest.approx(float(expit(log_odds)), rel=0, abs=1e-300)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2000), st.integers(0, 2000), st.floats(1e-6, 0.999))
 def test_the_tail_of_a_binomial_distribution_is_that_of_scipy(count: int, more: int, rate: float) -> None:
     tail = compute_binomial_tail(count, count + more, rate)

@@ -220,6 +220,7 @@ def test_every_fault_of_the_server_is_unavailable_with_what_to_do(make, server, 
     assert_unavailable(make(**APIS[api]), f"^{server.url}|no answer within", expected)
 
 
+@pytest.mark.slow
 def test_a_server_that_is_gone_and_comes_back(detector, server):
     server.stop()
     try:
@@ -238,6 +239,7 @@ def test_a_server_that_is_gone_and_comes_back(detector, server):
     assert len(search(detector, spot()).confident) == 1
 
 
+@pytest.mark.slow
 def test_a_server_on_this_computer_is_asked_without_a_proxy(server, monkeypatch):
     monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
     with contextlib.closing(build("direct", url=server.url, **V1)) as detector:

@@ -89,6 +89,7 @@ def watch(text: str, folder: Path, do: Callable[[Watched], Awaitable[None]]) -> 
     return outcomes[0]
 
 
+@pytest.mark.slow
 def test_a_watcher_sees_a_first_step_then_the_run_to_its_end(tmp_path: Path) -> None:
     async def do(watched: Watched) -> None:
         await watched.wish(name="step")
