@@ -68,9 +68,10 @@ class Parts:
         """Close the tool and count the pick, unless the touched object cannot be sealed."""
         tool = occurrence.context.cell.arm.tool_pose.position
         objects = occurrence.context.world.objects
-        distances = [math.dist(one.position[:2], tool[:2]) for one in objects]
+        # The objects of a stack lie one above the other.
+        distances = [math.dist(one.position, tool) for one in objects]
         number = int(np.argmin(distances)) if distances else -1
-        if distances and distances[number] <= MAX_TOOL_DISTANCE:
+        if distances and math.dist(objects[number].position[:2], tool[:2]) <= MAX_TOOL_DISTANCE:
             self.pick_counts[number] += 1
             if number in self.unsealable:
                 return
