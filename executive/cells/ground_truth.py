@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from executive.cell.bins import Bin
 from executive.cell.protocols import Routes
@@ -78,8 +76,7 @@ def count_outcomes(
 
 def _is_any_near(points: Sequence[Array], positions: Sequence[Array], max_distance: float) -> bool:
     """Return True if a point `(3,)` [m] is at most `max_distance` [m] from a position, seen from above."""
-    pairs = itertools.product(points, positions)
-    return any(np.linalg.norm((point - position)[:2]) <= max_distance for point, position in pairs)
+    return any(math.dist(point[:2], place[:2]) <= max_distance for point in points for place in positions)
 
 
 def _find_outcomes(final_object: FinalObject, place: str, is_seen: bool) -> Iterator[str]:

@@ -188,11 +188,15 @@ class LedgerQueries:
         return self._bin_contents.explain_skipped_class(label)
 
     def _is_separate(self, position: Array, targets: Collection[Target | Observation]) -> bool:
-        """Return True if `position` `(3,)` [m] is neither in a bin nor near a target, seen from above."""
+        """Return True if `position` `(3,)` [m] is neither in a bin nor at one of `targets`.
+
+        Positions higher than the tallest class above the centre of a target show another, taller object.
+        """
         margin = max([AMBIGUITY_FACTOR * self.config.gate, *(each.radius for each in self.classes.values())])
         is_in_bin = any(bin.contains(position, margin) for bin in self.bins.values())
-        distances = (math.dist(position[:2], target.position[:2]) for target in targets)
-        return not is_in_bin and all(distance > margin for distance in distances)
+        height = max((each.height for each in self.classes.values()), default=math.inf)
+        near = [each for each in targets if math.dist(position[:2], each.position[:2]) <= margin]
+        return not is_in_bin and all(position[2] > each.position[2] + height for each in near)
 
     def _needs_look(self, record: ItemRecord) -> bool:
         """Return True if too few looks showed an item; no touch proves an item of no class."""

@@ -24,7 +24,7 @@ from executive.ledger.look import LookUpdate, make_look_event
 from executive.ledger.queries import LedgerQueries
 from executive.perception.evidence import compute_weight_log_ratios, describe_weight
 
-BODY_LOOK_COUNT = 3
+BODY_LOOK_COUNT = 5
 """Number of looks after which an object of no item that was not detected again is forgotten. It is less than
 the attempts of the library, so that an obstacle that is no longer there costs no object."""
 
@@ -88,6 +88,7 @@ class Tracker(LedgerQueries):
         `max_miss_probability`; its position then becomes unknown.
         """
         record, frame = self._records.find(item), detections.frame
+        observations = [each for each in observations if each.detection.label not in self.ignored_labels]
         if record.state is State.PLACED:
             presence = self._bin_contents.find_presence(record, detections, observations)
             if presence is Presence.GONE:
