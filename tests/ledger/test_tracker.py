@@ -340,6 +340,15 @@ def test_an_ignored_object_stands_on_the_table_as_long_as_looks_show_it(bench: B
         assert shown == [("cube", 0.0), ("", 0.0)], "neither at an item nor beside the workspace"
 
 
+def test_an_ignored_box_as_wide_as_the_table_is_no_object(bench: Bench) -> None:
+    bench.ledger.ignored_labels = ("dining table",)
+    shown = Bench()
+    shown.look(("dining table", 0.5, 0.0))
+    look, (seen,) = shown.last_look
+    bench.ledger.observe(look, [replace(seen, detection=replace(seen.detection, box=look.area))])
+    assert bench.ledger.find_objects_on_table() == []
+
+
 def test_what_is_put_down_stands_there_and_waits_for_a_look(bench: Bench) -> None:
     bench.look(CUBE)
     bench.ledger.record_grasp("cube-1")
