@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import GeneratorType
 from typing import Protocol
@@ -103,6 +104,10 @@ class Arm(Protocol):
     @property
     def collision(self) -> str | None:
         """Description of the collision that ended the last motion, or None."""
+
+    @property
+    def contact_point(self) -> Sequence[float] | None:
+        """Point `(x, y, z)` [m] at which the last motion collided; None: unknown, or no collision."""
 
     def describe_unreachable(self, goal: Goal) -> str:
         """Return a sentence if no joint configuration within the limits reaches a goal, else ""."""

@@ -55,7 +55,11 @@ class Ledger(Protocol):
         """Return a target for each item that still has to be sorted and has a known position."""
 
     def find_objects_on_table(self) -> Sequence[Target]:
-        """Return all items that lie on the table with a probability of at least 0.5."""
+        """Return all items that lie on the table with a probability of at least 0.5, and objects of no item.
+
+        Objects of no item have the label "": objects whose label the cell file ignores, and what the arm ran
+        into, unless it is an item or a bin. They are forgotten after some frames without them.
+        """
 
     def find_uncertain_items(self) -> Sequence[Item]:
         """Return the unsorted items in the workspace that are uncertain, or that may have been moved."""
@@ -189,6 +193,12 @@ class Ledger(Protocol):
 
     def invalidate_positions(self) -> None:
         """Record that the robot may have moved any object on the table."""
+
+    def record_collision(self, point: Sequence[float] | None) -> None:
+        """Record a collision of the arm, which may have moved any object on the table.
+
+        `point` is the contact point `(x, y, z)` [m]; None if it is unknown.
+        """
 
     def record_interruption(self) -> None:
         """Record an interruption of the run: the tool may have moved any item that is not in a bin."""

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-
-import numpy as np
+from dataclasses import dataclass, replace
 
 from executive.cell.bins import Bin
 from executive.cell.protocols import Routes
@@ -45,6 +43,7 @@ def count_outcomes(
     bins: Mapping[str, Bin],
     routes: Routes,
     max_distance: float,
+    ignored_positions: Sequence[Array] = (),
 ) -> dict[str, int]:
     """Return the number of objects by outcome.
 
@@ -58,18 +57,26 @@ def count_outcomes(
       or from the centre of its bin
 
     A removed object counts only if it was seen: by its bin if the tool placed it there, else as `elsewhere`.
-    An object with `UNKNOWN_LABEL` that was never seen counts only if it is in a wrong bin, not as `unseen`.
+    An object with `UNKNOWN_LABEL` that was never seen counts only if it is in a wrong bin, not as `unseen`;
+    so does any other unseen object that was detected with an ignored label, at one of `ignored_positions`.
     """
     counts = dict.fromkeys(AUDIT_KEYS, 0)
     first_positions = [record.first_position for record in records if record.state is not State.PHANTOM]
     for final_object in objects:
         # For an item in a bin, a resumed run records the centre of the bin as first position.
         bin_centre = [bins[final_object.bin].position] if final_object.bin else []
-        pairs = itertools.product(first_positions, (*final_object.rest_positions, *bin_centre))
-        is_seen = any(np.linalg.norm((first - position)[:2]) <= max_distance for first, position in pairs)
+        positions = (*final_object.rest_positions, *bin_centre)
+        is_seen = _is_any_near(first_positions, positions, max_distance)
+        if not is_seen and _is_any_near(ignored_positions, positions, max_distance):
+            final_object = replace(final_object, label=UNKNOWN_LABEL)
         for key in _find_outcomes(final_object, _find_place(final_object, routes), is_seen):
             counts[key] += 1
     return counts
+
+
+def _is_any_near(points: Sequence[Array], positions: Sequence[Array], max_distance: float) -> bool:
+    """Return True if a point `(3,)` [m] is at most `max_distance` [m] from a position, seen from above."""
+    return any(math.dist(point[:2], place[:2]) <= max_distance for point in points for place in positions)
 
 
 def _find_outcomes(final_object: FinalObject, place: str, is_seen: bool) -> Iterator[str]:

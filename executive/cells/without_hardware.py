@@ -48,7 +48,10 @@ class CellWithoutHardware:
         self.config, self.routes = config, dict(routes)
         self.steps = self.last_command_step = 0
         bins, classes = build_bins(config), build_object_classes(config)
-        self.accounts = Tracker(config.ledger, config.table, bins, classes, self.routes, options.quotas, emit)
+        ignored = set(config.unknown.ignore).difference(classes)
+        self.accounts = Tracker(
+            config.ledger, config.table, bins, classes, self.routes, options.quotas, emit, ignored
+        )
         no_device: Any = None
 
         def emit_selection(target: Target, bin: str) -> None:

@@ -9,12 +9,15 @@ from dataclasses import dataclass
 
 from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
+from executive.cell.detection import Observation
 from executive.cell.frame import Frame
 from executive.cell.objects import Item, KnownItem, ObjectClass, Target
 from executive.cell.protocols import Routes
 from executive.cell.quotas import Quotas
 from executive.events import Emit
 from executive.geometry import Array
+
+from executive.ledger.association import AMBIGUITY_FACTOR
 from executive.ledger.bin_contents import BinContents
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
@@ -45,7 +48,10 @@ class LedgerQueries:
         routes: Names of the permitted bins by class.
         quotas: Maximum numbers of objects in the bins.
         emit: Function that receives the events.
-        unknown_labels: Labels that are not in the cell file, each with its maximum number of boxes per frame.
+        ignored_labels: Labels that are not in the cell file, of objects that may lie on the table.
+        unknown_labels: Other labels that are not in the cell file, each with its maximum number of boxes per
+            frame.
+        ignored_positions: Positions `(3,)` [m] of all detections with an ignored label so far.
     """
 
     config: LedgerConfig
@@ -55,11 +61,15 @@ class LedgerQueries:
     routes: Routes
     quotas: Quotas
     emit: Emit
+    ignored_labels: Collection[str] = ()
 
     def __post_init__(self) -> None:
         self.unknown_labels: Counter[str] = Counter()
+        self.ignored_positions: list[Array] = []
         self._failed_picks: list[tuple[Item, Array]] = []
         """Item and position `(3,)` [m] of each failed attempt to pick; see `_count_attempts`."""
+        self._bodies: list[tuple[Array, int]] = []
+        """Objects of no item: position `(3,)` [m], and number of further looks until it is forgotten."""
         self._records = ItemRecords(self.emit)
         self._certainty = Certainty(self.config, find_classes_distinct_by_touch(self.classes))
         self._bin_contents = BinContents(self.config, self.bins, self.routes, self._records, self.quotas)
@@ -81,9 +91,13 @@ class LedgerQueries:
         return [record.target for record in unmoved_items if record.label not in self.unknown_labels]
 
     def find_objects_on_table(self) -> Sequence[Target]:
-        """Return all items that lie on the table with a probability of at least 0.5."""
+        """Return all items that are probably on the table, and what else is known to be there."""
         items = [record for record in self._records.filter_by_state(*ON_TABLE) if record.belief.is_probable]
-        return [item.target for item in items if not self._certainty.is_position_empty(item)]
+        targets = [item.target for item in items if not self._certainty.is_position_empty(item)]
+        for position, _ in reversed(self._bodies):
+            if self._is_separate(position, targets):
+                targets.append(Target("an object of no item", "", position, 0.0, 0, 0, 0.0))
+        return targets
 
     def find_uncertain_items(self) -> Sequence[Item]:
         """Return the unsorted items in the workspace that are uncertain, or that may have been moved."""
@@ -185,6 +199,17 @@ class LedgerQueries:
         other_positions = [position for item, position in self._failed_picks if item != record.item]
         distances = [record.distance_to(position) for position in other_positions]
         return record.failed_pick_count + sum(distance <= self.config.gate for distance in distances)
+
+    def _is_separate(self, position: Array, targets: Collection[Target | Observation]) -> bool:
+        """Return True if `position` `(3,)` [m] is neither in a bin nor at one of `targets`.
+
+        Positions higher than the tallest class above the centre of a target show another, taller object.
+        """
+        margin = max([AMBIGUITY_FACTOR * self.config.gate, *(each.radius for each in self.classes.values())])
+        is_in_bin = any(bin.contains(position, margin) for bin in self.bins.values())
+        height = max((each.height for each in self.classes.values()), default=math.inf)
+        near = [each for each in targets if math.dist(position[:2], each.position[:2]) <= margin]
+        return not is_in_bin and all(position[2] > each.position[2] + height for each in near)
 
     def _needs_look(self, record: ItemRecord) -> bool:
         """Return True if too few looks showed an item; no touch proves an item of no class."""

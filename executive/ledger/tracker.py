@@ -16,7 +16,6 @@ from executive.errors import Fault
 from executive.events import ItemChanged
 from executive.geometry import Array
 from executive.ledger import outcomes
-from executive.ledger.association import AMBIGUITY_FACTOR
 from executive.ledger.belief import make_viewpoint_key
 from executive.ledger.bin_contents import find_probable_bin
 from executive.ledger.bin_recovery import BinRecovery
@@ -24,6 +23,14 @@ from executive.ledger.item import ON_TABLE, ItemRecord, State
 from executive.ledger.look import LookUpdate, make_look_event
 from executive.ledger.queries import LedgerQueries
 from executive.perception.evidence import compute_weight_log_ratios, describe_weight
+
+BODY_LOOK_COUNT = 5
+"""Number of looks after which an object of no item that was not detected again is forgotten. It is less than
+the attempts of the library, so that an obstacle that is no longer there costs no object."""
+
+MAX_BODY_WIDTH = 0.5
+"""Maximum width of the box of an ignored object, as a fraction of the searched region's width; a wider box
+shows the table or a tray, on which the objects lie."""
 
 
 class Tracker(LedgerQueries):
@@ -50,7 +57,10 @@ class Tracker(LedgerQueries):
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
         """Update all items with the detections in one frame, and return the targets."""
         frame = detections.frame
-        self.unknown_labels |= Counter(detection.label for detection in detections.unknown)
+        labels = (detection.label for detection in detections.unknown)
+        self.unknown_labels |= Counter(label for label in labels if label not in self.ignored_labels)
+        ignored = [entry for entry in observations if entry.detection.label in self.ignored_labels]
+        observations = [entry for entry in observations if entry not in ignored]
         # The text before the colon identifies a reason; the numbers after the colon differ between frames.
         reason = detections.error_rates.assumption_reason
         reason_start = reason.partition(":")[0]
@@ -59,6 +69,12 @@ class Tracker(LedgerQueries):
         if frame.id != self._last_frame_id:
             self._last_frame_id, self._last_stamp = frame.id, frame.stamp
             self._update(detections, observations)
+            for entry in ignored:
+                self.ignored_positions.append(entry.position)
+                left, _, right, _ = entry.detection.box
+                is_object = right - left < MAX_BODY_WIDTH * (detections.area[2] - detections.area[0])
+                if is_object and self._coverage.is_in_workspace(entry.position):
+                    self._add_body(entry.position)
         self.emit(FrameCaptured(frame))
         self.emit(make_look_event(detections, observations))
         return self.find_targets()
@@ -72,6 +88,7 @@ class Tracker(LedgerQueries):
         `max_miss_probability`; its position then becomes unknown.
         """
         record, frame = self._records.find(item), detections.frame
+        observations = [each for each in observations if each.detection.label not in self.ignored_labels]
         if record.state is State.PLACED:
             presence = self._bin_contents.find_presence(record, detections, observations)
             if presence is Presence.GONE:
@@ -211,6 +228,12 @@ class Tracker(LedgerQueries):
         """Record that any object on the table may have been moved."""
         self._invalidate_near(np.zeros(3), math.inf)
 
+    def record_collision(self, point: Sequence[float] | None) -> None:
+        """Record a collision of the arm at `point` `(x, y, z)` [m], or at an unknown point."""
+        self.invalidate_positions()
+        if point is not None:
+            self._add_body(np.array(point))
+
     def record_interruption(self) -> None:
         """Record an interruption of the run: the tool may have moved any item that is not in a bin."""
         self._bin_recovery = BinRecovery(self._bin_contents)
@@ -266,6 +289,7 @@ class Tracker(LedgerQueries):
     def _update(self, detections: Detections, observations: Sequence[Observation]) -> None:
         """Update the items on the table and the dropped items with the observations of a look."""
         bias_std = detections.error_rates.bias
+        self._bodies = [(position, count - 1) for position, count in self._bodies if count > 1]
         entries = self._omit_redundant_observations(observations)
         bin_names = {entry: self._bin_contents.find_bin_name(entry, bias_std) for entry in entries}
         observations_on_table = [entry for entry, bin_name in bin_names.items() if bin_name is None]
@@ -289,18 +313,22 @@ class Tracker(LedgerQueries):
         picks = self._failed_picks
         self._failed_picks = [pick for pick in picks if record.distance_to(pick[1]) > self.config.gate]
 
+    def _add_body(self, position: Array) -> None:
+        """Record an object of no item at `position` `(3,)` [m], unless an item or a bin is there."""
+        if self._is_separate(position, [target for target in self.find_objects_on_table() if target.label]):
+            self._bodies.append((position, BODY_LOOK_COUNT))
+
     def _omit_redundant_observations(self, observations: Sequence[Observation]) -> list[Observation]:
         """Return the observations without those of undeclared labels that show no further object to sort.
 
         Such an observation is near another observation or a known object, or it is outside of the workspace.
         """
         kept = [entry for entry in observations if entry.detection.label not in self.unknown_labels]
-        targets = [each for each in self.find_objects_on_table() if each.label not in self.unknown_labels]
-        positions = [target.position for target in targets]
+        targets = [
+            each for each in self.find_objects_on_table() if each.label not in ("", *self.unknown_labels)
+        ]
         for entry in (entry for entry in observations if entry not in kept):
-            distances = [math.dist(entry.position, position) for position in positions]
-            distances += [math.dist(entry.position, other.position) for other in kept]
-            is_separate = min(distances, default=math.inf) > AMBIGUITY_FACTOR * self.config.gate
+            is_separate = self._is_separate(entry.position, (*targets, *kept))
             if is_separate and self._coverage.is_in_workspace(entry.position):
                 kept.append(entry)
         return kept

@@ -71,7 +71,7 @@ def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] =
         arm.stop()
     yield from wait_for_rest(arm)
     if arm.collision is not None:
-        cell.ledger.invalidate_positions()
+        cell.ledger.record_collision(arm.contact_point)
         raise skill.failure("blocked", arm.collision)
 
 

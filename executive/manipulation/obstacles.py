@@ -17,7 +17,10 @@ MAX_ROLL_DISTANCE = 0.002
 
 
 def list_obstacles(cell: Cell, excluded_item: Item | None = None) -> tuple[Obstacle, ...]:
-    """Return the objects on the table and in the bins as obstacles, except the item `excluded_item`."""
+    """Return the objects on the table and in the bins as obstacles, except the item `excluded_item`.
+
+    An object of no item, such as what the arm ran into lately, is an obstacle as large as the largest class.
+    """
     targets = [target for target in cell.ledger.find_objects_on_table() if target.item != excluded_item]
     return (*(make_obstacle(cell, target) for target in targets), *_list_bin_obstacles(cell, excluded_item))
 

@@ -35,8 +35,8 @@ class InputFormat(NamedTuple):
 
 
 UNCHANGED_INPUTS = (
-    "arm.at_rest", "plan.ready", "tool.touching", "tool.holding", "tool.load", "tool.load_std",
-    "camera.name", "camera.next_pose", "camera.sees_table",
+    "arm.at_rest", "arm.contact_point", "plan.ready", "tool.touching", "tool.holding", "tool.load",
+    "tool.load_std", "camera.name", "camera.next_pose", "camera.sees_table",
 )  # fmt: skip
 """Accesses whose results are recorded unchanged, under the name of the access."""
 

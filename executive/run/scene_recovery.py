@@ -107,4 +107,4 @@ def _move(cell: Cell, goal: Goal | str, task: Task) -> Steps:
     while not cell.arm.at_rest:
         yield
     if cell.arm.collision is not None:
-        cell.ledger.invalidate_positions()
+        cell.ledger.record_collision(cell.arm.contact_point)

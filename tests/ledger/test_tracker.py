@@ -9,7 +9,7 @@ import pytest
 from ledger_bench import Bench, Thing
 
 from executive.cell.detection import ErrorRates, assume_rates
-from executive.cell.objects import Target
+from executive.cell.objects import ObjectClass, Target
 from executive.errors import Fault
 from executive.events import DetectedObject, FrameSearched, ItemChanged
 
@@ -329,6 +329,35 @@ def test_what_is_believed_on_the_table_stands_there_given_up_or_not(bench: Bench
     assert "cube-1" in names(bench.ledger.find_objects_on_table())
     bench.ledger.record_placement("cube-1", "red_bin")
     assert "cube-1" not in names(bench.ledger.find_objects_on_table())
+
+
+def test_what_the_arm_ran_into_stands_on_the_table_for_five_looks() -> None:
+    bench = Bench({"cube": ObjectClass("cube", 0.05, 0.0354)})
+    bench.look(("cube", 0.5, 0.0))
+    for place in [(0.53, 0, 0.05), (0.5, 0, 0.2), (0.6, 0.1, 0.2), (0.6, 0.12, 0.2), (0.2, -0.3, 0.06)]:
+        bench.ledger.record_collision(place)
+    for _ in range(5):
+        bodies = [each.position.tolist() for each in bench.ledger.find_objects_on_table() if not each.label]
+        assert bodies == [[0.6, 0.12, 0.2], [0.5, 0, 0.2]], "once, and neither at an item nor at a bin"
+        bench.look(("cube", 0.5, 0.0))
+    assert names(bench.ledger.find_objects_on_table()) == ["cube-1"]
+
+
+def test_an_ignored_object_stands_on_the_table_as_long_as_looks_show_it(bench: Bench) -> None:
+    bench.ledger.ignored_labels = ("banana",)
+    for _ in range(6):
+        bench.look(("banana", 0.5, 0.0), ("banana", 0.5, 0.5), ("banana", 0.62, 0.0), ("cube", 0.6, 0.0))
+        shown = [(each.label, round(each.position[1], 2)) for each in bench.ledger.find_objects_on_table()]
+        assert shown == [("cube", 0.0), ("", 0.0)], "neither at an item nor beside the workspace"
+
+
+def test_an_ignored_box_as_wide_as_the_table_is_no_object(bench: Bench) -> None:
+    bench.ledger.ignored_labels = ("dining table",)
+    shown = Bench()
+    shown.look(("dining table", 0.5, 0.0))
+    look, (seen,) = shown.last_look
+    bench.ledger.observe(look, [replace(seen, detection=replace(seen.detection, box=look.area))])
+    assert bench.ledger.find_objects_on_table() == []
 
 
 def test_what_is_put_down_stands_there_and_waits_for_a_look(bench: Bench) -> None:

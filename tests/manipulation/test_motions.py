@@ -8,6 +8,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.objects import Obstacle, Target
 from executive.cells.fake.cell import FakeCell
 from executive.manipulation.motions import plan
+from executive.manipulation.obstacles import list_obstacles
 from executive.testing.run_skill import run_skill
 from skills.move_to_scan import MoveToScan
 
@@ -20,6 +21,9 @@ def test_an_arm_that_runs_into_something_stops_and_the_whole_table_is_in_doubt(
     assert (result.reason, result.message) == ("blocked", "link 4 ran into the lamp")
     assert fake.arm.at_rest
     assert not any(fake.ledger.is_fresh(target) for target in targets)
+    point = fake.arm.contact_point
+    assert point is not None
+    assert (point[0], point[1]) in [(obstacle.x, obstacle.y) for obstacle in list_obstacles(fake.cell)]
     assert run_skill(MoveToScan(pose="aside"), fake).status == "SUCCESS", "only that motion was broken off"
 
 

@@ -16,7 +16,7 @@ from executive.testing.run_mission import MissionResult, run_mission
 OBJECTS = (("cube", 0.46, -0.12), ("sphere", 0.58, 0.0), ("cube", 0.5, 0.14), ("duck", 0.6, 0.16))
 
 
-def sorted_with(mission: str, labels: dict[str, str]) -> MissionResult:
+def sorted_with(mission: str, labels: dict[str, str], **cell: str) -> MissionResult:
     """Sort `OBJECTS` with a detector that gives some classes another label."""
 
     def relabel(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
@@ -28,7 +28,7 @@ def sorted_with(mission: str, labels: dict[str, str]) -> MissionResult:
             fake.world.put(*thing)
         fake.detector.make_answer = relabel
 
-    return run_mission(mission, FakeCell, arrange=arrange)
+    return run_mission(mission, FakeCell, arrange=arrange, set=cell)
 
 
 @pytest.mark.parametrize("mission", ["sort_overhead", "sort_wrist"])
@@ -98,6 +98,14 @@ def test_a_box_of_no_class_counts_if_looks_confirm_it_in_the_workspace(
     assert (result.status, result.items["placed"]) == (status, 4)
 
 
-def test_a_label_that_the_cell_file_ignores_is_not_counted() -> None:
-    result = sorted_beside_banana(lambda look: True, 0.5, 0.0, 0.9, **{"cell.unknown.ignore": "[banana]"})
+@pytest.mark.parametrize("y", [0.0, 0.06], ids=["alone", "beside a sphere"])
+def test_a_label_that_the_cell_file_ignores_is_not_counted(y: float) -> None:
+    result = sorted_beside_banana(lambda look: True, 0.5, y, 0.9, **{"cell.unknown.ignore": "[banana]"})
     assert (result.status, result.accounts.unknown_labels, result.is_table_empty) == ("SUCCESS", {}, True)
+    assert (result.items["placed"], result.agrees) == (4, True)
+
+
+@pytest.mark.parametrize("mission", ["sort_overhead", "sort_wrist"])
+def test_the_audit_leaves_out_objects_that_were_only_seen_with_an_ignored_label(mission: str) -> None:
+    result = sorted_with(mission, {"cube": "banana"}, **{"cell.unknown.ignore": "[banana]"})
+    assert (result.status, result.items["seen"], result.agrees) == ("SUCCESS", 2, True)

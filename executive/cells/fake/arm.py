@@ -83,6 +83,7 @@ class FakeArm:
         tool_pose: Pose of the tool centre point; changed by `set_tool_pose`.
         tool_velocity: Velocity zero `(3,)` [m/s]: a released object falls straight down.
         collision: Description of the obstacle that stopped the last motion, or None.
+        contact_point: Position of the tool `(x, y, z)` [m] at the last `next_obstacle`, or None.
         next_obstacle: Name of an obstacle in the middle of the next motion, or None; set by tests.
         commands: Names of the executed commands, `start` or `stop`, in order, for tests.
     """
@@ -92,6 +93,7 @@ class FakeArm:
         self.poses = {name: compute_tool_pose(np.radians(q)) for name, q in config.arm.poses_deg.items()}
         self.tool_pose, self.tool_velocity = self.poses["home"], np.zeros(3)
         self.collision: str | None = None
+        self.contact_point: Sequence[float] | None = None
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
         self._world = world
@@ -153,7 +155,7 @@ class FakeArm:
         self._world.is_commanded = True
         self._path = list(motion.path)
         self._half_pose_count = len(self._path) // 2
-        self.collision = None
+        self.collision = self.contact_point = None
 
     def set_tool_pose(self, pose: Pose) -> None:
         """Move the tool to a pose at once; the arm is then at rest."""
@@ -179,6 +181,7 @@ class FakeArm:
             self.tool_pose = self._path.pop(0)
             if self.next_obstacle is not None and len(self._path) <= self._half_pose_count:
                 self.collision, self.next_obstacle = self.next_obstacle, None
+                self.contact_point = self.tool_pose.position.tolist()
                 self.stop()
         if (held := self._world.held_object) is not None:
             height = self._world.classes[held.label].height

@@ -114,7 +114,7 @@ class FakeCell(CellWithoutHardware):
             arm=self.arm,
             tool=self.tool,
             camera=self.camera,
-            detectors=screen_detectors(self.detectors, classes, config.unknown.ignore),
+            detectors=screen_detectors(self.detectors, classes),
             localizer=CellLocalizer("plane", classes, bins),
         )
 
@@ -159,14 +159,14 @@ class FakeCell(CellWithoutHardware):
     def audit(self) -> dict[str, int]:
         """Return the number of objects by outcome, such as `right`, `wrong_bin`, `left` and `elsewhere`."""
         held, removed = self.world.held_object, self.world.removed_objects
-        final_objects = []
+        objects = []
         for each in (*self.world.objects, *removed):
             bin, positions, is_removed = self.world.find_bin(each), each.rest_positions, each in removed
             name = bin.name if bin else ""
             entry = FinalObject(each.label, name, positions, each.is_dropped, each is held, is_removed)
-            final_objects.append(entry)
-        max_distance = self.config.ledger.gate
-        return count_outcomes(final_objects, self.ledger.records, self.cell.bins, self.routes, max_distance)
+            objects.append(entry)
+        ledger, bins, gate = self.ledger, self.cell.bins, self.config.ledger.gate
+        return count_outcomes(objects, ledger.records, bins, self.routes, gate, ledger.ignored_positions)
 
     def close(self) -> None:
         """Close the log."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -52,6 +52,7 @@ class SimArm:
     Attributes:
         planner: Motion planner of the arm.
         collision: Description of the collision that ended the last motion; None: no collision.
+        contact_point: Point of the collision in the world `(x, y, z)` [m]; None: unknown, or no collision.
     """
 
     def __init__(
@@ -66,6 +67,7 @@ class SimArm:
     ) -> None:
         self.planner = planner
         self.collision: str | None = None
+        self.contact_point: Sequence[float] | None = None
         self._world = world
         self._poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
         self._worker = ThreadPoolExecutor(1, "planner")
@@ -149,7 +151,7 @@ class SimArm:
             raise Fault(f"the simulated arm follows its own planned motions, not a {type(motion).__name__}")
         if error := _describe_difference(self._commanded_q, motion.start, START_TOLERANCE):
             raise Fault(f"the start of the motion is not at the end of the last motion: {error}")
-        self.collision = self._describe_disturbance(START_TOLERANCE) or None
+        self.collision, self.contact_point = self._describe_disturbance(START_TOLERANCE) or None, None
         if self.collision is not None:
             self._commanded_q = self.q
             self.send_command()
@@ -186,7 +188,7 @@ class SimArm:
             return
         if self._braking_times is None:
             lip_may_touch = self._motion_time >= self._motion.guarded_start_time
-            message = self._contact_monitor.describe_new_contact(lip_may_touch)
+            message, self.contact_point = self._contact_monitor.find_new_contact(lip_may_touch)
             if message := message or self._describe_disturbance(TRACKING_TOLERANCE):
                 self.stop_after_collision(message)
         if self._braking_times is None:

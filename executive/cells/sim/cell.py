@@ -103,7 +103,7 @@ class SimCell(SimCellChecks, CellWithoutHardware):
             arm=self._arm,
             tool=self._tool,
             camera=self._camera,
-            detectors=screen_detectors(self._detectors, classes, config.unknown.ignore),
+            detectors=screen_detectors(self._detectors, classes),
             classes=classes,
             localizer=localizer,
         )
@@ -126,9 +126,9 @@ class SimCell(SimCellChecks, CellWithoutHardware):
 
     def audit(self) -> dict[str, int]:
         """Return the number of objects by `AUDIT_KEYS`; `left` counts the objects on the table."""
-        records, bins, max_distance = self.accounts.records, self.cell.bins, self.config.ledger.gate
+        ledger, bins, gate = self.accounts, self.cell.bins, self.config.ledger.gate
         objects = list_final_objects(self._world, self._tool, bins)
-        return count_outcomes(objects, records, bins, self.routes, max_distance)
+        return count_outcomes(objects, ledger.records, bins, self.routes, gate, ledger.ignored_positions)
 
     def close(self) -> None:
         """Close the detectors, the planner and the physics servers."""

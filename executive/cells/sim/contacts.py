@@ -32,8 +32,11 @@ class ContactMonitor:
         step = self._world.step_count
         self._last_contact_steps = {(part, body): step for part, body, _, _ in self._iterate_contacts()}
 
-    def describe_new_contact(self, lip_may_touch: bool) -> str:
-        """Return a description of a new forbidden contact, or ""; the lip is exempt if `lip_may_touch`."""
+    def find_new_contact(self, lip_may_touch: bool) -> tuple[str, Sequence[float] | None]:
+        """Return description and point [m] of a new forbidden contact; without one, "" and None.
+
+        The lip is exempt if `lip_may_touch`.
+        """
         now, last_steps = self._world.step_count, self._last_contact_steps
         oldest_step = now - SEPARATION_STEP_COUNT
         self._last_contact_steps = {pair: step for pair, step in last_steps.items() if step >= oldest_step}
@@ -43,8 +46,8 @@ class ContactMonitor:
             elif force > MIN_CONTACT_FORCE and not (lip_may_touch and self._is_lip(part, position)):
                 x, y, z = self._world.get_tool_pose().position
                 name = self._world.name_body(body)
-                return f"{part} ran into {name}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m"
-        return ""
+                return f"{part} ran into {name}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m", position
+        return "", None
 
     def _is_lip(self, part: str, position: Sequence[float]) -> bool:
         """Return True if a point in the world [m] on a part of the robot is on the lip of the cup."""

@@ -5,7 +5,7 @@ Every answer of every kind of detector is screened before a skill reads it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from executive.cell.detection import Answer, Detection
@@ -33,15 +33,14 @@ MAX_SECOND_CLASS_RATIO = 0.5
 def screen_answer(answer: Answer, frame: Frame, view: str, label_map: Mapping[str, str]) -> Answer:
     """Return an answer with its detections divided into `confident`, `doubtful` and `unknown`.
 
-    Boxes that the arm occludes, ignored labels, and doubtful boxes with unknown labels are omitted. The label
-    of a class that looks like another class is replaced by the label of the other class.
+    Boxes that the arm occludes, and doubtful boxes with unknown labels are omitted. The label of a class that
+    looks like another class is replaced by the label of the other class.
 
     Args:
         answer: Answer with all detections in `confident`.
         frame: The searched frame.
         view: Name of the searched region, for an error message.
-        label_map: For each class of the cell, the class that the detectors report for it; "" for each ignored
-            label.
+        label_map: For each class of the cell, the class that the detectors report for it.
 
     Raises:
         Crowded: There are more than `MAX_BOXES` boxes.
@@ -66,7 +65,7 @@ def screen_answer(answer: Answer, frame: Frame, view: str, label_map: Mapping[st
         is_confident = _is_confident(detection, threshold)
         if label:
             (confident if is_confident else doubtful).append(replace(detection, label=label))
-        elif label is None and is_confident:
+        elif is_confident:
             unknown.append(detection)
     return replace(answer, confident=tuple(confident), doubtful=tuple(doubtful), unknown=tuple(unknown))
 
@@ -78,8 +77,7 @@ class ScreenedDetector:
     Attributes:
         detector: The detector.
         name: Name of the detector in the cell file.
-        label_map: For each class of the cell, the class that the detectors report for it; "" for each ignored
-            label.
+        label_map: For each class of the cell, the class that the detectors report for it.
     """
 
     detector: Detector
@@ -95,16 +93,10 @@ class ScreenedDetector:
 
 
 def screen_detectors(
-    detectors: Mapping[str, Detector],
-    classes: Mapping[str, ObjectClass],
-    ignored_labels: Collection[str] = (),
+    detectors: Mapping[str, Detector], classes: Mapping[str, ObjectClass]
 ) -> dict[str, Detector]:
-    """Return detectors with screened answers, by name.
-
-    `classes` are the classes of the cell by label; boxes with `ignored_labels` are omitted.
-    """
-    label_map = dict.fromkeys(ignored_labels, "")
-    label_map |= {label: object_class.detected_label for label, object_class in classes.items()}
+    """Return detectors with screened answers, by name; `classes` are the classes of the cell by label."""
+    label_map = {label: object_class.detected_label for label, object_class in classes.items()}
     return {name: ScreenedDetector(detector, name, label_map) for name, detector in detectors.items()}
 
 

@@ -11,7 +11,7 @@ from rig import Rig
 
 from executive.cell.arm import Goal, Task
 from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, build_object_class
-from executive.cell.objects import Load
+from executive.cell.objects import Load, Obstacle
 from executive.geometry import Array
 from executive.motion.braking import RETREAT_TIME
 from executive.motion.trajectory import Trajectory
@@ -119,5 +119,9 @@ def test_an_unknown_obstacle_blocks_each_motion_and_breaks_nothing(rig: Rig, mas
     for _ in range(3):
         assert bump(rig, rig.planned(RIGHT)).startswith("the tool ran into something unknown")
         assert rig.world.client.getClosestPoints(rig.world.arm, post, 0.0) == (), "it moved back"
+    contact_x, contact_y, contact_z = rig.arm.contact_point or (0, 0, 0)
+    task = Task(obstacles=(Obstacle(contact_x, contact_y, 0.0354, contact_z + 0.03, "the post"),))
+    rig.go(RIGHT, task)
+    assert rig.arm.collision is rig.arm.contact_point is None, "a motion around the contact point is free"
     rig.go("home")
     assert rig.arm.collision is None
