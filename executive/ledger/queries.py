@@ -16,7 +16,6 @@ from executive.cell.protocols import Routes
 from executive.cell.quotas import Quotas
 from executive.events import Emit
 from executive.geometry import Array
-
 from executive.ledger.association import AMBIGUITY_FACTOR
 from executive.ledger.bin_contents import BinContents
 from executive.ledger.certainty import Certainty
