@@ -42,11 +42,14 @@ ContentT = TypeVar("ContentT")
 
 
 class YoloFile(BaseModel, extra="allow"):
-    """A YOLO class file: class names by number, and shape of the keypoints; further keys name the splits."""
+    """A YOLO class file: class names by number, and shape of the keypoints; further keys name the splits.
+
+    The shape of the keypoints is (0, 0) for boxes and polygons, and None if the file does not state it.
+    """
 
     names: dict[int, str] | list[str]
     path: str = ""
-    kpt_shape: tuple[int, int] = (0, 0)
+    kpt_shape: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -35,6 +37,16 @@ MAX_COPY_DISTANCE = 1.0
 CORNER_FRACTIONS = (0.9, 0.1)
 """Minimum fractions of the boxes of a COCO file with corners: boxes that fit as two corners, and boxes that
 end outside of their images if they are read as corner and size."""
+MIN_SHIFTED_FRACTION = 0.05
+"""Minimum fraction of boxes that end outside of their images if corner and centre were confused."""
+COCO_FORM, YOLO_FORM = "left, top, width and height", "centre x, centre y, width and height"
+"""Meaning of the numbers of a box."""
+MAX_CORNER_FRACTION = 0.02
+"""Maximum coordinate, as a fraction of the image, of boxes in 0..1 that are read as pixels."""
+MAX_BOX_WORDS = 6
+"""Maximum number of words of a YOLO box: class, centre, size, and perhaps confidence."""
+MIN_LABEL_FRACTION = 0.9
+"""Minimum fraction of the labels that fit a form, if all labels have the form."""
 MAX_FRACTION = 1.02
 """Maximum coordinate in an image, as a fraction of its width or height; annotation tools round."""
 OUTSIDE, SMALL = "boxes outside of the image dropped", "boxes smaller than a pixel dropped"
@@ -130,12 +142,19 @@ class LabelledDataset:
         path = self._source.file if is_coco else self._source.images[0].parent
         self._property_folder = folder if path == folder else path.parent
         self.classes = self._read_coco() if is_coco else self._read_yolo()
-        if _are_corners(np.concatenate(self._relative_boxes)):
-            problem = "many boxes end outside of their images, and seem to be left, top, right and bottom"
-            raise InputError(f"{self._source.file}: {problem}; write left, top, width and height")
+        boxes = np.concatenate(self._relative_boxes)
+        form, other_form = (COCO_FORM, YOLO_FORM) if is_coco else (YOLO_FORM, COCO_FORM)
+        if wrong_form := _find_wrong_form(boxes, other_form):
+            problem = f"many boxes end outside of their images, and seem to be {wrong_form}"
+            raise InputError(f"{self._source.file}: {problem}; write {form}")
         object_count = self.object_counts.total()
         if self.notes[OUTSIDE] + self.notes[SMALL] > object_count:
-            raise InputError(f"{self.summary}; write the boxes in the units of the format (COCO: pixels)")
+            remedy = "delete the boxes without an area, or draw them around the objects"
+            if is_coco and np.abs(boxes).max() <= MAX_CORNER_FRACTION:
+                remedy = "all boxes are in the upper left corner; write the boxes in pixels"
+            elif self.notes[OUTSIDE] > self.notes[SMALL]:
+                remedy = "the boxes may belong to other or larger images; export images and boxes together"
+            raise InputError(f"{self.summary}; {remedy}")
         if not object_count:
             raise InputError(f"{self.summary}; an evaluation or a training needs objects")
 
@@ -224,12 +243,18 @@ class LabelledDataset:
 
         content = dataset_layout.read_class_file(self._source.file)
         names = dict(enumerate(content.names)) if isinstance(content.names, list) else content.names
-        pose_word_count = 5 + content.kpt_shape[0] * content.kpt_shape[1]
+        rows_of_images: dict[Path, list[list[str]]] = {}
         for path in sorted(set(self._source.images)):
             file = dataset_layout.find_label_file(path)
             self.notes["images without a label file"] += file is None
             text = dataset_layout.read_text(file, dataset_layout.MAX_LABEL_FILE_SIZE) if file else ""
-            rows = [words for line in text.splitlines() if (words := line.split())]
+            rows_of_images[path] = [words for line in text.splitlines() if (words := line.split())]
+        if content.kpt_shape is None and _may_have_keypoints(chain(*rows_of_images.values())):
+            remedy = "state kpt_shape in data.yaml: [number of keypoints, 2 or 3], or [0, 0] for polygons"
+            raise InputError(f"{self._source.file}: the labels may be boxes with keypoints; {remedy}")
+        pose_word_count = 5 + math.prod(content.kpt_shape or (0, 0))
+        for path, rows in rows_of_images.items():
+            file = dataset_layout.find_label_file(path)
             lines = [" ".join(words[:5] if len(words) == pose_word_count else words) for words in rows]
             try:
                 detections = yolo_annotations_to_detections(lines, (1, 1), with_masks=False)
@@ -278,16 +303,48 @@ class LabelledDataset:
         )  # fmt: skip
 
 
-def _are_corners(relative: Array) -> bool:
-    """Return True if corners `(N, 4)`, as fractions of their images, were corners before the conversion.
+def _may_have_keypoints(rows: Iterable[list[str]]) -> bool:
+    """Return True if the words of YOLO labels may be boxes with keypoints, and not polygons.
 
-    COCO boxes are converted from left, top, width and height.
+    A box contains its keypoints. The first two points of a polygon are nearer to each other than the first
+    and the farthest point; centre and size of a box are not.
     """
+    numbers_of_labels = [words[1:] for words in rows if len(words) > MAX_BOX_WORDS]
+    if len(set(map(len, numbers_of_labels))) != 1:
+        return False
+    try:
+        numbers = np.array(numbers_of_labels, float)
+    except ValueError:
+        return False  # The parser of the labels names the word that is no number.
+    centres, sizes, keypoints = numbers[:, None, :2], numbers[:, None, 2:4], numbers[:, 4:]
+    if keypoints.shape[1] % 3 == 0 and np.isin(keypoints[:, 2::3], (0, 1, 2)).all():
+        return True  # The third number of a keypoint is its visibility.
+    if keypoints.shape[1] % 2:
+        return False
+    points = keypoints.reshape(len(keypoints), -1, 2)
+    offsets = np.where(points.any(axis=2, keepdims=True), points - centres, 0)  # (0, 0): no keypoint
+    is_inside = (np.abs(offsets) <= sizes / 2 + MAX_FRACTION - 1).all(axis=(1, 2))
+    max_distances = np.linalg.norm(offsets, axis=2).max(axis=1)
+    is_polygon = np.linalg.norm(sizes - centres, axis=2)[:, 0] <= max_distances
+    return bool(is_inside.mean() >= MIN_LABEL_FRACTION > is_polygon.mean())
+
+
+def _find_wrong_form(relative: Array, other_form: str) -> str:
+    """Return what the numbers of boxes seem to be: left, top, right and bottom, or `other_form`, or "".
+
+    `relative` contains the corners `(N, 4)`, as fractions of their images, if the numbers are read as usual.
+    """
+    if not len(relative):
+        return ""
     first, second = relative[:, :2], relative[:, 2:] - relative[:, :2]
     fits = ((first <= second) & (second <= MAX_FRACTION)).all(axis=1)
-    ends_outside = (relative > MAX_FRACTION).any(axis=1)
-    counts = np.array([fits.sum(), ends_outside.sum()])
-    return bool(len(relative) and (counts >= len(relative) * np.array(CORNER_FRACTIONS)).all())
+    ends_outside = (np.abs(relative - 0.5) > MAX_FRACTION - 0.5).any(axis=1)
+    if ([fits.mean(), ends_outside.mean()] >= np.array(CORNER_FRACTIONS)).all():
+        return "left, top, right and bottom"
+    shift = np.tile(second, 2) / 2
+    shifted = relative - shift if other_form == YOLO_FORM else relative + shift
+    fits_other_form = (np.abs(shifted - 0.5) <= MAX_FRACTION - 0.5).all()
+    return other_form if fits_other_form and ends_outside.mean() >= MIN_SHIFTED_FRACTION else ""
 
 
 def read_image_properties(file: Path) -> dict[str, Any]:

@@ -174,9 +174,12 @@ YOLO: dict[str, dict[str, Any]] = {
 REFUSED: dict[str, tuple[Callable[..., None], dict[str, Any]]] = {
     "seem to be left, top, right": (
         write_coco, {"change": change_boxes(lambda x, y, w, h, *_: [x, y, x + w, y + h])}),
-    "smaller than a pixel": (
+    "write the boxes in pixels": (
         write_coco, {"change": change_boxes(lambda x, y, w, h, W, H: [x / W, y / H, w / W, h / H])}),
-    "write the boxes in": (write_coco, {"change": add([-9, 0, 5, 5], [0, -9, 5, 5], [-9, -9, 5, 5])}),
+    "export images and boxes": (write_coco, {"change": add([-9, 0, 5, 5], [0, -9, 5, 5], [-9, -9, 5, 5])}),
+    "seem to be centre x": (
+        write_coco, {"change": change_boxes(lambda x, y, w, h, *_: [x + w / 2, y + h / 2, w, h])}),
+    "seem to be left, top, width": (write_yolo, {"line": "{n} {l} {t} {w} {h}"}),
     "is a class of detector eye": (write_coco, {"change": update("categories", {"name": "bolt"})}),
     "was turned": (write_coco, {"turn": 6, "change": update("images", {"width": 120, "height": 160})}),
     "objects: none": (write_coco, {"change": lambda content: content["annotations"].clear()}),
@@ -184,7 +187,8 @@ REFUSED: dict[str, tuple[Callable[..., None], dict[str, Any]]] = {
     "is not a file": (write_coco, {"name": "b{}"}),
     "no labelled images": (write_yolo, {"suffixes": (".pcx",)}),
     "must be normalized": (write_yolo, {"line": "{n} {p[0]} {p[1]} 30 40"}),
-    "coordinates must be": (write_yolo, {"line": POSE}),
+    "state kpt_shape": (write_yolo, {"line": POSE}),
+    "with keypoints": (write_yolo, {"line": "{n} {x} {y} {w} {h} {l} {t} {x} {y}"}),
     "top, right and bottom": (write_yolo, {"line": "{n} {l} {t} {r} {b}"}),
     "label is invalid": (write_yolo, {"line": "{n} {x} {y} {w}"}),
     "unknown class": (write_yolo, {"line": "7 {x} {y} {w} {h}"}),
