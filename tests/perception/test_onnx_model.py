@@ -115,6 +115,20 @@ def test_a_model_of_another_kind_is_refused_in_a_sentence(tmp_path, inputs, arra
         OnnxModel(write(tmp_path, inputs, arrays), ("cube", "duck")).detect(IMAGE, 0.25)
 
 
+@pytest.mark.parametrize(
+    ("content", "remedy"),
+    [
+        (b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
+        (b"\n<!DOCTYPE html>", "download the file itself"),
+        (b"", "download it again"),
+    ],
+)
+def test_a_file_that_is_no_model_is_refused_with_a_remedy(tmp_path, content, remedy):
+    (tmp_path / "model.onnx").write_bytes(content)
+    with pytest.raises(InputError, match=f"model.onnx is not a model .*{remedy}"):
+        OnnxModel(tmp_path / "model.onnx", ("cube",))
+
+
 def test_the_trial_of_a_model_survives_what_the_model_does(tmp_path, monkeypatch):
     path = write(tmp_path, images(1, 3, 8, 8), outputs(), "Nonsense")
     assert "onnxruntime can run: Load model from" in find_model_errors(path, ("cube",), 1)[0]

@@ -89,7 +89,7 @@ def read_shapes(path: Path, tag: str) -> Triangles:
             vertices.append(Pose(make_rotation(*rpy), np.array(xyz)).apply(points))
     if (link_count := len(root.findall("link"))) != 1 or not vertices:
         problem = f"the model {path.name} has {link_count} link(s) and {len(vertices)} shape(s) as <{tag}>"
-        raise InputError(f"{problem}; an object is one <link> with at least one <visual> and <collision>")
+        raise InputError(f"{problem}; merge all into one <link> with <visual> and <collision>")
     return np.concatenate(vertices), np.concatenate(triangles)
 
 
@@ -129,7 +129,7 @@ def convert_model(path: Path) -> str:
     else:
         root = read_urdf(path)
         files = [(mesh, find_mesh(path, mesh)) for mesh in root.iter("mesh")]
-        if all(file.suffix == ".obj" and "package:" not in mesh.attrib["filename"] for mesh, file in files):
+        if all(file.suffix == ".obj" and "://" not in mesh.attrib["filename"] for mesh, file in files):
             return str(path)
         for mesh, file in files:
             mesh.set("filename", convert_model(file))
@@ -155,13 +155,15 @@ def find_mesh(urdf: Path, mesh: Element) -> Path:
 
 
 def _normalize_name(urdf: Path, name: str) -> str:
-    """Return a file name without `package://` or `package://NAME/`, relative to the URDF's folder.
+    """Return a file name without `file://`, `package://` or `package://NAME/`, relative to the URDF's folder.
 
     Raises:
         InputError: The file is outside of the folder.
     """
     path = name.removeprefix("package://")
-    if path != name and not (urdf.parent / path).exists():
+    if name.startswith("file://"):
+        path = os.path.relpath(name.removeprefix("file://"), urdf.parent)
+    elif path != name and not (urdf.parent / path).exists():
         path = path.partition("/")[2]
     if is_outside_path(path) or has_outside_link(urdf.parent, path):
         raise InputError(f'the model {urdf.name} names the file "{path}", which is outside of its folder')

@@ -58,9 +58,12 @@ def write(
     return ObjectConfig(urdf=str(folder / "m.urdf"), height=0.05, radius=0.0354)
 
 
-@pytest.mark.parametrize("visual", [BOX, STL, DAE, '<mesh filename="text.stl"/>'])
+FORMATS = [BOX, STL, DAE, '<mesh filename="text.stl"/>', '<mesh filename="file://{}/p.dae"/>']
+
+
+@pytest.mark.parametrize("visual", FORMATS)
 def test_a_box_in_each_format_lies_on_the_table_as_declared(visual: str, tmp_path: Path) -> None:
-    config = write(tmp_path, visual)
+    config = write(tmp_path, visual.format(tmp_path))
     assert np.ptp(load_mesh(config).vertices, axis=0) == pytest.approx([0.05, 0.05, 0.05])
     assert load_mesh(config).is_convex
     try_model(config)
