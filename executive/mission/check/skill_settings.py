@@ -130,21 +130,38 @@ def _is_weighing(skill: type[Skill]) -> bool:
 
 
 def find_undetectable_classes(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every class in the mission that no detector of the cell can detect."""
-    detectors = {
-        name: classes for name, classes in context.classes_by_detector.items() if classes is not None
-    }
-    if len(detectors) < len(context.classes_by_detector) or not detectors or context.cell is None:
+    """Yield an error for every class in the mission that none of its detectors can detect."""
+    classes_by_detector = context.classes_by_detector
+    detectors = {name: classes for name, classes in classes_by_detector.items() if classes is not None}
+    used_names = _find_used_detectors(context)
+    if not used_names <= detectors.keys() or not used_names or context.cell is None:
         # A detector with unknown classes may detect every class.
         return
     for label, span in _find_named_classes(context):
         section = context.cell.objects.get(label)
         detected = label if section is None else section.looks_like or label
-        if section is not None and not any(detected in classes for classes in detectors.values()):
+        if section is not None and not any(detected in detectors[name] for name in used_names):
             descriptions = "; ".join(f"{name}: {', '.join(classes)}" for name, classes in detectors.items())
-            message = f'no detector of the cell can detect the class "{label}"'
+            message = f'no detector that the mission asks can detect the class "{label}"'
             hint = f"Classes by detector: {descriptions}. Train another detector with `executive train`."
             yield make_error(span, "unseen-class", message, hint)
+
+
+def _find_used_detectors(context: CheckContext) -> set[str]:
+    """Return the names of the detectors that skills of the mission ask; a variable may name each detector."""
+    names = list(context.classes_by_detector)
+    used_names: set[str] = set()
+    for node, skill in context.find_installed_skills(context.iterate_nodes()):
+        for param in skill.params.values():
+            if param.refers_to == "detector":
+                value = node.settings[param.name].value if param.name in node.settings else param.default
+                if isinstance(value, Literal):
+                    value = value.value
+                if isinstance(value, str):
+                    used_names.update([value] if value else names[:1])  # The first detector is the default.
+                else:
+                    used_names.update(names)
+    return used_names.intersection(names)
 
 
 def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Span]]:
