@@ -12,10 +12,12 @@ import zipfile
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
+from urllib.parse import unquote
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
+import pybullet
 import pybullet_data
 from numpy.typing import ArrayLike, NDArray
 
@@ -27,6 +29,8 @@ MAX_MODEL_SIZE = 20_000_000
 """Maximum size of a model file [byte], to limit the duration of the check."""
 MAX_TRIANGLE_COUNT = 20_000
 """Maximum number of triangles of a mesh: a collision in PyBullet takes 3 s with 20,000, 60 s with 300,000."""
+FIXED_JOINTS = "joint[@type='fixed'][parent]"
+"""Path of the fixed joints of a URDF."""
 MESH_KINDS = {".obj": "Wavefront", ".stl": "STL", ".dae": "COLLADA"}
 """Formats of mesh files by suffix."""
 
@@ -50,7 +54,7 @@ def find_model(name: str) -> Path:
 
 
 def read_urdf(path: Path) -> Element:
-    """Return the root element of the URDF of an object.
+    """Return the root element of the URDF of an object; links joined by fixed joints become one link.
 
     Raises:
         InputError: The file is no URDF, refers to a file outside of its folder, or has an invalid mesh.
@@ -68,28 +72,63 @@ def read_urdf(path: Path) -> Element:
             _normalize_name(path, element.attrib["filename"])
         if element.tag == "mesh":
             read_mesh(find_mesh(path, element))
+    _merge_links(path, root)
     return root
+
+
+def _merge_links(path: Path, root: Element) -> None:
+    """Move the parts of links joined by fixed joints into the base, the link that is no child of a joint."""
+    joints = {
+        end.get("link"): joint for joint in root.findall(FIXED_JOINTS) for end in joint.findall("child")
+    }
+    links = {link.get("name"): link for link in root.findall("link")}
+    for name, link in links.items():
+        base = name
+        X_BL = Pose.identity()
+        left = dict(joints)  # each joint is passed once, even in a loop of joints
+        while (joint := left.pop(base, None)) is not None:
+            X_BL = _read_origin(path, joint) @ X_BL
+            base = joint.findall("parent")[0].get("link")
+        if base == name or base not in links:
+            continue
+        for part in link:
+            X_BP = X_BL @ _read_origin(path, part)
+            angles = pybullet.getEulerFromQuaternion(X_BP.quaternion)
+            xyz, rpy = (" ".join(map(str, numbers)) for numbers in (X_BP.position, angles))
+            part[:] = [child for child in part if child.tag != "origin"]
+            ElementTree.SubElement(part, "origin", xyz=xyz, rpy=rpy)
+        links[base].extend(link)
+        root.remove(link)
+        root.remove(joints[name])
+
+
+def _read_origin(path: Path, element: Element) -> Pose:
+    """Return the pose in the `origin` of an element of a URDF."""
+    origin = next(element.iter("origin"), Element("origin"))
+    xyz, rpy = (parse_numbers(path, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
+    return Pose(make_rotation(*rpy), np.array(xyz))
 
 
 def read_shapes(path: Path, tag: str) -> Triangles:
     """Return vertices and triangles of all `visual` or `collision` of a URDF, in the frame of its link.
 
     Raises:
-        InputError: There is none, a shape is unknown or invalid, or the URDF has several links.
+        InputError: There is none, a shape is unknown or invalid, or the URDF has several links or inertials.
     """
     root = read_urdf(path)
     vertices: list[Array] = []
     triangles: list[NDArray[np.intp]] = []
     for element in root.iterfind(f"link/{tag}"):
-        origin = next(element.iter("origin"), Element("origin"))
-        xyz, rpy = (parse_numbers(path, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
+        X_LE = _read_origin(path, element)
         for shape in element.iterfind("geometry/*"):
             points, faces = _read_shape(path, shape)
             triangles.append(faces + sum(map(len, vertices)))  # indices count the vertices of earlier shapes
-            vertices.append(Pose(make_rotation(*rpy), np.array(xyz)).apply(points))
-    if (link_count := len(root.findall("link"))) != 1 or not vertices:
-        problem = f"the model {path.name} has {link_count} link(s) and {len(vertices)} shape(s) as <{tag}>"
-        raise InputError(f"{problem}; merge all into one <link> with <visual> and <collision>")
+            vertices.append(X_LE.apply(points))
+    link_count, inertial_count = (len(root.findall(key)) for key in ("link", "link/inertial"))
+    if link_count != 1 or not vertices or inertial_count > 1:
+        counts = f"{link_count} link(s), {inertial_count} inertial(s) and {len(vertices)} shape(s) as <{tag}>"
+        needed = "one <link>, or links joined by fixed joints, with <visual>, <collision> and one <inertial>"
+        raise InputError(f"the model {path.name} has {counts}; an object is {needed}")
     return np.concatenate(vertices), np.concatenate(triangles)
 
 
@@ -129,7 +168,8 @@ def convert_model(path: Path) -> str:
     else:
         root = read_urdf(path)
         files = [(mesh, find_mesh(path, mesh)) for mesh in root.iter("mesh")]
-        if all(file.suffix == ".obj" and "://" not in mesh.attrib["filename"] for mesh, file in files):
+        names = [str(path.parent / mesh.attrib["filename"]) for mesh, _ in files]
+        if names == [convert_model(file) for _, file in files] and b"<joint" not in path.read_bytes():
             return str(path)
         for mesh, file in files:
             mesh.set("filename", convert_model(file))
@@ -155,18 +195,20 @@ def find_mesh(urdf: Path, mesh: Element) -> Path:
 
 
 def _normalize_name(urdf: Path, name: str) -> str:
-    """Return a file name without `file://`, `package://` or `package://NAME/`, relative to the URDF's folder.
+    """Return a file name without `package://NAME/`, `file://` etc., relative to the URDF's folder.
 
     Raises:
         InputError: The file is outside of the folder.
     """
-    path = name.removeprefix("package://")
-    if name.startswith("file://"):
-        path = os.path.relpath(name.removeprefix("file://"), urdf.parent)
-    elif path != name and not (urdf.parent / path).exists():
+    scheme, path = re.findall(r"^(?:(\w+):(?://)?)?(.*)", name)[0]
+    if scheme in ("package", "model") and not (urdf.parent / path).exists():
         path = path.partition("/")[2]
-    if is_outside_path(path) or has_outside_link(urdf.parent, path):
-        raise InputError(f'the model {urdf.name} names the file "{path}", which is outside of its folder')
+    if os.path.isabs(path):
+        path = os.path.relpath(os.path.realpath(unquote(path) if scheme else path), urdf.parent)
+    is_foreign = scheme not in ("", "file", "package", "model") or is_outside_path(path)
+    if is_foreign or has_outside_link(urdf.parent, path):
+        problem = f'the model {urdf.name} names the file "{name}", which is outside of its folder'
+        raise InputError(f"{problem}; copy the file into the folder, and name it without a folder")
     return path
 
 

@@ -58,10 +58,10 @@ def write(
     return ObjectConfig(urdf=str(folder / "m.urdf"), height=0.05, radius=0.0354)
 
 
-FORMATS = [BOX, STL, DAE, '<mesh filename="text.stl"/>', '<mesh filename="file://{}/p.dae"/>']
+LOCAL = '<mesh filename="file://{}/p.stl"/>'
 
 
-@pytest.mark.parametrize("visual", FORMATS)
+@pytest.mark.parametrize("visual", [BOX, STL, DAE, '<mesh filename="text.stl"/>', LOCAL])
 def test_a_box_in_each_format_lies_on_the_table_as_declared(visual: str, tmp_path: Path) -> None:
     config = write(tmp_path, visual.format(tmp_path))
     assert np.ptp(load_mesh(config).vertices, axis=0) == pytest.approx([0.05, 0.05, 0.05])
@@ -104,6 +104,18 @@ def test_a_primitive_has_its_size_and_a_closed_surface(shape: str, size: list[fl
 def test_geometry_far_from_the_origin_is_moved_to_the_object_frame(tmp_path: Path) -> None:
     config = write(tmp_path, BOX, origin=AWAY, inertial=AWAY + INERTIAL)
     assert load_mesh(config).vertices.mean(axis=0) == pytest.approx([0, 0, 0], abs=1e-9)
+    try_model(config)
+
+
+@pytest.mark.parametrize("shape", [BOX, STL])
+def test_links_joined_by_fixed_joints_are_one_object(shape: str, tmp_path: Path) -> None:
+    turn = '<origin xyz="0.3 0 0" rpy="0 1.5707963 0.2"/>'
+    back = '<origin xyz="0 0 -0.3" rpy="0.2 0 0"/>'  # the sum of both is a turn about the y axis
+    config = write(tmp_path, shape, origin=back, inertial=back + INERTIAL)
+    joint = f"<joint name='j' type='fixed'>{turn}<parent link='k'/><child link='l'/></joint><link name='k'/>"
+    text = Path(config.urdf).read_text().replace("</robot>", f"{joint}</robot>")
+    Path(config.urdf).write_text(text)
+    assert np.abs(load_mesh(config).vertices) == pytest.approx(0.025, abs=1e-6)
     try_model(config)
 
 

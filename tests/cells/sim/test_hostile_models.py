@@ -53,12 +53,12 @@ def test_a_file_that_is_no_mesh_is_an_error(content: str, tmp_path: Path) -> Non
         load_mesh(config)
 
 
-@pytest.mark.parametrize("mesh", ["/etc/x.obj", "../x.obj", "link.obj"])
+@pytest.mark.parametrize("mesh", ["/etc/x.obj", "../x.obj", "link.obj", "file:///etc/x.obj", "http://x.obj"])
 def test_a_mesh_outside_of_the_folder_of_its_urdf_is_not_opened(mesh: str, tmp_path: Path) -> None:
     (tmp_path / "link.obj").symlink_to("/etc/passwd")
     visual = f"<visual><geometry><mesh filename='{mesh}'/></geometry></visual>"
     (tmp_path / "m.urdf").write_text(f"<robot>{visual}</robot>")
-    with pytest.raises(InputError, match=r"names the file .*, which is outside of its folder$"):
+    with pytest.raises(InputError, match=rf'names the file "{mesh}", which is outside of its folder; copy'):
         load_mesh(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
 
 
