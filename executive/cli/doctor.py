@@ -1,19 +1,16 @@
 """`executive doctor`: checks of this installation, with a fix for each problem.
 
-Each check imports its packages itself, so that a missing package affects only this check. The module is also
-a program, `python -m executive.cli.doctor tiny|egl`, that prints the median rendering time of a frame.
-The command runs it in a separate process, so that a crash of an EGL driver does not end the command.
+Each check imports its packages itself, so that a missing package affects only this check.
 """
 
 from __future__ import annotations
 
 import os
 import platform
-import re
-import subprocess
+import statistics
 import sys
-from collections.abc import Callable, Iterator
-from importlib.util import find_spec
+import time
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import click
@@ -22,7 +19,6 @@ from executive.cli.options import json_option
 from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import InputError
 from executive.exit_codes import ExitCode
-from executive.processes import build_command
 
 MIN_PYTHON, MAX_PYTHON = (3, 10), (3, 11)
 """Oldest and newest Python version for which every required package has wheels."""
@@ -36,8 +32,6 @@ FRAME_COUNT = 5
 """Number of timed frames; the slower first frame of a process is not timed."""
 FRAME_SIZE = (640, 480)
 """Width and height of a frame [pixel]."""
-RENDER_TIMEOUT = 30.0
-"""Time after which a rendering process is ended [s]."""
 SERVER_TIMEOUT = 3.0
 """Time after which a server counts as unreachable [s]."""
 
@@ -149,15 +143,25 @@ def check_plugins() -> Iterator[CheckResult]:
 
 
 def check_renderer() -> Iterator[CheckResult]:
-    """Measure the time in which TinyRenderer renders a frame, and check PyBullet's EGL plugin."""
-    frame_time, problem = measure_frame_time("tiny")
-    ok_message = f"TinyRenderer, on the CPU: {frame_time:.0f} ms for 640x480 pixels of the cell overhead"
-    message, fix = f"TinyRenderer renders no frame: {problem}", "run `uv sync --reinstall-package pybullet`"
-    yield _make_result(not problem, "renderer", ok_message, "problem", message, fix)
-    _, egl_problem = measure_frame_time("egl")
-    state = f"renders no frame: {egl_problem}" if egl_problem else "can be loaded and renders"
-    status = "note" if egl_problem else "ok"
-    yield CheckResult(status, "egl", f"PyBullet's EGL plugin {state}; no cell needs it")
+    """Measure the median time in which TinyRenderer renders a frame of the cell overhead."""
+    from executive.cells.sim.camera import get_camera_pose
+    from executive.cells.sim.renderer import CELL_LIGHT, render
+    from executive.cells.sim.world import World
+    from executive.cli.cells import load_cells
+    from executive.perception.camera_model import compute_calibration
+
+    config = load_cells(("overhead",))["overhead"]
+    camera = next(iter(config.cameras.values()))
+    world = World(config)
+    matrix, _ = compute_calibration(camera)
+    times = []
+    for _ in range(1 + FRAME_COUNT):
+        start = time.perf_counter()
+        render(world, matrix, get_camera_pose(world, camera), (0, 0, *FRAME_SIZE), CELL_LIGHT)
+        times.append(time.perf_counter() - start)
+    duration = statistics.median(times[1:])
+    message = f"TinyRenderer, on the CPU: {1000 * duration:.0f} ms for 640x480 pixels of the cell overhead"
+    yield CheckResult("ok", "renderer", message)
 
 
 def check_roboflow() -> Iterator[CheckResult]:
@@ -181,20 +185,6 @@ def _make_result(
     return CheckResult(failure_status, subject, failure_message, fix)
 
 
-def measure_frame_time(renderer: str) -> tuple[float, str]:
-    """Render with `tiny` or `egl` in a subprocess; return the time per frame [ms], and an error or ""."""
-    argv = build_command("executive.cli.doctor", renderer)
-    try:
-        process = subprocess.run(argv, capture_output=True, text=True, timeout=RENDER_TIMEOUT, check=False)
-    except subprocess.TimeoutExpired:
-        return 0.0, f"no frame within {RENDER_TIMEOUT:.0f} s"
-    # Drivers may print text before and after the result, and may crash afterwards.
-    if result := re.search(r"^milliseconds: ([0-9.]+)$", process.stdout, re.MULTILINE):
-        return float(result[1]), ""
-    error_lines = process.stderr.strip().splitlines() or ["no error output"]
-    return 0.0, f"its process ended with exit code {process.returncode}: {error_lines[-1].strip()}"
-
-
 def is_reachable(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
     """Return True if a server answers within `timeout` [s]; an HTTP error is also an answer."""
     import urllib.error
@@ -205,39 +195,3 @@ def is_reachable(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
     except OSError as error:
         return isinstance(error, urllib.error.HTTPError)
     return True
-
-
-def prepare_renderer(renderer: str) -> Callable[[], object]:
-    """Return a function that renders a frame of the cell overhead (`tiny`) or of an empty scene (`egl`).
-
-    Raises:
-        SystemExit: The EGL plugin is missing or cannot be loaded.
-    """
-    import pybullet
-
-    from executive.cells.sim.camera import get_camera_pose
-    from executive.cells.sim.renderer import CELL_LIGHT, render
-    from executive.cells.sim.world import World
-    from executive.cli.cells import load_cells
-    from executive.perception.camera_model import compute_calibration
-
-    if renderer == "egl":
-        pybullet.connect(pybullet.DIRECT)
-        spec = find_spec("eglRenderer")
-        if spec is None or pybullet.loadPlugin(spec.origin, "_eglRendererPlugin") < 0:
-            sys.exit("the EGL plugin cannot be loaded")
-        return lambda: pybullet.getCameraImage(*FRAME_SIZE, renderer=pybullet.ER_BULLET_HARDWARE_OPENGL)
-    config = load_cells(("overhead",))["overhead"]
-    camera = next(iter(config.cameras.values()))
-    world = World(config)
-    matrix, _ = compute_calibration(camera)
-    return lambda: render(world, matrix, get_camera_pose(world, camera), (0, 0, *FRAME_SIZE), CELL_LIGHT)
-
-
-if __name__ == "__main__":
-    import statistics
-    import timeit
-
-    with keep_stdout_clean():
-        times = timeit.repeat(prepare_renderer(sys.argv[1]), number=1, repeat=1 + FRAME_COUNT)
-    click.echo(f"milliseconds: {1000 * statistics.median(times[1:]):.2f}")

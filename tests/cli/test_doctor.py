@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import http.server
 import json
+import re
 import socket
-import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -38,10 +38,6 @@ FILM = "ok film: av 14.0 encodes videos; the program ffmpeg is not needed"
 
 def shown(findings) -> list[str]:
     return [f"{mark} {subject}: {'; '.join(filter(None, rest))}" for mark, subject, *rest in findings]
-
-
-def ended(code: int = 0, stdout: str = "", stderr: str = ""):
-    return lambda *words, **options: subprocess.CompletedProcess([], code, stdout, stderr)
 
 
 @pytest.mark.parametrize(
@@ -131,38 +127,8 @@ def test_everything_registered_is_counted_and_loaded(tmp_path: Path, monkeypatch
             list(doctor.check_plugins())
 
 
-def test_both_renderers_draw(monkeypatch):
-    # A driver may print around the result, and crash after it.
-    monkeypatch.setattr(subprocess, "run", ended(-11, "GL=Mesa\nmilliseconds: 41.7\nDestroy\n"))
-    assert shown(doctor.check_renderer()) == [
-        "ok renderer: TinyRenderer, on the CPU: 42 ms for 640x480 pixels of the cell overhead",
-        "ok egl: PyBullet's EGL plugin can be loaded and renders; no cell needs it",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("run", "why"),
-    [
-        (ended(-11), "its process ended with exit code -11: no error output"),
-        (ended(1, "GL=Mesa\n", "starting\nit fails\n\n"), "its process ended with exit code 1: it fails"),
-        (None, "no frame within 30 s"),
-    ],
-)  # fmt: skip
-def test_no_renderer_draws(monkeypatch, run, why):
-    def hanging(*words: object, timeout: float, **options: object) -> None:
-        raise subprocess.TimeoutExpired("python", timeout)
-
-    monkeypatch.setattr(subprocess, "run", run or hanging)
-    assert shown(doctor.check_renderer()) == [
-        f"problem renderer: TinyRenderer renders no frame: {why}; run `uv sync --reinstall-package pybullet`",
-        f"note egl: PyBullet's EGL plugin renders no frame: {why}; no cell needs it",
-    ]
-
-
-@pytest.mark.slow
-def test_a_frame_is_really_drawn_in_a_process_of_its_own():
-    milliseconds, problem = doctor.measure_frame_time("tiny")
-    assert (milliseconds > 1, problem) == (True, "")
+def test_the_renderer_draws():
+    assert re.match(r"ok renderer: TinyRenderer, on the CPU: \d+ ms", shown(doctor.check_renderer())[0])
 
 
 HOSTED = "https://serverless.roboflow.com"
@@ -240,11 +206,10 @@ def test_everything_is_examined_whatever_fails(monkeypatch):
 
     monkeypatch.setattr("executive.plugins.load_skills", fail)
     monkeypatch.setitem(sys.modules, "executive.perception.detectors.roboflow.key", None)
-    monkeypatch.setattr(doctor, "measure_frame_time", lambda renderer: (9.0, ""))
     found = shown(doctor.run_checks())
     assert [line.split(": ")[0].split(" ")[1] for line in found] == [
         "python", "display", "packages", "opencv", "view", "cluster", "train", "film",
-        "plugins", "renderer", "egl", "roboflow",
+        "plugins", "renderer", "roboflow",
     ]  # fmt: skip
     assert found[8] == "problem plugins: the skill is broken; correct it"
     assert found[-1].startswith(

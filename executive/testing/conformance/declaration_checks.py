@@ -1,27 +1,20 @@
-"""Rules for the declarations and the imports of a skill, which are checked without a run.
+"""Rules for the declarations of a skill, which are checked without a run.
 
 Each public function is a rule: its docstring states the rule, and the function yields one text per violation.
 """
 
 from __future__ import annotations
 
-import ast
 import inspect
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 from executive.mission.model.conversion import find_problem
 from executive.skill import Param, Port
 from executive.testing.conformance.skill_runs import SkillRuns
-from executive.testing.conformance.source_files import find_source_files
 
 RESOURCES = ("arm", "tool", "camera")
 """Values that `uses` of a skill may contain."""
-FORBIDDEN_PACKAGES = (
-    "py_trees", "pybullet", "ruckig", "threading", "multiprocessing", "concurrent", "subprocess", "time",
-    "asyncio",
-)  # fmt: skip
-"""Packages that skills must not import: skills use only the tick thread, the run's clock and the cell."""
 HALT = "halt"
 """Key of `tool_state_after_failure` for the state of the tool after a halt."""
 
@@ -71,18 +64,6 @@ def declares_resources(runs: SkillRuns) -> Iterator[str]:
             yield f"{problem}. Allowed: {', '.join(allowed_keys)}."
 
 
-def imports_allowed_modules(runs: SkillRuns) -> Iterator[str]:
-    """The file imports no package with a clock, with threads, or for only one kind of cell."""
-    for path in filter(lambda path: path.is_file(), find_source_files(runs.skill)):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            for package in _find_imported_packages(node):
-                if package in FORBIDDEN_PACKAGES:
-                    yield (
-                        f"{path.name}:{getattr(node, 'lineno', 0)} imports {package}. "
-                        "A skill must get the time from cell.clock, and act only through cell."
-                    )
-
-
 def _describe_default_problem(param: Param) -> str:
     """Return the predicate of a sentence about an invalid default; "" if the default is valid."""
     # The default None is allowed even if it is not among the choices.
@@ -91,12 +72,3 @@ def _describe_default_problem(param: Param) -> str:
         return str(find_problem(param.default, declaration) or "")
     except TypeError as problem:
         return str(problem)
-
-
-def _find_imported_packages(node: ast.AST) -> Sequence[str]:
-    """Return the top-level packages that a statement imports; empty if it is not an import."""
-    if isinstance(node, ast.Import):
-        return [alias.name.partition(".")[0] for alias in node.names]
-    if isinstance(node, ast.ImportFrom) and node.module and not node.level:
-        return [node.module.partition(".")[0]]
-    return []

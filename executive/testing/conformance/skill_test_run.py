@@ -5,10 +5,12 @@ from __future__ import annotations
 import copy
 import pickle
 import signal
+import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from time import perf_counter
 from traceback import extract_tb, walk_stack
 from types import FrameType
@@ -21,7 +23,6 @@ from executive.errors import Fault
 from executive.events import NodeStarted, TimedEvent
 from executive.skill import Skill, SkillFailed
 from executive.testing.conformance.situations import Arrange, Situation, prepare_scene
-from executive.testing.conformance.source_files import find_skill_line
 from executive.testing.faults import FaultyCell, during
 from executive.testing.faults.effect import Effect
 from executive.tree.skill_run import SkillRun
@@ -170,7 +171,7 @@ class SkillTestRun:
             return "FAILURE"
         except Exception as error:
             frames = reversed(extract_tb(error.__traceback__))
-            place = find_skill_line(self.skill, ((frame.filename, frame.lineno or 0) for frame in frames))
+            place = _find_skill_line(self.skill, ((frame.filename, frame.lineno or 0) for frame in frames))
             kind = "" if isinstance(error, Fault) else f"{type(error).__name__}: "
             self.message = f"{kind}{error}" + (f" ({place})" if place else "")
             return "FAULT"
@@ -204,7 +205,7 @@ def interrupt_stuck_ticks(skill: type[Skill], count_ticks: Callable[[], int]) ->
         unchanged_checks, last_tick = (unchanged_checks + 1 if tick == last_tick else 0), tick
         if unchanged_checks >= PROGRESS_CHECKS:
             callers = walk_stack(frame)
-            place = find_skill_line(skill, ((caller.f_code.co_filename, line) for caller, line in callers))
+            place = _find_skill_line(skill, ((caller.f_code.co_filename, line) for caller, line in callers))
             raise TickStuck(f"did not return for {STUCK_TIMEOUT:g} s{place and f', at {place}'}")
 
     old_handler = signal.signal(signal.SIGALRM, on_timer)
@@ -223,3 +224,15 @@ def has_equal_pickle(value: Any, other: Any) -> bool:
         return pickle.dumps(value) == pickle.dumps(other)
     except (pickle.PicklingError, TypeError, AttributeError):
         return True
+
+
+def _find_skill_line(skill: type[Skill], frames: Iterable[tuple[str, int]]) -> str:
+    """Return the first `(file, line)` that is in a source file of the skill, as `wave.py:12`, or "".
+
+    The files of a skill are those of its class and its base classes, except base classes of this package.
+    """
+    package = Skill.__module__.partition(".")[0]
+    module_names = [parent.__module__ for parent in skill.__mro__ if issubclass(parent, Skill)]
+    modules = [sys.modules.get(name) for name in module_names if name.partition(".")[0] != package]
+    files = {getattr(module, "__file__", "") for module in modules}
+    return next((f"{Path(file).name}:{line}" for file, line in frames if file in files), "")
