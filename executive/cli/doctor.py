@@ -9,7 +9,7 @@ import os
 import platform
 import statistics
 import sys
-import time
+import timeit
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -154,11 +154,8 @@ def check_renderer() -> Iterator[CheckResult]:
     camera = next(iter(config.cameras.values()))
     world = World(config)
     matrix, _ = compute_calibration(camera)
-    times = []
-    for _ in range(1 + FRAME_COUNT):
-        start = time.perf_counter()
-        render(world, matrix, get_camera_pose(world, camera), (0, 0, *FRAME_SIZE), CELL_LIGHT)
-        times.append(time.perf_counter() - start)
+    arguments = (world, matrix, get_camera_pose(world, camera), (0, 0, *FRAME_SIZE), CELL_LIGHT)
+    times = timeit.repeat(lambda: render(*arguments), number=1, repeat=1 + FRAME_COUNT)
     duration = statistics.median(times[1:])
     message = f"TinyRenderer, on the CPU: {1000 * duration:.0f} ms for 640x480 pixels of the cell overhead"
     yield CheckResult("ok", "renderer", message)

@@ -195,9 +195,8 @@ class LedgerQueries:
 
         Two objects of a class may exchange their items if looks miss one of them.
         """
-        other_positions = [position for item, position in self._failed_picks if item != record.item]
-        distances = [record.distance_to(position) for position in other_positions]
-        return record.failed_pick_count + sum(distance <= self.config.gate for distance in distances)
+        others = [position for item, position in self._failed_picks if item != record.item]
+        return record.failed_pick_count + sum(record.distance_to(each) <= self.config.gate for each in others)
 
     def _is_separate(self, position: Array, targets: Collection[Target | Observation]) -> bool:
         """Return True if `position` `(3,)` [m] is neither in a bin nor at one of `targets`.

@@ -158,7 +158,8 @@ def decode_behaviour_step(value: Any) -> BehaviourStep:
 def _encode_value(value: object) -> list[Any] | str:
     """Return a value in a list, behind it the type if it is a collection, or only the name of its type."""
     plain_value = value.item() if isinstance(value, np.generic) else value
-    content, type_name = plain_value, type(plain_value).__name__
+    content = plain_value
+    type_name = type(plain_value).__name__
     # The value may be an object of another project, whose methods may raise any exception.
     with contextlib.suppress(Exception):
         if isinstance(plain_value, tuple):

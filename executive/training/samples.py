@@ -39,8 +39,10 @@ CORNER_FRACTIONS = (0.9, 0.1)
 end outside of their images if they are read as corner and size."""
 MIN_SHIFTED_FRACTION = 0.05
 """Minimum fraction of boxes that end outside of their images if corner and centre were confused."""
-COCO_FORM, YOLO_FORM = "left, top, width and height", "centre x, centre y, width and height"
-"""Meaning of the numbers of a box."""
+COCO_FORM = "left, top, width and height"
+"""Meaning of the numbers of a box in a COCO file."""
+YOLO_FORM = "centre x, centre y, width and height"
+"""Meaning of the numbers of a box in a YOLO file."""
 MAX_CORNER_FRACTION = 0.02
 """Maximum coordinate, as a fraction of the image, of boxes in 0..1 that are read as pixels."""
 MAX_BOX_WORDS = 6
@@ -143,8 +145,8 @@ class LabelledDataset:
         self._property_folder = folder if path == folder else path.parent
         self.classes = self._read_coco() if is_coco else self._read_yolo()
         boxes = np.concatenate(self._relative_boxes)
-        form, other_form = (COCO_FORM, YOLO_FORM) if is_coco else (YOLO_FORM, COCO_FORM)
-        if wrong_form := _find_wrong_form(boxes, other_form):
+        form = COCO_FORM if is_coco else YOLO_FORM
+        if wrong_form := _find_wrong_form(boxes, YOLO_FORM if is_coco else COCO_FORM):
             problem = f"many boxes end outside of their images, and seem to be {wrong_form}"
             raise InputError(f"{self._source.file}: {problem}; write {form}")
         object_count = self.object_counts.total()
@@ -316,7 +318,9 @@ def _may_have_keypoints(rows: Iterable[list[str]]) -> bool:
         numbers = np.array(numbers_of_labels, float)
     except ValueError:
         return False  # The parser of the labels names the word that is no number.
-    centres, sizes, keypoints = numbers[:, None, :2], numbers[:, None, 2:4], numbers[:, 4:]
+    centres = numbers[:, None, :2]
+    sizes = numbers[:, None, 2:4]
+    keypoints = numbers[:, 4:]
     if keypoints.shape[1] % 3 == 0 and np.isin(keypoints[:, 2::3], (0, 1, 2)).all():
         return True  # The third number of a keypoint is its visibility.
     if keypoints.shape[1] % 2:

@@ -165,8 +165,9 @@ class FakeCell(CellWithoutHardware):
             name = bin.name if bin else ""
             entry = FinalObject(each.label, name, positions, each.is_dropped, each is held, is_removed)
             objects.append(entry)
-        ledger, bins, gate = self.ledger, self.cell.bins, self.config.ledger.gate
-        return count_outcomes(objects, ledger.records, bins, self.routes, gate, ledger.ignored_positions)
+        gate = self.config.ledger.gate
+        ignored = self.ledger.ignored_positions
+        return count_outcomes(objects, self.ledger.records, self.cell.bins, self.routes, gate, ignored)
 
     def close(self) -> None:
         """Close the log."""

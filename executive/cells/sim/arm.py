@@ -151,7 +151,8 @@ class SimArm:
             raise Fault(f"the simulated arm follows its own planned motions, not a {type(motion).__name__}")
         if error := _describe_difference(self._commanded_q, motion.start, START_TOLERANCE):
             raise Fault(f"the start of the motion is not at the end of the last motion: {error}")
-        self.collision, self.contact_point = self._describe_disturbance(START_TOLERANCE) or None, None
+        self.collision = self._describe_disturbance(START_TOLERANCE) or None
+        self.contact_point = None
         if self.collision is not None:
             self._commanded_q = self.q
             self.send_command()

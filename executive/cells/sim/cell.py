@@ -126,9 +126,10 @@ class SimCell(SimCellChecks, CellWithoutHardware):
 
     def audit(self) -> dict[str, int]:
         """Return the number of objects by `AUDIT_KEYS`; `left` counts the objects on the table."""
-        ledger, bins, gate = self.accounts, self.cell.bins, self.config.ledger.gate
-        objects = list_final_objects(self._world, self._tool, bins)
-        return count_outcomes(objects, ledger.records, bins, self.routes, gate, ledger.ignored_positions)
+        gate = self.config.ledger.gate
+        ignored = self.accounts.ignored_positions
+        objects = list_final_objects(self._world, self._tool, self.cell.bins)
+        return count_outcomes(objects, self.accounts.records, self.cell.bins, self.routes, gate, ignored)
 
     def close(self) -> None:
         """Close the detectors, the planner and the physics servers."""

@@ -78,9 +78,8 @@ def read_urdf(path: Path) -> Element:
 
 def _merge_links(path: Path, root: Element) -> None:
     """Move the parts of links joined by fixed joints into the base, the link that is no child of a joint."""
-    joints = {
-        end.get("link"): joint for joint in root.findall(FIXED_JOINTS) for end in joint.findall("child")
-    }
+    pairs = [(joint, child) for joint in root.findall(FIXED_JOINTS) for child in joint.findall("child")]
+    joints = {child.get("link"): joint for joint, child in pairs}
     links = {link.get("name"): link for link in root.findall("link")}
     for name, link in links.items():
         base = name

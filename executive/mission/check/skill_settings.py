@@ -155,10 +155,9 @@ def _find_used_detectors(context: CheckContext) -> set[str]:
         for param in skill.params.values():
             if param.refers_to == "detector":
                 value = node.settings[param.name].value if param.name in node.settings else param.default
-                if isinstance(value, Literal):
-                    value = value.value
-                if isinstance(value, str):
-                    used_names.update([value] if value else names[:1])  # The first detector is the default.
+                name = value.value if isinstance(value, Literal) else value
+                if isinstance(name, str):
+                    used_names.update([name] if name else names[:1])  # The first detector is the default.
                 else:
                     used_names.update(names)
     return used_names.intersection(names)
