@@ -47,8 +47,9 @@ MAX_CORNER_FRACTION = 0.02
 """Maximum coordinate, as a fraction of the image, of boxes in 0..1 that are read as pixels."""
 MAX_BOX_WORDS = 6
 """Maximum number of words of a YOLO box: class, centre, size, and perhaps confidence."""
-MIN_LABEL_FRACTION = 0.9
-"""Minimum fraction of the labels that fit a form, if all labels have the form."""
+KEYPOINT_FRACTIONS = (0.9, 0.75)
+"""Minimum fraction of labels whose box contains all points, and maximum fraction that fits polygons, if the
+labels may be boxes with keypoints."""
 MAX_FRACTION = 1.02
 """Maximum coordinate in an image, as a fraction of its width or height; annotation tools round."""
 OUTSIDE, SMALL = "boxes outside of the image dropped", "boxes smaller than a pixel dropped"
@@ -330,7 +331,7 @@ def _may_have_keypoints(rows: Iterable[list[str]]) -> bool:
     is_inside = (np.abs(offsets) <= sizes / 2 + MAX_FRACTION - 1).all(axis=(1, 2))
     max_distances = np.linalg.norm(offsets, axis=2).max(axis=1)
     is_polygon = np.linalg.norm(sizes - centres, axis=2)[:, 0] <= max_distances
-    return bool(is_inside.mean() >= MIN_LABEL_FRACTION > is_polygon.mean())
+    return bool(is_inside.mean() >= KEYPOINT_FRACTIONS[0] and is_polygon.mean() < KEYPOINT_FRACTIONS[1])
 
 
 def _find_wrong_form(relative: Array, other_form: str) -> str:
