@@ -10,7 +10,7 @@ from executive.cell.workcell import CellOptions, ResumePoint, Workcell
 from executive.cells.fake.cell import SilentOperator
 from executive.events import discard_event
 from executive.mission.load import LoadedMission
-from executive.testing.faults.world_access import WorldAccess, open_world
+from executive.testing.world_access import WorldAccess, open_world
 
 
 def meanwhile(

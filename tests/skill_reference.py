@@ -99,11 +99,8 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("executive.testing.substitutes", "testing/substitutes.py", ""),
     ],
     "Test kit: faults": [
-        ("Times of faults", "testing/faults/script.py", ""),
-        ("Effects on tool, arm, camera, localizer, table and operator", "testing/faults/robot_faults.py", ""),
-        ("Effects on objects", "testing/faults/object_faults.py", ""),
-        ("Effects on detectors", "testing/faults/detector_faults.py", ""),
-        ("effect = Effect(...)", "testing/faults/effect.py", "Effect"),
+        ("Times and effects", "testing/faults.py", ""),
+        ("effect = Effect(...)", "testing/faults.py", "Effect"),
     ],
     "Test kit: conformance": [
         ("Checks of the declarations", "testing/conformance/declaration_checks.py", ""),

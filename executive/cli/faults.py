@@ -49,31 +49,34 @@ def command(
     has_conflict = sum((pairs is not None, fault_numbers is not None, list_only)) > 1
     options.check_usage((has_conflict, "--pairs, --fault and --list exclude each other; give one of them"))
     with keep_stdout_clean():
-        from executive.campaign.faults import results as fault_results
-        from executive.campaign.faults.campaign import Campaign
-        from executive.campaign.faults.trial import record_trial
+        from executive.campaign.faults import campaign as fault_campaign
         from executive.campaign.mission_under_test import load_mission_under_test
         from executive.campaign.pool import JobOptions
         from executive.cli.progress import print_halt, show_progress
 
         mission_under_test = load_mission_under_test(mission, overrides, oracle, seed)
         with show_progress("faults", quiet=as_json or list_only or fault_numbers is not None) as progress:
-            campaign = Campaign(mission_under_test, JobOptions(workers, progress, print_halt))
+            campaign = fault_campaign.Campaign(mission_under_test, JobOptions(workers, progress, print_halt))
             output: Any
+            exit_code = 0
             if list_only:
-                descriptions = dict(enumerate(map(str, campaign.faults), start=1))
-                output = [{"fault": number, "description": text} for number, text in descriptions.items()]
-                text, exit_code = "\n".join(f"{number:4} {text}" for number, text in descriptions.items()), 0
+                output = [
+                    {"fault": number, "description": str(fault)}
+                    for number, fault in enumerate(campaign.faults, start=1)
+                ]
+                text = "\n".join(f"{entry['fault']:4} {entry['description']}" for entry in output)
             elif fault_numbers is not None:
                 faults = campaign.select_faults(fault_numbers)
-                trial, path = record_trial(mission_under_test, campaign.nominal_run, faults, runs_folder)
-                output = {**fault_results.trial_to_json(trial), "run": str(path)}
-                text = "\n".join((*fault_results.list_trial_lines(trial), str(path)))
+                nominal_run = campaign.nominal_run
+                trial = fault_campaign.run_trial(mission_under_test, faults, nominal_run, runs_folder)
+                output = fault_campaign.trial_to_json(trial)
+                text = "\n".join(fault_campaign.list_trial_lines(trial))
                 exit_code = int(bool(trial.problems))
             else:
                 results = campaign.run_fault_pairs(pairs) if pairs else campaign.run_single_faults()
-                output = fault_results.results_to_json(results)
-                text = "\n".join(fault_results.list_result_lines(results))
-                exit_code = int(bool(results.failed_trials)) if results.is_complete else ExitCode.HALTED
+                output = fault_campaign.results_to_json(campaign, results)
+                text = "\n".join(fault_campaign.list_result_lines(campaign, results))
+                has_problems = any(trial.problems for trial in results.trials)
+                exit_code = int(has_problems) if results.is_complete else ExitCode.HALTED
     print_json(output) if as_json else click.echo(text)
     return exit_code

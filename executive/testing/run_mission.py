@@ -20,8 +20,7 @@ from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.skill import Skill
-from executive.testing.faults.faulty_cell import FaultyCell, with_faults
-from executive.testing.faults.script import ScheduledFault
+from executive.testing.faults import FaultyCell, ScheduledFault, with_faults
 from executive.tree.skill_leaf import SkillLeaf
 
 MISSION_TIMEOUT = 600.0

@@ -33,7 +33,7 @@ from executive.record.resume import resume_run
 from executive.record.run_directory import LATEST_LINK, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
-from executive.testing.faults.world_access import TrueObject, WorldAccess
+from executive.testing.world_access import TrueObject, WorldAccess
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command, show_progress
 from tests.meanwhile import meanwhile

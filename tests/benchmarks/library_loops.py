@@ -20,10 +20,15 @@ import numpy as np
 from executive.cell.detection import Answer
 from executive.errors import Fault
 from executive.plugins import load_cell_kind
-from executive.testing.faults import ScheduledFault, after, tool_does_not_release, with_probability
-from executive.testing.faults.detector_faults import make_detector_effect
-from executive.testing.faults.effect import Effect, Occurrence
-from executive.testing.faults.object_faults import MAX_TOOL_DISTANCE
+from executive.testing.faults import (
+    Effect,
+    Occurrence,
+    ScheduledFault,
+    after,
+    during,
+    make_detector_effect,
+    tool_does_not_release,
+)
 from executive.testing.run_mission import MissionResult, run_mission
 
 ATTEMPTS = {
@@ -35,6 +40,8 @@ ASSUMED_RATES = {"miss_rate": 0.15, "confusion_rate": 0.05, "false_detections": 
 """Rates of the detector of a fake cell in every second run, as for a detector that was never measured."""
 UNMEASURED_THRESHOLD = 0.49
 """Threshold without a measurement, so that every second run on a simulated cell assumes high rates."""
+MAX_TOOL_DISTANCE = 0.03
+"""Maximum horizontal distance between tool and object if the tool touches the object [m]."""
 TIMEOUT = 900.0
 """Longest time of a run on its clock [s]."""
 
@@ -112,10 +119,13 @@ def run_with_faults(seed: int, kind: str) -> tuple[str, int, MissionResult, Part
     mission = list(ATTEMPTS)[seed % len(ATTEMPTS)]
     parts = Parts.draw(rng)
     labels = ("bolt", "nut", "washer") if "fasteners" in mission else ("cube", "sphere", "duck")
+    stuck_releases = [
+        number for number in range(1, 1000) if np.random.default_rng([seed, number]).random() < 0.05
+    ]
     faults: list[ScheduledFault] = [
         after(0.0, Effect("part", parts.drop, {"close": parts.close})),
         after(0.0, make_detector_effect("detector_errs", make_errors(rng, labels))),
-        with_probability(0.05, "*/Release", tool_does_not_release(), seed=seed),
+        during("*/Release", tool_does_not_release(), activations=stuck_releases),
     ]
     values: dict[str, Any] = {"cell.kind": kind}
     if seed % 2:

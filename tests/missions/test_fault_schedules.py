@@ -10,9 +10,15 @@ import pytest
 from executive.cell.detection import Answer, Detection
 from executive.cells.fake.cell import FakeCell
 from executive.plugins import load_cell_kind
-from executive.testing.faults import ScheduledFault, after, during, object_bumped, with_probability
-from executive.testing.faults.detector_faults import make_detector_effect
-from executive.testing.faults.effect import Effect, Occurrence
+from executive.testing.faults import (
+    Effect,
+    Occurrence,
+    ScheduledFault,
+    after,
+    during,
+    make_detector_effect,
+    object_bumped,
+)
 from executive.testing.run_mission import MissionResult, run_mission
 
 X_RANGE, Y_RANGE = (0.42, 0.64), (-0.22, 0.22)
@@ -81,7 +87,8 @@ def schedule(kind: str, seed: int) -> list[ScheduledFault]:
     if kind == "false detection":
         return [after(0.0, detector_adds_false_box(seed))]
     if kind == "wrong classes in a third of the looks":
-        return [with_probability(0.3, "*/Detect", detector_swaps_classes(), seed=seed)]
+        looks = (1 + np.flatnonzero(np.random.default_rng(seed).random(1000) < 0.3)).tolist()
+        return [during("*/Detect", detector_swaps_classes(), activations=looks)]
     if kind == "exchanged before an approach":
         return [during("*/Approach", Effect("objects_exchanged", exchange_objects), activations=1 + seed % 3)]
     assert kind == "emptied bin"

@@ -4,50 +4,138 @@ from __future__ import annotations
 
 import math
 import random
-from collections import defaultdict
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
+from pathlib import Path
 
-from executive.campaign.faults.fault_list import list_faults
-from executive.campaign.faults.nominal_run import execute_nominal_run
-from executive.campaign.faults.planned_fault import PlannedFault
-from executive.campaign.faults.results import Branch, FaultCampaignResults, Trial
-from executive.campaign.faults.trial import FaultsByNumber, run_trial
+from executive.campaign.faults.fault_list import INJECTED_MESSAGE, PlannedFault, SkillFault, list_faults
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.campaign.pool import JobOptions, run_jobs
 from executive.errors import InputError
+from executive.events import RunEnded
+from executive.ledger.outcomes import is_balanced
+from executive.mission.flow_analysis import UnhandledFailure
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SubtreeNode
+from executive.record.recorded_run import RecordedRun, make_run_directory
+from executive.record.recorder import Recorder
+from executive.record.result import is_confirmed_by_audit
+from executive.record.timeline.activation import group_by_node
+from executive.record.timeline.timeline import Timeline
+from executive.run.assembly import RunOptions, assemble
+from executive.skill import Skill
+from executive.testing.faults import FaultyCell, with_faults
+from executive.view.report.page import try_write_report
+from executive.view.terminal.summary import describe_end
 
 MAX_FAULTS_PER_RUN = 4
 """Maximum number of faults in a run: the fault under test, and the faults that activate its node."""
+MIN_TIMEOUT = 60.0
+"""Minimum timeout of a run with faults, on the run's clock [s]."""
+TIMEOUT_FACTOR = 10.0
+"""Additional timeout of a run with faults, as a multiple of the duration of the run without faults."""
+DISPLACING_EFFECTS = frozenset({"object_removed", "object_moved", "seal_breaks"})
+"""Values of `FaultInjected.name` for the faults that may move an object out of reach of the arm."""
 
 FaultNumbers = tuple[int, ...]
-"""Numbers of the faults of a run; the last fault is under test."""
+"""Numbers of the faults of a run; the last fault is under test, and the earlier faults activate its node."""
+FaultsByNumber = Mapping[int, PlannedFault]
+"""Faults of a run by number, in the same order."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial(RunEnded):
+    """One run with injected faults: its `RunEnded` event, its faults, and the results of its checks.
+
+    Attributes:
+        faults: Injected faults by number. The last fault is under test, and occurs only after all others.
+        have_occurred: True if all faults occurred.
+        had_effect: True if the affected node failed with the expected reason, or if no reason is expected.
+        items: Number of items in the ledger by state.
+        audit: Number of objects by their true place, or None if there was no audit.
+        missing_count: Number of objects in bins after a run without faults, minus the number after this run.
+        steps_by_path: Number of control steps of each activation of a node, by path of the node.
+        run_directory: Path of the directory of a recorded run, or "".
+        problems: Sentences about violated requirements.
+    """
+
+    faults: FaultsByNumber
+    have_occurred: bool = False
+    had_effect: bool = True
+    items: Mapping[str, int] = field(default_factory=dict)
+    audit: Mapping[str, int] | None = None
+    missing_count: int = 0
+    steps_by_path: Mapping[str, Sequence[int]] = field(default_factory=dict)
+    run_directory: str = ""
+    problems: tuple[str, ...] = ()
+
+    @property
+    def fault_option(self) -> str:
+        """Value of the option `--fault` that repeats the trial: `12`, or `3+12`."""
+        return "+".join(map(str, self.faults))
+
+    @property
+    def verdict(self) -> str:
+        """Verdict: `!!` (problem), `-` (fault did not occur), `ok`, `ok -N` (N objects fewer), or status."""
+        if self.problems:
+            return "!!"
+        if not self.have_occurred:
+            return "-"
+        if self.status in ("SUCCESS", "INCOMPLETE"):
+            return f"ok -{self.missing_count}" if self.missing_count > 0 else "ok"
+        return f"FAILURE {self.reason}" if self.status == "FAILURE" else self.status
+
+
+@dataclass(frozen=True)
+class CampaignResults:
+    """Results of a fault campaign on one mission.
+
+    Attributes:
+        trials: All trials, in the order of the faults.
+        branches: Number of trials that entered a branch of the tree that runs only after a failure or at the
+            end, by file, line and name of the branch (`catch on Grasp.missed`, `recover`, `finally`).
+        is_complete: False if the user ended the campaign before its last run.
+    """
+
+    trials: Sequence[Trial]
+    branches: Mapping[str, int]
+    is_complete: bool
 
 
 class Campaign:
-    """A fault campaign; the constructor executes the nominal run and lists the faults.
+    """A fault campaign; the constructor executes the mission without a fault and lists the faults.
 
     Args:
         mission: The mission and its cell.
         options: Number of processes, and functions that are called during the campaign.
 
     Attributes:
-        nominal_run: Results of the run without a fault.
+        mission: The mission and its cell.
+        nominal_run: The run without a fault.
         faults: All single faults; the number of a fault is its position in this list, from 1.
 
     Raises:
-        ExecutiveError: The mission does not succeed without a fault.
-        KeyboardInterrupt: The user halted the nominal run.
+        InputError: The mission does not succeed without a fault, or ledger and ground truth disagree.
+        KeyboardInterrupt: The user halted the run without a fault.
     """
 
     def __init__(self, mission: MissionUnderTest, options: JobOptions = JobOptions()) -> None:
         self.mission = mission
-        self.nominal_run = execute_nominal_run(mission)
-        self.faults: Sequence[PlannedFault] = list_faults(mission, self.nominal_run)
         self._options = options
+        self.nominal_run = run = run_trial(mission, {})
+        if run.status == "HALTED":
+            raise KeyboardInterrupt
+        if run.status != "SUCCESS" or run.problems or (run.audit and run.audit["unseen"]):
+            end_text = " ".join((run.status, run.reason, run.message, *run.problems))
+            raise InputError(
+                f"without a fault, {mission.name} with seed {mission.seed} ends as {end_text}; a campaign "
+                "needs a run that succeeds and observes the whole table: choose another seed or mission"
+            )
+        self.faults = list_faults(mission, run.steps_by_path, run.robot_time)
 
     def select_faults(self, numbers: FaultNumbers) -> dict[int, PlannedFault]:
         """Return the faults with these numbers, by number.
@@ -57,11 +145,13 @@ class Campaign:
         """
         for number in numbers:
             if not 1 <= number <= len(self.faults):
-                advice = f"the numbers are 1 to {len(self.faults)}, and --list shows them"
-                raise InputError(f"{self.mission.name} has no fault {number}; {advice}")
+                raise InputError(
+                    f"{self.mission.name} has no fault {number}; "
+                    f"the numbers are 1 to {len(self.faults)}, and --list shows them"
+                )
         return {number: self.faults[number - 1] for number in numbers}
 
-    def run_single_faults(self) -> FaultCampaignResults:
+    def run_single_faults(self) -> CampaignResults:
         """Execute a run for each single fault and return the results.
 
         If a node runs only after other faults, the smallest combination of faults that activates the node is
@@ -72,10 +162,10 @@ class Campaign:
         while is_complete and (combinations := self._list_next_combinations(trials)):
             ended_trials, is_complete = self._run_trials(combinations, len(trials))
             trials += ended_trials
-        trials.sort(key=lambda trial: (trial.fault_numbers[-1], trial.fault_numbers))
-        return self._make_results(trials, is_complete=is_complete, has_pairs=False)
+        trials.sort(key=lambda trial: tuple(reversed(trial.faults)))
+        return CampaignResults(trials, count_branch_entries(self.mission.loaded.tree, trials), is_complete)
 
-    def run_fault_pairs(self, count: int) -> FaultCampaignResults:
+    def run_fault_pairs(self, count: int) -> CampaignResults:
         """Execute a run for each of `count` random pairs of faults and return the results.
 
         The seed of the mission determines the pairs; bugs, conditional and replacing faults are excluded.
@@ -85,44 +175,34 @@ class Campaign:
             for number, fault in enumerate(self.faults, 1)
             if not (fault.is_conditional or fault.replaces_previous or fault.is_bug)
         ]
-        random_generator, pairs = random.Random(self.mission.seed), dict[FaultNumbers, None]()
+        random_generator = random.Random(self.mission.seed)
+        pairs: dict[FaultNumbers, None] = {}
         while len(pairs) < min(count, math.comb(len(numbers), 2)):
             pairs[tuple(sorted(random_generator.sample(numbers, 2)))] = None
         trials, is_complete = self._run_trials(list(pairs), 0)
-        return self._make_results(trials, is_complete=is_complete, has_pairs=True)
-
-    def _make_results(self, trials: list[Trial], is_complete: bool, has_pairs: bool) -> FaultCampaignResults:
-        """Return the results of the campaign."""
-        mission, branches = self.mission, find_branches(self.mission.loaded.tree, trials)
-        return FaultCampaignResults(
-            mission.name, mission.cell_description, mission.seed, self.nominal_run.duration,
-            len(self.faults), tuple(trials), branches, is_complete, has_pairs,
-        )  # fmt: skip
+        return CampaignResults(trials, count_branch_entries(self.mission.loaded.tree, trials), is_complete)
 
     def _list_next_combinations(self, trials: Sequence[Trial]) -> list[FaultNumbers]:
         """Return the combinations of faults for the next trials, which can occur according to `trials`."""
-        triggers_by_path = self._find_smallest_triggers(trials)
-        trials_by_number = {trial.fault_numbers[-1]: trial for trial in trials}
+        # The smallest combination of faults that activated a node, by path of the node.
+        triggers_by_path: dict[str, FaultNumbers] = {}
+        trials_by_number: dict[int, Trial] = {}
+        for trial in sorted(trials, key=lambda trial: (len(trial.faults), tuple(trial.faults))):
+            number = list(trial.faults)[-1]
+            trials_by_number[number] = trial
+            if not self.faults[number - 1].is_bug:
+                for path in trial.steps_by_path:
+                    triggers_by_path.setdefault(path, tuple(trial.faults))
         combinations = []
         for number, fault in enumerate(self.faults, 1):
-            if number in trials_by_number:
-                continue
             previous_trial = trials_by_number.get(number - 1)
-            if fault.replaces_previous and (previous_trial is None or previous_trial.had_effect):
+            is_replaced = fault.replaces_previous and (previous_trial is None or previous_trial.had_effect)
+            triggers = triggers_by_path.get(fault.location) if fault.is_conditional else ()
+            if number in trials_by_number or is_replaced or triggers is None:
                 continue
-            required_faults = triggers_by_path.get(fault.location) if fault.is_conditional else ()
-            if required_faults is not None and len(required_faults) < MAX_FAULTS_PER_RUN:
-                combinations.append((*required_faults, number))
+            if len(triggers) < MAX_FAULTS_PER_RUN:
+                combinations.append((*triggers, number))
         return combinations
-
-    def _find_smallest_triggers(self, trials: Iterable[Trial]) -> dict[str, FaultNumbers]:
-        """Return the smallest combination of faults that activated a node, by path of the node."""
-        triggers_by_path: dict[str, FaultNumbers] = {}
-        for trial in sorted(trials, key=lambda trial: (len(trial.fault_numbers), trial.fault_numbers)):
-            if not self.faults[trial.fault_numbers[-1] - 1].is_bug:
-                for path in trial.entered_paths:
-                    triggers_by_path.setdefault(path, trial.fault_numbers)
-        return triggers_by_path
 
     def _run_trials(self, combinations: Sequence[FaultNumbers], offset: int) -> tuple[list[Trial], bool]:
         """Execute a trial for each combination of faults; `offset` is the number of earlier trials.
@@ -134,9 +214,9 @@ class Campaign:
             self._options.on_progress(offset + ended_count, offset + total)
 
         jobs = list(map(self.select_faults, combinations))
-        run_job = partial(run_trial, self.mission, self.nominal_run)
+        run_job = partial(run_trial, self.mission, nominal_run=self.nominal_run)
         trials = run_jobs(jobs, run_job, _make_aborted_trial, replace(self._options, on_progress=report))
-        complete_trials = [trial for trial in trials if trial is not None and not trial.is_halted_by_user]
+        complete_trials = [trial for trial in trials if trial is not None and trial.status != "HALTED"]
         return complete_trials, len(complete_trials) == len(combinations)
 
 
@@ -146,27 +226,221 @@ def _make_aborted_trial(faults: FaultsByNumber, error: BaseException) -> Trial:
     return Trial("FAULT", "", "", "", False, "", 0, 0.0, faults=faults, problems=(problem,))
 
 
-def find_branches(tree: Node, trials: Sequence[Trial]) -> tuple[Branch, ...]:
-    """Return the branches that run only after failures or at the end, in the order of the tree.
+def run_trial(
+    mission: MissionUnderTest, faults: FaultsByNumber, nominal_run: Trial | None = None,
+    runs_folder: Path | None = None,
+) -> Trial:  # fmt: skip
+    """Execute a mission with these faults and return the trial.
 
-    A branch in a subtree that is used twice has two paths.
+    Args:
+        mission: The mission and its cell.
+        faults: Faults of the run.
+        nominal_run: The run without faults; None if this is the run without faults.
+        runs_folder: Folder below which the run is recorded; None: the run is not recorded.
+
+    Raises:
+        InputError: The run directory cannot be created.
+        ExecutiveError: The result cannot be written.
     """
-    paths_by_place: dict[tuple[str, int, int, str], list[str]] = defaultdict(list)
+    start_time = time.perf_counter()
+    loaded = mission.loaded
+    cell_faults = []
+    substitutes: dict[str, type[Skill]] = {}
+    for fault in faults.values():
+        if isinstance(fault.injected, SkillFault):
+            skill = substitutes.get(fault.location, loaded.skills[fault.injected.skill])
+            substitutes[fault.location] = fault.injected.make_skill(skill)
+        else:
+            cell_faults.append(fault.injected)
+    timeout = MIN_TIMEOUT + TIMEOUT_FACTOR * nominal_run.robot_time if nominal_run else math.inf
+    make_cell = with_faults(mission.make_cell, cell_faults, timeout)
+    options = RunOptions(mission.seed, mission.requests, make_cell=make_cell, substitutes=substitutes)
+    timeline = Timeline()
+    run_directory = ""
+    with closing(assemble(loaded, options, [timeline])) as run:
+        workcell = run.workcell
+        assert isinstance(workcell, FaultyCell)
+        run.add_observer(workcell.on_event)
+        if runs_folder is None:
+            run.execute()
+        else:
+            directory = make_run_directory(run, loaded, options, runs_folder)
+            recorded_run = RecordedRun(run, loaded, directory, Recorder(directory))
+            run_directory = recorded_run.execute(mission.seed, start_time).run
+            try_write_report(run_directory)
+        items = run.count_items()
+        audit = run.count_ground_truth()
+        is_arm_at_rest = workcell.cell.arm.at_rest
+        is_holding = workcell.cell.tool.holding
+    end = timeline.ended
+    assert end is not None, "every run emits its end"
+    activations_by_path = group_by_node(timeline.activations)
+    effect_names = [name for _, name in timeline.faults]
+
+    def has_effect(fault: PlannedFault) -> bool:
+        return any(map(fault.is_cause_of, activations_by_path.get(fault.location, ())))
+
+    def has_occurred(fault: PlannedFault) -> bool:
+        if isinstance(fault.injected, SkillFault):
+            return has_effect(fault)
+        return fault.injected.effect.name in effect_names
+
+    raised_bugs = [fault.location for fault in faults.values() if fault.is_bug and has_effect(fault)]
+    problems = [*check_end(end, raised_bugs, loaded.unhandled_failures)]
+    if audit is not None:
+        problems += check_ledger(end, items, audit, effect_names)
+    if not is_arm_at_rest:
+        problems.append("the arm is not at rest")
+    if is_holding != bool(end.held_item):
+        tool_text = "holds an object" if is_holding else "is empty"
+        problems.append(f'the tool {tool_text}, but the held item of the run is "{end.held_item}"')
+    return Trial(
+        **asdict(end),
+        faults=faults,
+        have_occurred=all(map(has_occurred, faults.values())),
+        had_effect=all(has_effect(fault) for fault in list(faults.values())[-1:] if fault.is_failure_reason),
+        items=items,
+        audit=audit,
+        missing_count=nominal_run.items["placed"] - items["placed"] if nominal_run else 0,
+        steps_by_path={
+            path: [each.end_tick - each.start_tick for each in activations]
+            for path, activations in activations_by_path.items()
+        },
+        run_directory=run_directory,
+        problems=tuple(problems),
+    )
+
+
+def check_end(
+    end: RunEnded, raised_bugs: Sequence[str], unhandled_failures: Sequence[UnhandledFailure]
+) -> Iterator[str]:
+    """Yield a problem if the run did not end as its faults require.
+
+    Args:
+        end: End of the run.
+        raised_bugs: Nodes whose injected error was raised; the run must then end as FAULT at such a node.
+        unhandled_failures: Failures with which the mission may end, according to the check of the mission.
+    """
+    if end.status == "FAULT":
+        if end.node not in raised_bugs or INJECTED_MESSAGE not in end.message:
+            yield f"the run ended as FAULT at {end.node or 'no node'}: {end.message}"
+    elif raised_bugs:
+        yield f"the injected error was raised, but the run ended as {end.status} {end.reason}"
+    if end.status == "FAILURE" and end.reason != "lost":
+        ends = {(failure.node, f"{failure.source}.{failure.reason}") for failure in unhandled_failures}
+        if (end.node, end.reason) not in ends:
+            yield f"the run ended with {end.reason} at {end.node}; `check` lists no such end"
+
+
+def check_ledger(
+    end: RunEnded, items: Mapping[str, int], audit: Mapping[str, int], effects: Sequence[str]
+) -> Iterator[str]:
+    """Yield a problem if the ledger does not balance, an object is misplaced, or the audit disagrees.
+
+    If the run ended early or lost an item, the ledger may lack objects, and dropped items may count as lost.
+
+    Args:
+        end: End of the run.
+        items: Number of items in the ledger, by state.
+        audit: True object counts by `AUDIT_KEYS`, for instance `left` for the table.
+        effects: Names of the effects that occurred. The ledger may count a removed object as lost, or still
+            contain it.
+    """
+    books = f"the ledger says {items}; the audit {audit}"
+    if not is_balanced(items):
+        yield f"the ledger does not balance: {books}"
+    if audit["wrong_bin"]:
+        yield f"{audit['wrong_bin']} objects in wrong bins; {books}"
+    displaced_count = sum(name in DISPLACING_EFFECTS for name in effects)
+    if audit["elsewhere"] > displaced_count:
+        yield f"{audit['elsewhere']} objects are out of reach, but the faults displaced {displaced_count}"
+    unnoticed_count = min(max(audit["elsewhere"] - items["lost"], 0), effects.count("object_removed"))
+    left_count = audit["left"] + unnoticed_count
+    if end.status == "FAULT" or end.node or items["lost"]:
+        is_confirmed = (
+            items["placed"] <= audit["right"] and items["rejected"] + items["skipped"] <= left_count
+        )
+    else:
+        places = {**audit, "left": left_count, "elsewhere": audit["elsewhere"] - unnoticed_count}
+        is_confirmed = is_confirmed_by_audit(items, places, end.is_table_empty)
+    if not is_confirmed:
+        yield books
+
+
+def count_branch_entries(tree: Node, trials: Iterable[Trial]) -> dict[str, int]:
+    """Return the number of trials that entered each branch after a failure or at the end.
+
+    The keys are file, line and name of the branch, in the order of the tree. A branch in a subtree that is
+    used twice has two paths.
+    """
+    paths_by_branch: dict[str, set[str]] = defaultdict(set)
     for node in tree.walk():
         if isinstance(node, InnerNode):
             for name, child in make_inspection_instance(node).list_contingencies():
                 branch = get_mission_node(child)
-                place = branch.span.source.path, branch.span.line, branch.span.col, name
-                paths_by_place[place].append(_find_path(branch))
-    branches = []
-    for (file, line, _, name), paths in paths_by_place.items():
-        trial_count = sum(not trial.entered_paths.isdisjoint(paths) for trial in trials)
-        branches.append(Branch(f"{file}:{line}", name, trial_count))
-    return tuple(branches)
+                key = f"{branch.span.source.path}:{branch.span.line}:{branch.span.col}: {name}"
+                # The built tree contains no node for the use of a subtree without a label.
+                while isinstance(branch, SubtreeNode) and not branch.label and branch.body is not None:
+                    branch = branch.body
+                paths_by_branch[key].add(branch.path)
+    entered_paths = [trial.steps_by_path.keys() for trial in trials]
+    return {
+        branch: sum(not paths.isdisjoint(entered) for entered in entered_paths)
+        for branch, paths in paths_by_branch.items()
+    }
 
 
-def _find_path(node: Node) -> str:
-    """Return the path of a node in the built tree, which contains no node for a use without a label."""
-    while isinstance(node, SubtreeNode) and not node.label and node.body is not None:
-        node = node.body
-    return node.path
+def results_to_json(campaign: Campaign, results: CampaignResults) -> dict[str, object]:
+    """Return the results of a campaign as JSON values by key; times are in s."""
+    mission = campaign.mission
+    return {
+        "mission": mission.name, "cell": mission.cell_description, "seed": mission.seed,
+        "listed": len(campaign.faults), "complete": results.is_complete,
+        "robot_time_s": campaign.nominal_run.robot_time, "runs": len(results.trials),
+        "failed": sum(bool(trial.problems) for trial in results.trials), "branches": results.branches,
+        "trials": list(map(trial_to_json, results.trials)),
+    }  # fmt: skip
+
+
+def trial_to_json(trial: Trial) -> dict[str, object]:
+    """Return a trial as JSON values by key; times are in s."""
+    values = {name: value for name, value in vars(trial).items() if name not in ("faults", "steps_by_path")}
+    faults = list(map(str, trial.faults.values()))
+    return {"fault": trial.fault_option, "faults": faults, "verdict": trial.verdict, **values}
+
+
+def list_result_lines(campaign: Campaign, results: CampaignResults) -> Iterator[str]:
+    """Yield the lines of the text about a campaign: verdicts by node and fault, problems, unused branches."""
+    mission = campaign.mission
+    yield (
+        f"{mission.name} ({mission.cell_description}), seed {mission.seed}: {len(results.trials)} runs with "
+        f"faults; a run without faults takes {campaign.nominal_run.robot_time:.1f} s"
+    )
+    if not results.is_complete:
+        yield "  ended by the user before the last run"
+    verdicts_by_fault: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+    for trial in results.trials:
+        tested_fault = list(trial.faults.values())[-1]
+        verdicts_by_fault[tested_fault.name, tested_fault.kind][trial.verdict] += 1
+    for (name, kind), verdicts in verdicts_by_fault.items():
+        texts = [f"{verdict} ({count})" for verdict, count in verdicts.most_common()]
+        yield f"  {name:40} {kind:30} {', '.join(texts)}"
+    failed_trials = [trial for trial in results.trials if trial.problems]
+    yield f"  runs with a problem: {len(failed_trials) or 'none'}"
+    for trial in failed_trials:
+        yield from (f"    {line}" for line in list_trial_lines(trial))
+    unentered_branches = [branch for branch, count in results.branches.items() if not count]
+    entered_count = len(results.branches) - len(unentered_branches)
+    yield f"  branches after a failure: {entered_count} of {len(results.branches)} entered"
+    yield from (f"    never entered: {branch}" for branch in unentered_branches)
+
+
+def list_trial_lines(trial: Trial) -> Iterator[str]:
+    """Yield the lines of the text about a trial: its faults, its end and its problems."""
+    yield f"fault {trial.fault_option}: {'; and '.join(map(str, trial.faults.values()))}"
+    if not trial.have_occurred:
+        yield "  not all of these faults occurred"
+    yield f"  {describe_end(trial.status, trial.reason, trial.node, trial.message)}"
+    yield from (f"  wrong: {problem}" for problem in trial.problems)
+    if trial.run_directory:
+        yield trial.run_directory

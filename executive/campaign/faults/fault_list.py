@@ -2,220 +2,258 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
-from executive.campaign.faults.nominal_run import NominalRun
-from executive.campaign.faults.planned_fault import Occasion, PlannedFault, SkillFault
 from executive.campaign.mission_under_test import MissionUnderTest
-from executive.cell.config import TableConfig
 from executive.cell.objects import Target
+from executive.cell.protocols import Cell, Steps
+from executive.manipulation.drop_detection import detect_and_record_drop
 from executive.mission.model.nodes import SkillNode
-from executive.skill import HOLDING, Skill
+from executive.record.timeline.activation import Activation
+from executive.skill import EMPTY, HOLDING, Skill
 from executive.testing import faults as effects
-from executive.testing.conformance.situations import list_input_ports
-from executive.testing.faults.effect import Effect
-from executive.testing.faults.script import ScheduledFault, TimeSpan, after, between, during
+from executive.testing.faults import Effect, ObjectChoice, ScheduledFault, after, between, during
+from executive.testing.substitutes import make_raising, make_substitute
 
 FAULT_DURATIONS = (0.5, 5.0)
-"""Durations of faults of detectors and tool [s]; the longer one is also the timeout of hanging requests."""
-QUARTER_FRACTIONS: tuple[tuple[Occasion, float], ...] = (("first", 0.25), ("middle", 0.5), ("late", 0.75))
-"""Fractions of the nominal run, or of a motion, after which faults of objects occur, by occasion."""
+"""Durations of short faults of detectors and tool [s]."""
+OCCASIONS: Mapping[str, float] = {"first": 0.25, "middle": 0.5, "late": 0.75}
+"""Fractions of a run, or of a motion, after which faults of objects and of the seal occur, by occasion."""
 REPEATED_ACTIVATIONS = tuple(range(1, 21))
 """Numbers of the activations with a repeated fault, if the fault must end before the end of the run."""
-TRANSPORT_FRACTIONS: tuple[tuple[Occasion, float], ...] = (
-    ("first", 0.1), ("first", 0.3), ("middle", 0.5), ("late", 0.7), ("late", 0.9),
-)  # fmt: skip
-"""Fractions of a transport after which the seal breaks, by occasion."""
+ENDLESS_REASONS = ("stale", "rescan")
+"""Reasons after which missions try again without a limit, so that a fault that causes them must end."""
+INJECTED_MESSAGE = "injected by the campaign"
+"""Message of a failure without a cause in the cell, and of an error that simulates a bug of a skill."""
 
 
 @dataclass(frozen=True)
-class Cause:
-    """A fault of the cell that causes failures of skills with a certain reason.
+class SkillFault:
+    """A failure or bug of a skill without a cause in the cell.
 
     Attributes:
-        effect: Effect of the fault.
-        description: Description of the effect, for the list of faults.
-        required_property: Property of the affected skills: `moves`, `senses`, or an element of `uses`; "" if
-            all skills are affected.
-        lasting_activations: Numbers of the activations with a lasting fault; empty: all activations.
+        skill: Name of the skill.
+        reason: Reason of the failure; "" for a bug, an error that the code of the skill raises.
+        activations: Numbers of the affected activations of the node, from 1.
+        delay_steps: Number of control steps from the start of the skill to the error.
     """
 
-    effect: Effect
-    description: str
-    required_property: str = ""
-    lasting_activations: tuple[int, ...] = ()
+    skill: str
+    reason: str
+    activations: tuple[int, ...]
+    delay_steps: int = 0
 
-    def can_affect(self, skill: type[Skill]) -> bool:
-        """Return True if a skill has the required property."""
-        properties = {"": True, "moves": skill.moves, "senses": skill.senses}
-        return properties.get(self.required_property, self.required_property in skill.uses)
+    def make_skill(self, skill: type[Skill]) -> type[Skill]:
+        """Return a subclass of a skill with this fault."""
+        if self.reason:
+            faulty_skill = _make_failing(skill, self.reason)
+        else:
+            faulty_skill = make_raising(skill, RuntimeError(INJECTED_MESSAGE), delay_steps=self.delay_steps)
+        return make_substitute(skill, "Faulty", faulty_skill.run, self.activations)
 
-
-def list_causes(table: TableConfig) -> Mapping[str, Cause]:
-    """Return the known causes of failures in the cell, by reason."""
-    bumped, rescan = effects.object_bumped(table.x, table.y), effects.operator_asks_rescan()
-    return {
-        "missed": Cause(effects.seal_fails(), "the suction cup cannot seal", "tool"),
-        "dropped": Cause(effects.seal_breaks(), "the seal breaks half-way", "moves"),
-        "no_contact": Cause(bumped, "the object is bumped aside", "moves"),
-        "blocked": Cause(effects.arm_collides(), "the arm collides", "moves"),
-        "unreachable": Cause(effects.no_path(), "the planner finds no path", "moves"),
-        "stuck": Cause(effects.tool_does_not_release(), "the object sticks to the tool", "tool"),
-        "unavailable": Cause(effects.detector_dead(), "the detector is dead", "camera"),
-        "unsure": Cause(effects.detector_unsure(), "all confidences are low", "camera"),
-        "hidden": Cause(effects.workspace_occluded(), "the arm occludes the workspace", "camera"),
-        "stale": Cause(effects.table_bumped(), "the table is bumped", "", REPEATED_ACTIVATIONS),
-        "no_depth": Cause(effects.no_depth(), "no detection can be localized"),
-        "quit": Cause(effects.operator_quits(), "the operator quits", "senses"),
-        "rescan": Cause(rescan, "the operator asks for a scan", "senses", REPEATED_ACTIVATIONS),
-    }
+    def __str__(self) -> str:
+        """Return a description of the fault."""
+        return "without a cause" if self.reason else f"a bug after {self.delay_steps} control steps"
 
 
-def list_faults(mission: MissionUnderTest, nominal_run: NominalRun) -> tuple[PlannedFault, ...]:
+def _make_failing(skill: type[Skill], reason: str) -> type[Skill]:
+    """Return a skill that fails at the start with this reason.
+
+    If the declared state of the tool after the failure is EMPTY, the skill drops the held object. If the
+    object sticks to the tool, the original skill runs instead.
+    """
+
+    def run(self: Skill, cell: Cell) -> Steps:
+        if skill.tool_state_after_failure.get(reason) is EMPTY:
+            cell.tool.open()
+            if cell.tool.holding:
+                yield from skill.run(self, cell) or ()
+                return
+            if (item := cell.ledger.find_held_item()) is not None:
+                detect_and_record_drop(cell, item)
+        raise self.failure(reason, INJECTED_MESSAGE)
+
+    return make_substitute(skill, "Failing", run)
+
+
+@dataclass(frozen=True)
+class PlannedFault:
+    """A fault that a campaign injects into a run of a mission; can be pickled.
+
+    Attributes:
+        location: Path of the affected node, or affected part of the cell: `detector`, `object`, `tool`.
+        name: Label or skill of the node, with its file and line; name of the part.
+        kind: Failure reason of the node, or kind of the fault, for instance `target removed`.
+        occasion: Occasion of the fault in a run or motion: `first`, `middle`, `late` or `lasting`.
+        injected: Fault of the cell or of a skill that is injected.
+        is_failure_reason: True if `kind` is a failure reason: the fault must let the node fail with it.
+        is_conditional: True if the node runs only after another fault.
+        replaces_previous: True if the fault is injected only if the previous fault caused no failure.
+    """
+
+    location: str
+    name: str
+    kind: str
+    occasion: str
+    injected: ScheduledFault | SkillFault
+    is_failure_reason: bool = False
+    is_conditional: bool = False
+    replaces_previous: bool = False
+
+    @property
+    def is_bug(self) -> bool:
+        """True if the fault simulates a bug, after which the run must end with the status FAULT."""
+        return self.kind == "raises"
+
+    def is_cause_of(self, activation: Activation) -> bool:
+        """Return True if an activation ended with the injected error, or with the reason of the fault."""
+        has_message = isinstance(self.injected, ScheduledFault) or INJECTED_MESSAGE in activation.message
+        return has_message and (self.is_bug or activation.reason == self.kind)
+
+    def __str__(self) -> str:
+        """Return a description of the fault."""
+        return f"{self.location} {self.kind}, {self.occasion}: {self.injected}"
+
+
+def list_faults(
+    mission: MissionUnderTest, steps_by_path: Mapping[str, Sequence[int]], duration: float
+) -> list[PlannedFault]:
     """Return all single faults of a mission; the number of a fault is its position in the list, from 1.
 
     The order is: failures of all nodes in the order of the tree, bugs of all skills in the order of the tree,
     faults of detectors, faults of objects, faults of the tool.
+
+    Args:
+        mission: The mission.
+        steps_by_path: Control steps of each activation in a run without faults, by path of the node.
+        duration: Duration of a run without faults [s].
     """
-    lister = _FaultLister(mission, nominal_run)
-    return (
+    lister = _FaultLister(mission, steps_by_path, duration)
+    return [
         *(fault for node in lister.nodes for fault in lister.list_failures(node)),
         *(fault for node in lister.nodes for fault in lister.list_bugs(node)),
         *lister.list_detector_faults(),
         *lister.list_object_faults(),
         *lister.list_tool_faults(),
-    )
+    ]
 
 
 class _FaultLister:
-    """Lists the faults of one mission."""
+    """Lists the faults of one mission; the arguments are those of `list_faults`."""
 
-    def __init__(self, mission: MissionUnderTest, nominal_run: NominalRun) -> None:
-        self._skills, self._nominal_run = mission.loaded.skills, nominal_run
-        self._table = mission.loaded.cell_config.table
-        self._causes = list_causes(self._table)
-        self.nodes = list_skill_nodes(mission)
+    def __init__(
+        self, mission: MissionUnderTest, steps_by_path: Mapping[str, Sequence[int]], duration: float
+    ) -> None:
+        self.nodes = [node for node in mission.loaded.tree.walk() if isinstance(node, SkillNode)]
+        self._skills = mission.loaded.skills
+        self._steps_by_path = steps_by_path
+        self._duration = duration
+        table = mission.loaded.cell_config.table
+        self._area = (table.x, table.y)
+        # Effects on the cell that cause failures of skills, by reason.
+        self._causes = {
+            "missed": effects.seal_fails(),
+            "dropped": effects.seal_breaks(),
+            "no_contact": effects.object_bumped(*self._area),
+            "blocked": effects.arm_collides(),
+            "unreachable": effects.no_path(),
+            "stuck": effects.tool_does_not_release(),
+            "unavailable": effects.detector_dead(),
+            "unsure": effects.detector_unsure(),
+            "hidden": effects.workspace_occluded(),
+            "stale": effects.table_bumped(),
+            "no_depth": effects.no_depth(),
+            "quit": effects.operator_quits(),
+            "rescan": effects.operator_asks_rescan(),
+        }
 
     def list_failures(self, node: SkillNode) -> Iterator[PlannedFault]:
         """Yield the failures of a node: each reason on each occasion, caused by the cell and by the skill."""
-        skill = self._skills[node.skill]
-        activation_count = len(self._nominal_run.steps_by_path.get(node.path, ()))
-        occasions: list[tuple[Occasion, tuple[int, ...]]] = [("first", (1,)), ("lasting", ())]
+        activation_count = len(self._steps_by_path.get(node.path, ()))
+        occasions: dict[str, tuple[int, ...]] = {"first": (1,), "lasting": ()}
         if activation_count >= 3:
-            occasions.insert(1, ("middle", (1 + activation_count // 2,)))
-        for reason in skill.reasons:
+            occasions["middle"] = (1 + activation_count // 2,)
+        for reason in self._skills[node.skill].reasons:
             cause = self._causes.get(reason)
-            for occasion, activations in occasions:
-                skill_fault = SkillFault(node.path, "fails", reason, activations or REPEATED_ACTIVATIONS)
-                description = "the skill fails without a cause"
-                fault = self._make_node_fault(node, reason, occasion, description, skill_fault)
-                fault = replace(fault, is_failure_reason=True)
-                if cause is not None and cause.can_affect(skill):
-                    numbers = activations or cause.lasting_activations
-                    cell_fault = during(node.path, cause.effect, activations=numbers)
-                    yield replace(fault, cause=cause.description, injected=cell_fault)
-                    fault = replace(fault, replaces_previous=True)
-                yield fault
+            for occasion, activations in occasions.items():
+                if cause is not None:
+                    numbers = activations or (REPEATED_ACTIVATIONS if reason in ENDLESS_REASONS else ())
+                    fault = during(node.path, cause, activations=numbers)
+                    yield self._plan(node, reason, occasion, fault, True)
+                skill_fault = SkillFault(node.skill, reason, activations or REPEATED_ACTIVATIONS)
+                yield self._plan(node, reason, occasion, skill_fault, True, cause is not None)
 
     def list_bugs(self, node: SkillNode) -> Iterator[PlannedFault]:
-        """Yield errors that the code of a skill raises: at its start, half-way, and when it is halted."""
-        step_counts = self._nominal_run.steps_by_path.get(node.path, ())
+        """Yield errors that the code of a skill raises: at its start, and half-way in its longest run."""
+        yield self._plan(node, "raises", "first", SkillFault(node.skill, "", (1,)))
+        step_counts = self._steps_by_path.get(node.path, ())
         max_steps = max(step_counts, default=0)
-        longest_activation = 1 + step_counts.index(max_steps) if step_counts else 1
-        half_steps = max_steps // 2
-        bug = SkillFault(node.path, "raises", activations=(1,))
-        yield self._make_node_fault(node, "raises", "first", "its code raises an error at the start", bug)
         if max_steps >= 2:
-            bug = SkillFault(node.path, "raises", "", (longest_activation,), half_steps)
-            cause = f"its code raises an error after {half_steps} ticks"
-            yield self._make_node_fault(node, "raises", "middle", cause, bug)
-        if max_steps >= 2 or not step_counts:
-            bug = SkillFault(node.path, "raises when halted", "", (longest_activation,), half_steps)
-            cause = f"its code raises an error at a halt after {half_steps} ticks"
-            yield self._make_node_fault(node, "halted", "middle", cause, bug)
+            longest_activation = 1 + step_counts.index(max_steps)
+            bug = SkillFault(node.skill, "", (longest_activation,), max_steps // 2)
+            yield self._plan(node, "raises", "middle", bug)
 
     def list_detector_faults(self) -> Iterator[PlannedFault]:
         """Yield slow, hanging, unsure and dead detectors, from the start and from the middle of the run."""
-        starts: dict[Occasion, float] = {"first": 0.0, "middle": self._nominal_run.duration / 2}
-        dead, unsure = effects.detector_dead(), effects.detector_unsure()
-        endless_hang = effects.detector_times_out(FAULT_DURATIONS[-1])
-        for occasion, start in starts.items():
-            faults = [(f"slow by {d:g} s", after(start, effects.detector_slow(d))) for d in FAULT_DURATIONS]
-            for duration in FAULT_DURATIONS:
-                for kind, effect in (("hangs", effects.detector_hangs()), ("unsure", unsure), ("dead", dead)):
-                    faults.append((f"{kind} for {duration:g} s", between(start, start + duration, effect)))
-            for kind, effect in (("hangs", endless_hang), ("dead", dead), ("unsure", unsure)):
-                faults.append((f"{kind} to the end", after(start, effect)))
-            for kind, cell_fault in faults:
-                reason = "unsure" if kind.startswith("unsure") else "unavailable"
-                fault = _make_part_fault("detector", kind, occasion, cell_fault)
-                yield replace(fault, expected_reason=reason)
+        kinds = {
+            "slow": effects.detector_slow(FAULT_DURATIONS[0]),
+            "hangs": effects.detector_hangs(),
+            "unsure": effects.detector_unsure(),
+            "dead": effects.detector_dead(),
+        }
+        for occasion, start in (("first", 0.0), ("middle", self._duration / 2)):
+            for duration in (*FAULT_DURATIONS, self._duration):
+                for kind, effect in kinds.items():
+                    fault = between(start, start + duration, effect)
+                    yield PlannedFault(
+                        "detector", "detector", f"{kind} for {duration:.3g} s", occasion, fault
+                    )
 
     def list_object_faults(self) -> Iterator[PlannedFault]:
         """Yield removed and bumped objects: the object nearest to the tool, and the target of an approach."""
-        x, y = self._table.x, self._table.y
-        for occasion, fraction in QUARTER_FRACTIONS:
-            start = fraction * self._nominal_run.duration
-            removed, bumped = effects.object_removed("nearest"), effects.object_bumped(x, y, "nearest")
-            yield _make_part_fault("object", "removed", occasion, after(start, removed))
-            yield _make_part_fault("object", "bumped", occasion, after(start, bumped))
-        for node in self.nodes:
-            skill = self._skills[node.skill]
-            has_target = any(port.type is Target for port in list_input_ports(skill))
-            if not (skill.moves and has_target and self._has_run(node)):
-                continue
-            middle_activation = 1 + len(self._nominal_run.steps_by_path[node.path]) // 2
-            for occasion, fraction in QUARTER_FRACTIONS:
-                cause = f"after {fraction:.0%} of the motion"
-                removed = effects.object_removed("node", fraction)
-                bumped = effects.object_bumped(x, y, "node", fraction)
-                for kind, effect in (("target removed", removed), ("target bumped", bumped)):
-                    cell_fault = during(node.path, effect, activations=middle_activation)
-                    yield self._make_node_fault(node, kind, occasion, cause, cell_fault)
+        for occasion, fraction in OCCASIONS.items():
+            start = fraction * self._duration
+            for kind, effect in self._list_object_effects("nearest", None):
+                yield PlannedFault("object", "object", kind, occasion, after(start, effect))
+        for node in self._list_moving_nodes():
+            if any(port.type is Target for port in self._skills[node.skill].ports.values()):
+                middle = 1 + len(self._steps_by_path[node.path]) // 2
+                for occasion, fraction in OCCASIONS.items():
+                    for kind, effect in self._list_object_effects("node", fraction):
+                        fault = during(node.path, effect, activations=middle)
+                        yield self._plan(node, f"target {kind}", occasion, fault)
 
     def list_tool_faults(self) -> Iterator[PlannedFault]:
         """Yield losses of the seal during a transport, and times in which the suction cup cannot seal."""
-        for node in self.nodes:
-            skill = self._skills[node.skill]
-            if not (skill.moves and skill.tool_state[0] is HOLDING and self._has_run(node)):
-                continue
-            for occasion, fraction in TRANSPORT_FRACTIONS:
-                cell_fault = during(node.path, effects.seal_breaks(fraction), activations=1)
-                cause = f"after {fraction:.0%} of the motion"
-                yield self._make_node_fault(node, "seal breaks", occasion, cause, cell_fault)
-            kind, effect = "seal breaks over a wrong bin", effects.seal_breaks_over_wrong_bin()
-            cell_fault = during(node.path, effect)
-            yield self._make_node_fault(node, kind, "lasting", "in every motion", cell_fault)
-        middle_time = self._nominal_run.duration / 2
+        for node in self._list_moving_nodes():
+            if self._skills[node.skill].tool_state[0] is HOLDING:
+                for occasion, fraction in OCCASIONS.items():
+                    fault = during(node.path, effects.seal_breaks(fraction), activations=1)
+                    yield self._plan(node, "seal breaks", occasion, fault)
+                fault = during(node.path, effects.seal_breaks_over_wrong_bin())
+                yield self._plan(node, "seal breaks over a wrong bin", "lasting", fault)
+        start = self._duration / 2
         for duration in FAULT_DURATIONS:
-            cell_fault = between(middle_time, middle_time + duration, effects.seal_fails())
-            yield _make_part_fault("tool", f"no seal for {duration:g} s", "middle", cell_fault)
-        for number in (1, 2):
-            cell_fault = after(0.0, effects.object_unsealable(number))
-            yield _make_part_fault("tool", f"no seal on object {number}", "lasting", cell_fault)
+            fault = between(start, start + duration, effects.seal_fails())
+            yield PlannedFault("tool", "tool", f"no seal for {duration:g} s", "middle", fault)
 
-    def _make_node_fault(
-        self, node: SkillNode, kind: str, occasion: Occasion, cause: str, fault: ScheduledFault | SkillFault
-    ) -> PlannedFault:
+    def _list_object_effects(self, choice: ObjectChoice, fraction: float | None) -> list[tuple[str, Effect]]:
+        removed = effects.object_removed(choice, fraction)
+        bumped = effects.object_bumped(*self._area, choice, fraction)
+        return [("removed", removed), ("bumped", bumped)]
+
+    def _list_moving_nodes(self) -> list[SkillNode]:
+        """Return the nodes that move the arm in a run without faults."""
+        nodes_with_run = [node for node in self.nodes if node.path in self._steps_by_path]
+        return [node for node in nodes_with_run if self._skills[node.skill].moves]
+
+    def _plan(
+        self, node: SkillNode, kind: str, occasion: str, fault: ScheduledFault | SkillFault,
+        is_failure_reason: bool = False, replaces_previous: bool = False,
+    ) -> PlannedFault:  # fmt: skip
         """Return a planned fault that affects a node."""
-        return PlannedFault(
-            node.path, node.label or node.skill, f"{node.span.source.path}:{node.span.line}",
-            kind, occasion, cause, fault, is_conditional=not self._has_run(node),
-        )  # fmt: skip
-
-    def _has_run(self, node: SkillNode) -> bool:
-        """Return True if the node runs in the nominal run."""
-        return node.path in self._nominal_run.steps_by_path
-
-
-def list_skill_nodes(mission: MissionUnderTest) -> list[SkillNode]:
-    """Return the nodes of a mission that run skills, in the order of the tree."""
-    return [node for node in mission.loaded.tree.walk() if isinstance(node, SkillNode)]
-
-
-def _make_part_fault(part: str, kind: str, occasion: Occasion, cell_fault: ScheduledFault) -> PlannedFault:
-    """Return a fault with a time span, which affects a part of the cell but no particular node."""
-    assert isinstance(cell_fault.time, TimeSpan)
-    cause = f"from {cell_fault.time.start:.2f} s on"
-    return PlannedFault(part, part, "", kind, occasion, cause, cell_fault)
+        name = f"{node.label or node.skill} {node.span.source.path}:{node.span.line}"
+        is_conditional = node.path not in self._steps_by_path
+        reasons = (is_failure_reason, is_conditional, replaces_previous)
+        return PlannedFault(node.path, name, kind, occasion, fault, *reasons)

@@ -12,7 +12,7 @@ from executive.skill import Skill
 from executive.testing import faults
 from executive.testing.conformance.situations import Arrange, NotTestable, Situation, list_situations
 from executive.testing.conformance.skill_test_run import NamedFault, SkillTestRun
-from executive.testing.faults.effect import Effect, Occurrence
+from executive.testing.faults import Effect, Occurrence
 
 MAX_HALTS = 40
 """Maximum number of halts at evenly spaced ticks of a run, and maximum number of halts at calls."""

@@ -23,8 +23,7 @@ from executive.errors import Fault
 from executive.events import NodeStarted, TimedEvent
 from executive.skill import Skill, SkillFailed
 from executive.testing.conformance.situations import Arrange, Situation, prepare_scene
-from executive.testing.faults import FaultyCell, during
-from executive.testing.faults.effect import Effect
+from executive.testing.faults import Effect, FaultyCell, during
 from executive.tree.skill_run import SkillRun
 
 MAX_RUN_TIME = 60.0

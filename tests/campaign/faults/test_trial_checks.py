@@ -24,7 +24,7 @@ from executive.events import FaultInjected, FrameSearched, RunEnded, TimedEvent
 from executive.mission.flow_analysis import UnhandledFailure
 from executive.record.timeline.timeline import Timeline
 from executive.testing.faults import during, seal_fails
-from executive.testing.faults.world_access import TrueObject
+from executive.testing.world_access import TrueObject
 
 BUG = PlannedFault("tree/Grasp", "Grasp", "", "raises", "first", "", SkillFault("tree/Grasp", "raises"))
 SEAL_FAILS = during("tree/Grasp", seal_fails())

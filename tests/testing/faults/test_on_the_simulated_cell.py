@@ -12,7 +12,7 @@ from executive.events import FaultInjected, NodeEnded, TimedEvent
 from executive.geometry import Array
 from executive.testing import faults as effects
 from executive.testing.faults import ScheduledFault, after, during
-from executive.testing.faults.world_access import open_world
+from executive.testing.world_access import open_world
 from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_mission import MissionResult, run_mission
 

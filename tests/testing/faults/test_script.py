@@ -26,7 +26,7 @@ from executive.testing.faults import (
     with_probability,
 )
 from executive.testing.faults.script import NodeActivations
-from executive.testing.faults.world_access import open_world
+from executive.testing.world_access import open_world
 from executive.testing.run_mission import MissionResult, run_mission
 
 SLIPS = effects.seal_fails()
