@@ -101,12 +101,12 @@ def execute_missing_runs(
         side: `A` or `B` in a comparison, else "".
     """
     from executive.campaign.pool import JobOptions
-    from executive.campaign.results.tables import RUNS
-    from executive.campaign.sweep import list_jobs, run_sweep
+    from executive.campaign.sweep import run_sweep
+    from executive.campaign.sweep_job import list_jobs
     from executive.cli.progress import print_cancellation, print_halt, show_progress
 
     mission, jobs = database.settings.mission, list_jobs(database.settings, database.path.parent)
-    stored_indices = {run.run_index for run in database.read(RUNS)}
+    stored_indices = {run.run_index for run in database.read_runs()}
     missing_jobs = [job for job in jobs if job.index not in stored_indices]
     with show_progress(f"{side}: {mission}" if side else mission, print_lines=True) as progress:
         on_halt = print_halt if cluster is None else print_cancellation

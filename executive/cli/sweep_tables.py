@@ -8,10 +8,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
 from rich.table import Table
 
-from executive.campaign.results.differences import Difference, RunPair
-from executive.campaign.results.intervals import Estimate
 from executive.campaign.results.rows import describe_variant
-from executive.campaign.results.sweep_summary import FailureGroup, VariantSummary
+from executive.campaign.results.summary import Difference, Estimate, FailureGroup, RunPair, VariantSummary
 from executive.view.terminal.summary import describe_end
 
 MAX_LISTED_SEEDS = 10

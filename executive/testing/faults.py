@@ -265,19 +265,14 @@ def object_bumped(
     return Effect("object_moved", _bump_object, arguments=(choice, x, y), fraction=fraction)
 
 
-def detector_dead(delay: float = 0.0) -> Effect:
-    """Return an effect: requests fail `delay` [s] after the answer, and `Detect` fails with `unavailable`."""
-    return make_detector_effect("detector_dead", _raise_unavailable, delay)
+def detector_dead() -> Effect:
+    """Return an effect: requests fail instead of an answer, and `Detect` fails with `unavailable`."""
+    return make_detector_effect("detector_dead", _raise_unavailable)
 
 
 def detector_hangs() -> Effect:
     """Return an effect: requests are answered when the fault ends; a node that ends before gets no answer."""
     return make_detector_effect("detector_hangs", hangs=True)
-
-
-def detector_slow(delay: float) -> Effect:
-    """Return an effect: requests are answered late, after a delay of `delay` [s]."""
-    return make_detector_effect("detector_slow", delay=delay)
 
 
 def detector_unsure() -> Effect:
@@ -290,18 +285,15 @@ def detector_finds_nothing() -> Effect:
     return make_detector_effect("detector_finds_nothing", _remove_detections)
 
 
-def make_detector_effect(
-    name: str, change_answer: AnswerChange | None = None, delay: float = 0.0, hangs: bool = False
-) -> Effect:
-    """Return an effect: the detector answers late, with changed answers, or not at all.
+def make_detector_effect(name: str, change_answer: AnswerChange | None = None, hangs: bool = False) -> Effect:
+    """Return an effect: the detector answers with changed answers, or not before the end of the fault.
 
     Args:
         name: Name of the effect in the journal.
         change_answer: Function that changes an answer of the detector; None: no change.
-        delay: Delay of each answer [s].
         hangs: True if the detector answers no request before the end of the fault.
     """
-    return Effect(name, interceptors={"request": _change_answer}, arguments=(change_answer, delay, hangs))
+    return Effect(name, interceptors={"request": _change_answer}, arguments=(change_answer, hangs))
 
 
 class FaultyCell(CellWrapper):
@@ -613,25 +605,17 @@ class _FaultyAnswer:
         pending: The pending answer without a fault.
         occurrence: Occurrence of the fault during which the answer was requested.
         change_answer: Function that changes the answer, or raises an error; None: no change.
-        delay: Delay of the answer [s].
         hangs: True if there is no answer during the occurrence.
-        answer_time: Time on the run's clock of the delayed answer [s]; infinite while it is unknown.
     """
 
     pending: Request | Planning
     occurrence: Occurrence
     change_answer: Callable[[Any], Any] | None
-    delay: float = 0.0
     hangs: bool = False
-    answer_time: float = math.inf
 
     @property
     def ready(self) -> bool:
-        now = self.occurrence.context.cell.clock.now
-        if math.isinf(self.answer_time) and self.pending.ready:
-            self.answer_time = now + self.delay
-        is_hanging = self.hangs and not self.occurrence.is_over
-        return now >= self.answer_time - TIME_TOLERANCE and not is_hanging
+        return self.pending.ready and (self.occurrence.is_over or not self.hangs)
 
     def result(self) -> Any:
         answer = self.pending.result()

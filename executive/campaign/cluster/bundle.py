@@ -13,7 +13,7 @@ from pathlib import Path
 
 from packaging.utils import canonicalize_name
 
-from executive.campaign.sweep import SweepJob
+from executive.campaign.sweep_job import SweepJob
 from executive.errors import InputError
 from executive.mission.text.file_search import find_mission
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP

@@ -14,7 +14,7 @@ from executive.campaign.cluster.bundle import make_bundle
 from executive.campaign.cluster.returned_run import unpack_run
 from executive.campaign.pool import MAX_CRASHES, JobOptions
 from executive.campaign.results.rows import RunRecord
-from executive.campaign.sweep import SweepJob, make_fault_record
+from executive.campaign.sweep_job import SweepJob, make_fault_record
 from executive.errors import InputError
 from executive.run.signals import HALT_SIGNALS, handle_signals
 

@@ -21,7 +21,7 @@ from distributed import Worker, WorkerPlugin, get_worker
 from executive.campaign.cluster.bundle import PACKAGES_FOLDER
 from executive.campaign.cluster.environment import check_environment
 from executive.campaign.cluster.returned_run import ReturnedRun, pack_run
-from executive.campaign.sweep import SweepJob, make_fault_record, run_job
+from executive.campaign.sweep_job import SweepJob, make_fault_record, run_job
 from executive.processes import WorkerPool
 
 

@@ -195,9 +195,8 @@ class _FaultLister:
             yield self._plan(node, "raises", "middle", bug)
 
     def list_detector_faults(self) -> Iterator[PlannedFault]:
-        """Yield slow, hanging, unsure and dead detectors, from the start and from the middle of the run."""
+        """Yield hanging, unsure and dead detectors, from the start and from the middle of the run."""
         kinds = {
-            "slow": effects.detector_slow(FAULT_DURATIONS[0]),
             "hangs": effects.detector_hangs(),
             "unsure": effects.detector_unsure(),
             "dead": effects.detector_dead(),

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from executive.campaign.results.database import encode_run
 from executive.campaign.results.rows import RunRow, describe_variant
-from executive.campaign.results.sweep_summary import VariantSummary
-from executive.campaign.results.tables import RUNS
+from executive.campaign.results.summary import VariantSummary
 from executive.errors import InputError
+from executive.record.result import Audit
 
 METRICS = ("success", "agreement", "objects_per_hour")
 """Metrics of a variant: names of attributes of `VariantSummary` with the type `Estimate`."""
@@ -22,12 +23,9 @@ STATISTICS = ("mean", *PERCENTILES)
 """Names of the statistics of a column."""
 OPERATORS = {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
 """Comparisons by symbol."""
-_COLUMN_INDICES = {
-    column.name: index
-    for index, column in enumerate(RUNS.columns)
-    if column.sql_type != "TEXT" and column.name not in ("run_index", "seed")
-}
-"""Positions of the numeric columns in the tuple from `RUNS.encode`, by column name."""
+_EXAMPLE = RunRow(run_index=0, seed=0, status="", audit=Audit())
+_COLUMNS = [name for name, value in encode_run(_EXAMPLE).items() if isinstance(value, (int, float))][2:]
+"""Names of the numeric columns of a run, without `run_index` and `seed`."""
 _CONDITION_PATTERN = re.compile(
     r"\s*(\w+)\s*(?:\(\s*(\w+)\s*\))?\s*([<>]=?)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 )
@@ -55,8 +53,8 @@ class Condition:
         if not self.column:
             value: float | None = getattr(summary, self.metric).value
             return value
-        values = [RUNS.encode(run)[_COLUMN_INDICES[self.column]] for run in runs]
-        numbers = [float(value) for value in values if value is not None]
+        columns = map(encode_run, runs)
+        numbers = [float(each[self.column]) for each in columns if self.column in each]
         if not numbers:
             return None
         percentile = PERCENTILES.get(self.metric)
@@ -103,7 +101,6 @@ def _parse_condition(text: str) -> Condition:
     if metric not in (STATISTICS if column else METRICS):
         statistics = ", ".join(f"{name}(COLUMN)" for name in STATISTICS)
         raise InputError(f'there is no metric "{metric}"; the metrics are {", ".join(METRICS)}, {statistics}')
-    if column and column not in _COLUMN_INDICES:
-        columns = ", ".join(_COLUMN_INDICES)
-        raise InputError(f'"{column}" is no numeric column of the runs; these are {columns}')
+    if column and column not in _COLUMNS:
+        raise InputError(f'"{column}" is no numeric column of the runs; these are {", ".join(_COLUMNS)}')
     return Condition(metric, column, match[3], float(match[4]))

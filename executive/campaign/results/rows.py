@@ -1,55 +1,35 @@
-"""Rows of the results of a sweep: one per run, one per item of a run, and one per skill of a run."""
+"""Rows of the results of a sweep: one per run, one per item of a run, and one per skill of a run.
+
+`schema.sql` describes the fields.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise, product
 from pathlib import Path
-from typing import ClassVar
 
-from pydantic import ConfigDict, TypeAdapter
-
-from executive.cell.json_values import DECIMAL_PLACES, to_json
+from executive.cell.json_values import DECIMAL_PLACES
 from executive.record.result import Audit, ItemCounts, Result, describe_disagreement
 from executive.record.timeline.timeline import PlanningTotals, Timeline
 
 
-class Row:
-    """Base class of the rows.
-
-    The docstring of each field becomes the comment of its SQL column (see `tables.py`).
-    """
-
-    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(use_attribute_docstrings=True)
-
-
 @dataclass(frozen=True, kw_only=True)
-class SweepSettings(Row):
-    """Settings of a sweep, from which its jobs are computed; the table has one row."""
+class SweepSettings:
+    """Settings of a sweep, from which its jobs are computed."""
 
     mission: str
-    """Mission file, or name of a shipped mission."""
     mission_name: str
-    """Name of the mission."""
     cell: str
-    """Path of the cell file."""
     overrides: Mapping[str, str]
-    """Values of `--set` by param or by `cell.<key>.<key>`; equal in all runs."""
     variations: Mapping[str, tuple[str, ...]]
-    """Values of `--vary` by param or by `cell.<key>.<key>`; each combination is a variant."""
     first_seed: int
-    """First seed of each variant."""
     last_seed: int
-    """Last seed of each variant."""
     scene: Path | None
-    """Scene file; NULL: no change of the simulated world."""
     saves_images: bool
-    """1 if the runs save the images on which decisions are based."""
     inputs_hash: str
-    """Hash of mission, libraries, cell and scene; `--resume` requires equal inputs."""
     versions: Mapping[str, str]
-    """Versions of this project, Python, the machine and the required packages."""
 
     @property
     def variants(self) -> list[dict[str, str]]:
@@ -59,41 +39,25 @@ class SweepSettings(Row):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunRow(Row):
-    """A run. All columns except `wall_time_s`, `run_directory` and `crashes` are reproducible."""
+class RunRow:
+    """A run; `items`, `audit` and `planning` have a column for each of their fields."""
 
     run_index: int
-    """Index of the run in the sweep, from 0: variant by variant, and seed by seed."""
     seed: int
-    """Random seed."""
     variant: Mapping[str, str] = field(default_factory=dict)
-    """Values of the varied params and keys of the cell, by name."""
     status: str
-    """Final status: SUCCESS, INCOMPLETE, FAILURE or FAULT."""
     reason: str = ""
-    """Reason of the failure, for instance `Transit.dropped`; "" on success."""
     message: str = ""
-    """Sentence that explains the status, or ""."""
     node: str = ""
-    """Path of the node that caused the status, or ""."""
     items: ItemCounts = field(default_factory=ItemCounts)
-    """Number of items by final state, from the ledger."""
     audit: Audit | None = None
-    """Count of objects by ground-truth location, and whether the ledger agrees; NULL without ground truth."""
     planning: PlanningTotals = field(default_factory=PlanningTotals)
-    """Number of planned motions, and time for which skills waited for plans [s]."""
     ticks: int = 0
-    """Number of control steps."""
     robot_time_s: float = 0.0
-    """Duration on the run clock (simulated time in simulation, real time on hardware) [s]."""
     wall_time_s: float = 0.0
-    """Duration on a wall clock [s]."""
     decision_hash: str = ""
-    """Hash of all decisions."""
     run_directory: str = ""
-    """Path of the run directory; "" if there is none."""
     crashes: int = 0
-    """Number of worker processes that died during the run; after the first, the run was repeated."""
 
     @property
     def is_success(self) -> bool:
@@ -117,39 +81,27 @@ class RunRow(Row):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ItemRow(Row):
+class ItemRow:
     """An item of the ledger."""
 
     run_index: int
-    """Index of the run."""
     item: str
-    """Name of the item."""
     label: str
-    """Class of the item."""
     state: str
-    """Final state: placed, rejected, skipped, lost, or phantom (false positive: no such object)."""
     bin: str
-    """Bin into which the item was placed, or ""."""
     failed_attempts: int
-    """Number of failed attempts to pick the item."""
     robot_time_s: float
-    """Time during which the item was the selected target and had no final state [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class SkillRow(Row):
+class SkillRow:
     """All activations of one skill in a run."""
 
     run_index: int
-    """Index of the run."""
     skill: str
-    """Name of the skill."""
     activations: int
-    """Number of activations."""
     failed_activations: int
-    """Number of failed activations."""
     robot_time_s: float
-    """Total duration of the activations [s]; the skills of parallel branches overlap."""
 
 
 def describe_variant(variant: Mapping[str, str]) -> str:
@@ -173,7 +125,7 @@ class RunRecord:
 
 
 def make_record(run_index: int, variant: Mapping[str, str], result: Result, timeline: Timeline) -> RunRecord:
-    """Return the rows of a run; values are rounded as in `result.json`.
+    """Return the rows of a run; times are rounded as in `result.json`.
 
     Args:
         run_index: Index of the run in the sweep.
@@ -181,9 +133,16 @@ def make_record(run_index: int, variant: Mapping[str, str], result: Result, time
         result: Result of the run.
         timeline: Timeline of the run; it must keep its history (`has_history`).
     """
-    values = {name: value for name, value in to_json(result).items() if name in RunRow.__dataclass_fields__}
-    values |= {"decision_hash": result.trace, "run_directory": result.run}
-    run = TypeAdapter(RunRow).validate_python({"run_index": run_index, "variant": variant, **values})
+    run = RunRow(
+        run_index=run_index, seed=result.seed, variant=variant,
+        status=result.status, reason=result.reason, message=result.message, node=result.node,
+        items=result.items, audit=result.audit,
+        planning=replace(result.planning, waited_s=round(result.planning.waited_s, DECIMAL_PLACES)),
+        ticks=result.ticks,
+        robot_time_s=round(result.robot_time_s, DECIMAL_PLACES),
+        wall_time_s=round(result.wall_time_s, DECIMAL_PLACES),
+        decision_hash=result.trace, run_directory=result.run,
+    )  # fmt: skip
     return RunRecord(run, tuple(_list_items(run_index, timeline)), tuple(_list_skills(run_index, timeline)))
 
 
@@ -212,7 +171,9 @@ def _list_skills(run_index: int, timeline: Timeline) -> Iterator[SkillRow]:
     """Yield the row of each skill."""
     for skill in dict.fromkeys(activation.skill for activation in timeline.activations if activation.skill):
         activations = [activation for activation in timeline.activations if activation.skill == skill]
-        failure_count = sum(activation.status == "FAILURE" for activation in activations)
-        time = round(sum(activation.end - activation.start for activation in activations), DECIMAL_PLACES)
-        counts = {"activations": len(activations), "failed_activations": failure_count}
-        yield SkillRow(run_index=run_index, skill=skill, **counts, robot_time_s=time)
+        time = sum(activation.end - activation.start for activation in activations)
+        yield SkillRow(
+            run_index=run_index, skill=skill, activations=len(activations),
+            failed_activations=sum(activation.status == "FAILURE" for activation in activations),
+            robot_time_s=round(time, DECIMAL_PLACES),
+        )  # fmt: skip
