@@ -1,8 +1,9 @@
-"""Many seeds and variants of one mission."""
+"""Sweeps: jobs in processes of their own, and the runs that are stored."""
 
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import signal
 import time
@@ -12,50 +13,116 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from unittest.mock import patch
+from typing import Any
 
 import pytest
 
 from executive.campaign.pool import JobOptions, run_jobs
 from executive.campaign.results.database import ResultsDatabase
 from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings, make_record
-from executive.campaign.results.tables import RUNS
-from executive.campaign.sweep import (
-    SweepJob,
-    list_jobs,
-    make_fault_record,
-    make_repeat_command,
-    run_job,
-    run_sweep,
-)
+from executive.campaign.sweep import make_repeat_command, run_sweep
+from executive.campaign.sweep_job import SweepJob, list_jobs, make_fault_record, run_job
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
-from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.timeline.timeline import Timeline
 from executive.run.assembly import RunOptions
+from executive.run.run_control import RunControl
+from executive.run.signals import HALT_SIGNALS, halt_on_signals
 
+SLOW = pytest.mark.slow
 SETTINGS = SweepSettings(
     mission="sort", mission_name="sort", cell="c.yaml", overrides={"a": "1"}, variations={}, first_seed=0,
     last_seed=3, scene=None, saves_images=False, inputs_hash="", versions={},
 )  # fmt: skip
 
 
-def record(job: SweepJob, **values: object) -> RunRecord:
-    end = {"status": "SUCCESS", "reason": "", "message": "", "node": ""}
-    return RunRecord(RunRow(run_index=job.index, seed=job.seed, variant=job.variant, **end | values))
+@pytest.fixture
+def signals() -> Iterator[None]:
+    """Hear SIGINT, which is ignored in a process in the background of a shell, and SIGTERM."""
+    handlers = {number: signal.signal(number, signal.default_int_handler) for number in HALT_SIGNALS}
+    yield
+    assert all(signal.getsignal(number) is signal.default_int_handler for number in HALT_SIGNALS)
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
 
 
-def swept(folder: Path, work: Callable[[SweepJob], RunRecord], count: int = 4, **options) -> list[RunRow]:
-    """Sweep without a mission: `work` says what comes of it."""
-    jobs = list_jobs(replace(SETTINGS, last_seed=count - 1), folder)
-    with (
-        patch("executive.campaign.sweep.run_job", work),
-        closing(ResultsDatabase(folder / "a", SETTINGS)) as database,
-    ):
-        run_sweep(jobs, database, JobOptions(**options))
-        return database.read(RUNS)
+def halve(number: int) -> float:
+    if number % 2:
+        raise ValueError(f"{number} is odd")
+    return number / 2
+
+
+def describe_fault(job: object, error: BaseException) -> Any:
+    return f"{job}: {error}"
+
+
+def test_every_job_is_done_and_the_results_are_in_their_order() -> None:
+    progress: list[tuple[int, int]] = []
+    stored: list[tuple[Any, ...]] = []
+    options = JobOptions(on_progress=lambda *counts: progress.append(counts))
+    results = run_jobs([4, 3, 2, 2], halve, describe_fault, options, lambda *result: stored.append(result))
+    assert (results, progress) == ([2.0, "3: 3 is odd", 1.0, 1.0], [(1, 4), (2, 4), (3, 4), (4, 4)])
+    assert sorted(stored) == [(index, result, 0) for index, result in enumerate(results)]
+    assert run_jobs([], halve, describe_fault) == []
+
+
+def wait_for_halt(number: signal.Signals) -> str:
+    control = RunControl()
+    with halt_on_signals(control):
+        os.kill(os.getppid(), number)
+        while not control.is_stopped:
+            time.sleep(0.01)
+    return "halted in good order"
+
+
+@pytest.mark.usefixtures("signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=SLOW)])
+def test_a_signal_halts_the_running_jobs(number: signal.Signals) -> None:
+    calls: list[str] = []
+    options = JobOptions(1, on_halt=lambda: calls.append("halting"))
+    results = run_jobs([number] * 3, wait_for_halt, describe_fault, options)
+    assert (results, calls) == (["halted in good order", None, None], ["halting"])
+
+
+def ignore_halt(number: signal.Signals) -> str:
+    os.kill(os.getppid(), number)
+    signal.pause()
+    return "never returned"
+
+
+@pytest.mark.usefixtures("signals")
+def test_a_second_signal_ends_the_running_jobs_at_once() -> None:
+    options = JobOptions(1, on_halt=lambda: os.kill(os.getpid(), signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        run_jobs([signal.SIGINT] * 3, ignore_halt, describe_fault, options)
+    assert multiprocessing.active_children() == []
+
+
+def end_with_parent(number: signal.Signals) -> str:
+    os.kill(os.getppid(), number)
+    os.kill(os.getpid(), signal.SIGTERM)
+    return "never returned"
+
+
+@pytest.mark.usefixtures("signals")
+def test_a_job_whose_process_was_ended_with_this_one_has_no_result() -> None:
+    assert run_jobs([signal.SIGTERM] * 2, end_with_parent, describe_fault, JobOptions(1)) == [None, None]
+
+
+def make_sweep_record(job: SweepJob, status: str = "SUCCESS", **fields: Any) -> RunRecord:
+    return RunRecord(RunRow(run_index=job.index, seed=job.seed, variant=job.variant, status=status, **fields))
+
+
+def store_runs(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, run: Callable[[SweepJob], RunRecord], **options: Any
+) -> list[RunRow]:
+    """Sweep without a mission: `run` makes the record of a job."""
+    monkeypatch.setattr("executive.campaign.sweep.run_job", run)
+    with closing(ResultsDatabase(folder / "a", SETTINGS)) as database:
+        run_sweep(list_jobs(SETTINGS, folder), database, JobOptions(**options))
+        return database.read_runs()
 
 
 def test_every_seed_is_run_with_every_combination() -> None:
@@ -67,83 +134,51 @@ def test_every_seed_is_run_with_every_combination() -> None:
         (0, 0, "1x"), (1, 1, "1x"), (2, 0, "1y"), (3, 1, "1y"),
         (4, 0, "2x"), (5, 1, "2x"), (6, 0, "2y"), (7, 1, "2y"),
     ]  # fmt: skip
-    assert make_repeat_command(settings, record(jobs[3]).run) == (
+    assert make_repeat_command(settings, make_sweep_record(jobs[3]).run) == (
         "executive run sort --seed 1 --set a=1 --set b=1 --set c=y --scene s.yaml"
     )
 
 
-def work(job: SweepJob) -> RunRecord:
-    """Do a run in another process, in a way that the seed says."""
-    if job.seed == 2:
-        raise ValueError("seed two")
+def run_or_die(job: SweepJob) -> RunRecord:
+    """Kill the process in the run of seed 0 always, and of seed 1 the first time; seed 3 has no run."""
+    mark = job.runs_folder / "died"
+    if job.seed == 0 or (job.seed == 1 and not mark.exists()):
+        if job.seed == 1:
+            mark.touch()
+        os._exit(1)
     if job.seed == 3:
         raise InputError("there is no place for seed three")
-    return record(job, ticks=os.getpid(), message=job.settings.overrides["a"])
+    return make_sweep_record(job, message=job.settings.overrides["a"])
 
 
 @pytest.mark.slow
-def test_every_seed_is_run_once_in_another_process(tmp_path: Path) -> None:
-    reported: list[tuple[int, int]] = []
-    rows = swept(tmp_path, work, on_progress=lambda done, total: reported.append((done, total)))
-    assert [row.seed for row in rows] == [0, 1, 2, 3]
-    assert rows[0].ticks != os.getpid()
-    assert rows[0].message == "1"
-    assert [(row.status, row.message, row.crashes) for row in rows[2:]] == [
-        ("FAULT", "ValueError: seed two", 0),
-        ("FAULT", "there is no place for seed three", 0),
-    ]
-    assert reported == [(1, 4), (2, 4), (3, 4), (4, 4)]
+def test_a_run_whose_process_died_is_repeated_once_and_costs_no_other_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = store_runs(tmp_path, monkeypatch, run_or_die)
+    assert [(row.seed, row.status, row.crashes) for row in rows] == [
+        (0, "FAULT", 2), (1, "SUCCESS", 1), (2, "SUCCESS", 0), (3, "FAULT", 0),
+    ]  # fmt: skip
+    assert "BrokenProcessPool" in rows[0].message
+    assert [row.message for row in rows[2:]] == ["1", "there is no place for seed three"]
 
 
-def interrupt(job: SweepJob) -> RunRecord:
-    """Do a run during which somebody presses Ctrl-C."""
+def halt_second(job: SweepJob) -> RunRecord:
     if job.seed == 1:
         os.kill(os.getppid(), signal.SIGINT)
         time.sleep(0.2)
-        return record(job, status="HALTED")
-    return record(job)
-
-
-@pytest.fixture
-def sigint() -> Iterator[None]:
-    """Hear SIGINT: what a shell runs in the background begins with it ignored."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
+        return make_sweep_record(job, "HALTED")
+    return make_sweep_record(job)
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("sigint")
-def test_after_ctrl_c_no_further_run_begins_and_halted_runs_are_not_stored(tmp_path: Path) -> None:
-    reported: list[str] = []
-    rows = swept(tmp_path, interrupt, workers=1, on_halt=lambda: reported.append("halting"))
-    assert ([row.seed for row in rows], reported) == ([0], ["halting"])
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+@pytest.mark.usefixtures("signals")
+def test_halted_runs_are_not_stored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert [row.seed for row in store_runs(tmp_path, monkeypatch, halt_second, workers=1)] == [0]
 
 
-def die(job: SweepJob) -> RunRecord:
-    """Take the process down with the run of seed 0 always, and of seed 1 the first time."""
-    mark = job.runs_folder / "died"
-    if job.seed == 0 or (job.seed == 1 and not mark.exists()):
-        mark.touch() if job.seed == 1 else None
-        os._exit(1)
-    return record(job)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_run_that_takes_its_process_down_is_repeated_once_and_costs_no_other_run(
-    workers: int, tmp_path: Path
-) -> None:
-    rows = swept(tmp_path, die, workers=workers)
-    assert [(row.seed, row.status, row.crashes) for row in rows] == [
-        (0, "FAULT", 2), (1, "SUCCESS", 1), (2, "SUCCESS", 0), (3, "SUCCESS", 0),
-    ]  # fmt: skip
-    assert "BrokenProcessPool" in rows[0].message
-
-
-class Torn:
-    """A pool whose process died before anybody looked."""
+class BrokenPool:
+    """A pool whose process died before its first job."""
 
     def submit(self, *job: object) -> None:
         raise BrokenProcessPool("died")
@@ -152,68 +187,43 @@ class Torn:
         pass
 
 
-def test_a_pool_found_broken_is_replaced_and_no_run_is_lost(monkeypatch, tmp_path: Path) -> None:
-    pools = iter([Torn(), ThreadPoolExecutor(1)])
+def test_a_broken_pool_is_replaced_and_no_run_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    pools = iter([BrokenPool(), ThreadPoolExecutor(1)])
     monkeypatch.setattr("executive.campaign.pool.WorkerPool", lambda count: next(pools))
-    monkeypatch.setattr(ResultsDatabase, "append", lambda self, record: stored.append(record.run.status))
-    stored: list[str] = []
-    swept(tmp_path, record, count=2, workers=1)
-    assert stored == ["SUCCESS", "SUCCESS"]
+    assert run_jobs([4, 6], halve, describe_fault, JobOptions(1)) == [2.0, 3.0]
 
 
-def test_runs_of_a_worker_are_equal_to_single_runs(tmp_path: Path) -> None:
-    variations = {"cell.table.objects": ("[1, 1]", "[2, 2]")}
-    settings = replace(SETTINGS, mission="sort_fruit", overrides={}, variations=variations)
-    jobs = list_jobs(settings, tmp_path)
-    # The same process runs all jobs, as a worker does.
-    for job in (jobs[0], jobs[5], jobs[1]):
-        found = run_job(job)
-        loaded = load_mission("sort_fruit", load_skills(), job.variant)
-        single = record_run(loaded, RunOptions(job.seed), tmp_path / "single")
-        expected = make_record(
-            job.index,
-            job.variant,
-            single,
-            Timeline.from_events(read_journal(Path(single.run) / "journal.jsonl")),
-        )
-        same_run = replace(
-            expected.run, wall_time_s=found.run.wall_time_s, run_directory=found.run.run_directory
-        )
-        assert found == replace(expected, run=same_run)
-        assert (
-            found.run.decision_hash
-            == json.loads((Path(found.run.run_directory) / "result.json").read_text())["trace"]
-            != ""
-        )
+@pytest.mark.parametrize(
+    ("mission", "size"), [("sort_fruit", "[2, 2]"), pytest.param("sort_overhead", "[1, 1]", marks=SLOW)]
+)
+def test_the_run_of_a_worker_is_equal_to_a_single_run(mission: str, size: str, tmp_path: Path) -> None:
+    settings = replace(
+        SETTINGS, mission=mission, overrides={}, variations={"cell.table.objects": ("[1, 2]", size)}
+    )
+    job = list_jobs(settings, tmp_path)[5]
+    # The worker has one thread and has executed another job before.
+    found = run_jobs([replace(job, seed=0), job], run_job, make_fault_record, JobOptions(1))[-1]
+    assert found is not None
+    history = Timeline()
+    loaded = load_mission(mission, load_skills(), {"cell.table.objects": size})
+    single = record_run(loaded, RunOptions(1), tmp_path / "single", RecordOptions(timeline=history))
+    expected = make_record(5, {"cell.table.objects": size}, single, history)
+    same_run = replace(expected.run, wall_time_s=found.run.wall_time_s, run_directory=found.run.run_directory)
+    assert found == replace(expected, run=same_run)
+    result = json.loads((Path(found.run.run_directory) / "result.json").read_text())
+    assert found.run.decision_hash == result["trace"] != ""
+    assert found.run.items.placed == sum(item.state == "placed" for item in found.items) > 0
+    assert not (Path(found.run.run_directory) / "report.html").exists()
 
 
 @pytest.mark.slow
-def test_only_a_run_with_a_problem_has_a_report(tmp_path: Path) -> None:
+def test_a_run_with_a_problem_has_a_report(tmp_path: Path) -> None:
     mission = tmp_path / "look.yaml"
     mission.write_text(
         "mission: look\ndescription: Look.\ncell: cells/overhead.yaml\n"
         "routes: {cube: red_bin}\ntree: [MoveToScan, Detect, Localize, SelectTarget]\n"
     )
     overrides = {"cell.table.objects": "[0, 0]", "cell.kind": "fake"}
-    for name, has_report in (("sort_fruit", False), (str(mission), True)):
-        settings = replace(SETTINGS, mission=name, overrides=overrides)
-        run = run_job(list_jobs(settings, tmp_path)[0]).run
-        assert (run.problem != "", (Path(run.run_directory) / "report.html").is_file()) == (
-            has_report,
-            has_report,
-        ), run
-
-
-@pytest.mark.slow
-def test_simulated_runs_of_a_worker_are_equal_to_single_runs(tmp_path: Path) -> None:
-    overrides = {"cell.table.objects": "[1, 1]"}
-    settings = replace(SETTINGS, mission="sort_overhead", overrides=overrides, first_seed=5, last_seed=7)
-    # The worker has one thread and reuses the model; this process has two threads and loads it once more.
-    found = run_jobs(list_jobs(settings, tmp_path), run_job, make_fault_record, JobOptions(1))[-1]
-    assert found is not None
-    loaded = load_mission("sort_overhead", load_skills(), overrides)
-    history = Timeline()
-    single = record_run(loaded, RunOptions(7), tmp_path / "single", RecordOptions(timeline=history))
-    expected = make_record(2, {}, single, history)
-    same_run = replace(expected.run, wall_time_s=found.run.wall_time_s, run_directory=found.run.run_directory)
-    assert found == replace(expected, run=same_run)
+    settings = replace(SETTINGS, mission=str(mission), overrides=overrides)
+    run = run_job(list_jobs(settings, tmp_path)[0]).run
+    assert run.problem and (Path(run.run_directory) / "report.html").is_file()

@@ -15,7 +15,7 @@ from click.testing import CliRunner, Result
 from test_sweep_command import make_record
 
 from executive.campaign.results.database import ResultsDatabase
-from executive.campaign.sweep import SweepJob
+from executive.campaign.sweep_job import SweepJob
 from executive.cli.main import main
 
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from executive.campaign.results.database import ResultsDatabase
 from executive.campaign.results.rows import RunRecord, RunRow, SkillRow
-from executive.campaign.sweep import SweepJob
+from executive.campaign.sweep_job import SweepJob
 from executive.cli.main import main
 from executive.record.result import Audit, ItemCounts
 

@@ -19,7 +19,7 @@ from executive.campaign.cluster.environment import FILES_KEY, describe_differenc
 from executive.campaign.cluster.returned_run import unpack_run
 from executive.campaign.pool import JobOptions
 from executive.campaign.results.sweep_folder import create_sweep, make_settings
-from executive.campaign.sweep import SweepJob, list_jobs, run_job
+from executive.campaign.sweep_job import SweepJob, list_jobs, run_job
 from executive.errors import InputError
 
 WAVE = '''

@@ -18,8 +18,8 @@ import pytest
 from executive.campaign.pool import JobOptions
 from executive.campaign.results.rows import RunRow
 from executive.campaign.results.sweep_folder import create_sweep, make_settings
-from executive.campaign.results.tables import ITEMS, RUNS
-from executive.campaign.sweep import list_jobs, run_sweep
+from executive.campaign.sweep import run_sweep
+from executive.campaign.sweep_job import list_jobs
 from executive.errors import InputError
 
 pytest.importorskip("distributed")
@@ -66,8 +66,8 @@ def sweep(folder: Path, cluster: str | None = None, **options: Any) -> list[RunR
     with closing(create_sweep(make_settings("sort_fruit", SEEDS, FAKE, {}, None, False), folder)) as database:
         jobs = list_jobs(database.settings, database.path.parent)
         run_sweep(jobs, database, JobOptions(**options), cluster)
-        assert [row.run_index for row in database.read(ITEMS) if row.state != "placed"] == []
-        return database.read(RUNS)
+        assert [row.run_index for row in database.read_items() if row.state != "placed"] == []
+        return database.read_runs()
 
 
 def test_a_killed_worker_costs_only_time(cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
