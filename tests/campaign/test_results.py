@@ -158,19 +158,6 @@ def test_a_sweep_is_resumed_by_one_process_and_only_with_its_inputs(
         sweep_folder.open_sweep(tmp_path / "changed")
 
 
-def test_a_comparison_is_resumed_with_both_sweeps_or_not_at_all(
-    tmp_path: Path, settings: SweepSettings
-) -> None:
-    first, second = sweep_folder.create_comparison([settings, settings], tmp_path)
-    first.close()
-    with pytest.raises(InputError, match=r"another process executes the sweep .*/b/"):
-        sweep_folder.open_comparison(first.path.parents[1])
-    second.close()
-    # The failed attempt has closed the first database.
-    for database in sweep_folder.open_comparison(first.path.parents[1]):
-        database.close()
-
-
 def test_the_summary_counts_objects_and_groups_problems() -> None:
     wrong = make_run(2, right=3, audit=Audit(agrees=False, right=2, wrong_bin=1))
     fault = make_run(4, "FAULT", crashes=2)
@@ -232,15 +219,6 @@ def test_the_interval_of_a_ratio_is_that_of_its_standard_error() -> None:
     error = sum(one**2 for one in residuals) ** 0.5 / sum(bottoms)
     assert estimate.high - estimate.low == pytest.approx(2 * 1.96 * error, rel=0.1)
     assert (estimate_ratio([2.0], [4.0]), estimate_ratio([], [])) == (Estimate(2.0, 4.0, 0.5), Estimate(0, 0))
-
-
-def test_a_mission_compared_with_itself_has_no_difference() -> None:
-    runs = [make_run(seed, "FAILURE" if seed % 3 == 0 else "SUCCESS") for seed in range(20)]
-    pairs = pair_runs(runs, runs)
-    assert [(one.difference, one.low, one.high) for one in compute_differences(pairs)] == [
-        (0.0, 0.0, 0.0)
-    ] * 3
-    assert not any(pair.is_changed for pair in pairs)
 
 
 def test_a_loss_has_an_interval_that_excludes_zero() -> None:

@@ -26,15 +26,8 @@ def make_record(job: SweepJob, status: str = "SUCCESS") -> RunRecord:
         robot_time_s=10.0 + job.seed, wall_time_s=6.0,
         run_directory="" if status == "FAULT" else f"runs/{job.seed}",
     )  # fmt: skip
-    return RunRecord(
-        run,
-        (),
-        (
-            SkillRow(
-                run_index=job.index, skill="Grasp", activations=2, failed_activations=1, robot_time_s=0.5
-            ),
-        ),
-    )
+    counts = {"activations": 2, "failed_activations": 1, "robot_time_s": 0.5}
+    return RunRecord(run, (), (SkillRow(run_index=job.index, skill="Grasp", **counts),))
 
 
 @pytest.fixture
@@ -54,70 +47,51 @@ def sweep(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Resu
 
 
 @pytest.mark.parametrize(
-    ("statuses", "run_count", "code", "expected"),
+    ("statuses", "code", "expected"),
     [
-        ("SUCCESS", 1, 0, "1 of 1 runs succeeded\n"),
-        ("SUCCESS FAILURE", 2, 0, "1 of 2 runs succeeded\n"),
-        ("SUCCESS FAILURE", 6, 130, "halted after 2 of 6 runs; 1 of the 2 succeeded\n"),
-        ("", 6, 130, "halted after 0 of 6 runs\n"),
+        ("SUCCESS FAILURE", 0, "1 of 2 runs succeeded\n"),
+        ("SUCCESS", 130, "halted after 1 of 2 runs; 1 of the 1 succeeded\n"),
+        ("", 130, "halted after 0 of 2 runs\n"),
     ],
 )
-def test_a_sweep_succeeds_if_all_runs_were_made(sweep, statuses, run_count, code, expected):
-    shown = sweep(statuses, "--seeds", f"0:{run_count}", "--json")
+def test_a_sweep_succeeds_if_all_runs_were_made(
+    sweep: Callable[..., Result], statuses: str, code: int, expected: str
+) -> None:
+    shown = sweep(statuses, "--seeds", "0:2", "--json")
     assert (shown.exit_code, expected in shown.stderr) == (code, True), shown.stderr
     figures = json.loads(shown.stdout)
-    assert (figures["planned_run_count"], figures["is_incomplete"], len(figures["runs"])) == (
-        run_count,
-        code == 130,
-        len(statuses.split()),
-    )
+    assert (figures["planned_run_count"], figures["is_incomplete"]) == (2, code == 130)
+    assert len(figures["runs"]) == len(statuses.split())
 
 
-def test_the_summary_shows_every_variant_and_how_to_repeat_a_failure(sweep):
+def test_the_summary_shows_every_variant_and_how_to_repeat_a_failure(sweep: Callable[..., Result]) -> None:
     words = ("--seeds", "3-4", "--vary", "cell.table.objects=[[1, 1], [2, 2]]")
-    shown = sweep("SUCCESS SUCCESS FAULT SUCCESS", *words)
-    said = " ".join(shown.stderr.split())
-    assert "3 of 4 runs succeeded" in said
-    assert "success rate 100.00% (34.2 to 100.0) 50.00% (9.5 to 90.5)" in said
-    assert "number in the right bin 4 of 4 4 of 4" in said
-    assert "Grasp, per run [s] 0.50 (2 of 4 failed) 0.50 (2 of 4 failed)" in said
-    assert (
-        "with cell.table.objects=[2, 2]: 1 run: FAULT Grasp.missed at tree/Grasp: no seal seeds 3; repeat"
-        in said
-    )
-    assert "the first: executive run sort_fruit --seed 3 --set 'cell.table.objects=[2, 2]'" in said
+    text = " ".join(sweep("SUCCESS SUCCESS FAULT SUCCESS", *words).stderr.split())
+    for line in (
+        "3 of 4 runs succeeded",
+        "success rate 100.00% (34.2 to 100.0) 50.00% (9.5 to 90.5)",
+        "number in the right bin 4 of 4 4 of 4",
+        "Grasp, per run [s] 0.50 (2 of 4 failed) 0.50 (2 of 4 failed)",
+        "with cell.table.objects=[2, 2]: 1 run: FAULT Grasp.missed at tree/Grasp: no seal seeds 3; repeat",
+        "the first: executive run sort_fruit --seed 3 --set 'cell.table.objects=[2, 2]'",
+    ):
+        assert line in text
 
 
-def test_an_unmet_requirement_is_the_reason_of_exit_code_1(sweep):
+def test_an_unmet_requirement_is_the_reason_of_exit_code_1(sweep: Callable[..., Result]) -> None:
     words = ("--seeds", "0:2", "--json", "--require", "success >= 0.99 and p95(robot_time_s) < 20")
     shown = sweep("SUCCESS FAILURE", *words)
-    message = "success>=0.99 is not met: the value is 0.5"
-    assert (shown.exit_code, shown.stderr.splitlines()[-1]) == (1, message)
-    assert json.loads(shown.stdout)["unmet_conditions"] == [message]
+    (message,) = json.loads(shown.stdout)["unmet_conditions"]
+    assert (shown.exit_code, message in shown.stderr) == (1, True)
     assert sweep("SUCCESS SUCCESS", *words).exit_code == 0
     assert sweep("SUCCESS", *words).exit_code == 130, "a halt is more important"
 
 
-def test_a_resumed_sweep_writes_its_report_for_all_runs(sweep, tmp_path):
+def test_a_resumed_sweep_reports_all_runs(sweep: Callable[..., Result], tmp_path: Path) -> None:
     assert sweep("SUCCESS FAILURE", "--seeds", "0:3").exit_code == 130
     (folder,) = (tmp_path / "runs").glob("*/*_sweep_sort_fruit")
     shown = sweep("FAULT", "--resume", str(folder), "--junit", str(tmp_path / "junit.xml"))
     assert (shown.exit_code, "1 of 3 runs succeeded" in shown.stderr) == (0, True)
-    names = [case.get("name") for case in ElementTree.parse(tmp_path / "junit.xml").iter("testcase")]
-    assert names == ["seed 0", "seed 1", "seed 2"]
+    assert len(list(ElementTree.parse(tmp_path / "junit.xml").iter("testcase"))) == 3
     refused = sweep("", "--resume", str(folder), "--junit", str(folder / "a" / "b"))
-    assert (refused.exit_code, refused.stderr.splitlines()[-1]) == (
-        2,
-        f'cannot write the report "{folder}/a/b": no such file or directory; '
-        "name another file with --junit FILE",
-    )
-
-
-def test_a_folder_that_cannot_be_made_is_one_message(sweep, tmp_path):
-    (tmp_path / "file").touch()
-    shown = sweep("", "--seeds", "0-9", "--runs", str(tmp_path / "file" / "runs"))
-    assert (shown.exit_code, shown.stderr) == (
-        2,
-        f'cannot make a run directory below "{tmp_path}/file/runs": not a directory; '
-        "name another folder with --runs DIR\n",
-    )
+    assert (refused.exit_code, "name another file with --junit FILE" in refused.stderr) == (2, True)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import pickle
 from collections.abc import Callable
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,12 +13,11 @@ from events import at
 
 from executive.cell.detection import Observation
 from executive.cell.protocols import Request
-from executive.cell.workcell import CellOptions
-from executive.cells.fake.cell import FakeCell, SilentOperator, load_empty_cell
+from executive.cells.fake.cell import FakeCell
 from executive.errors import Blocked, InputError, NoDepth, Unavailable, Unreachable
 from executive.events import FaultInjected, NodeEnded, NodeStarted, ToolCommanded
 from executive.testing import faults as effects
-from executive.testing.faults import Effect, FaultyCell, ScheduledFault, after, between, during, with_faults
+from executive.testing.faults import Effect, FaultyCell, ScheduledFault, after, between, during
 from executive.testing.run_mission import run_mission
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
@@ -118,44 +115,10 @@ def test_a_time_that_never_comes_is_refused(make: Callable[[], ScheduledFault], 
         make()
 
 
-def test_a_script_can_be_sent_to_another_process_and_used_again() -> None:
-    script = [
-        during("*/Grasp", effects.seal_fails(), activations=2),
-        after(0.0, effects.object_moved((0.1, 0))),
-    ]
-    assert pickle.loads(pickle.dumps(script)) == script
-    kind = with_faults(FakeCell, [after(0.0, effects.table_bumped())])
-    options = CellOptions(SilentOperator(), cell_folder=Path())
-    for _ in range(2):
-        cell = kind(load_empty_cell(), seed=0, routes={}, options=options)
-        cell.advance()
-        assert cell.cell.ledger.change_count == 1
-
-
 def test_the_world_of_an_unknown_cell_cannot_be_changed() -> None:
     strange: Any = SimpleNamespace(cell=FakeCell().cell, accounts=None, advance=lambda: None)
     with pytest.raises(InputError, match="not that of a SimpleNamespace"):
         FaultyCell(strange, [after(0.0, effects.object_removed(1))]).advance()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("pattern", "effect", "activations", "reasons", "status", "rejected"),
-    [
-        ("*/Release", effects.tool_does_not_release(), (2, 3, 4), ["stuck"] * 3, "FAILURE", 5),
-        ("*/Transit", effects.object_removed(), 2, ["dropped"], "FAILURE", 0),
-        ("*/Transit", effects.arm_collides(), tuple(range(1, 37)), ["blocked"] * 36, "INCOMPLETE", 6),
-        ("*/Approach", effects.no_path(), 2, ["unreachable"], "INCOMPLETE", 1),
-        ("*/watch/*/Localize", effects.no_depth(), 1, ["no_depth"], "SUCCESS", 0),
-        ("*/watch/*/Localize", effects.table_bumped(), 1, ["stale"], "SUCCESS", 0),
-    ],
-)  # fmt: skip
-def test_a_mission_deals_with_a_fault(
-    pattern: str, effect: Effect, activations: Any, reasons: list[str], status: str, rejected: int
-) -> None:
-    result = run_mission("sort_overhead", faults=[during(pattern, effect, activations=activations)])
-    assert result.list_failure_reasons(pattern) == reasons
-    assert (result.status, result.items["rejected"], result.agrees) == (status, rejected, True)
 
 
 def test_an_operator_asks_for_a_scan_and_quits() -> None:

@@ -1,14 +1,21 @@
-"""Files that travel to a worker, and the process there."""
+"""Sweeps on a cluster: the files that travel to a worker, the process there, and a dask scheduler."""
 
 from __future__ import annotations
 
 import io
+import os
+import re
 import shutil
+import signal
+import subprocess
 import sys
 import zipfile
+from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 from unittest.mock import patch
 
 import pytest
@@ -18,10 +25,14 @@ from executive.campaign.cluster.cluster import run_jobs_on_cluster
 from executive.campaign.cluster.environment import FILES_KEY, describe_differences, describe_environment
 from executive.campaign.cluster.returned_run import unpack_run
 from executive.campaign.pool import JobOptions
+from executive.campaign.results.rows import RunRow
 from executive.campaign.results.sweep_folder import create_sweep, make_settings
+from executive.campaign.sweep import run_sweep
 from executive.campaign.sweep_job import SweepJob, list_jobs, run_job
 from executive.errors import InputError
 
+FAKE = {"cell.kind": "fake", "cell.table.objects": "[1, 2]"}
+SEEDS = range(6)
 WAVE = '''
 from executive.skill import Skill
 
@@ -45,13 +56,12 @@ def project(tmp_path: Path, missions: Path, monkeypatch: pytest.MonkeyPatch) -> 
         "mine_wave/__init__.py": "",
         "mine_wave/wave.py": WAVE,
         "wave.yaml": MISSION,
-        "cells/mine.yaml": "base: bases/first.yaml\ncell: mine\nkind: fake\n",
+        "cells/mine.yaml": "base: bases/first.yaml\ncell: mine\nkind: fake\n# labels: 'my labels.txt'\n",
         "cells/bases/first.yaml": (missions / "cells" / "overhead.yaml").read_text(encoding="utf-8"),
         "cells/mine.measured.json": "[]",
         "cells/my labels.txt": "cube\n",
         "cells/unused.txt": "",
     }
-    files["cells/mine.yaml"] += "# labels: 'my labels.txt'\n"
     for name, text in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")
@@ -71,11 +81,10 @@ def list_sweep_jobs(folder: Path) -> list[SweepJob]:
 def test_all_files_of_the_runs_travel_and_no_others(project: Path) -> None:
     bundle = make_bundle(list_sweep_jobs(Path("runs")))
     names = set(zipfile.ZipFile(io.BytesIO(bundle)).namelist())
-    expected = ("wave.yaml", "pyproject.toml", "cells/mine.yaml", "cells/bases/first.yaml")
-    expected += ("cells/mine.measured.json", "cells/my labels.txt")
-    assert {f"{project}/{name}" for name in expected} <= names
+    expected = {str(file) for file in project.rglob("*.*") if file.suffix not in (".py", ".sqlite")}
+    expected.remove(f"{project}/cells/unused.txt")
+    assert {name for name in names if name.startswith(str(project))} == expected
     assert {f"{PACKAGES_FOLDER}/mine_wave/{name}.py" for name in ("__init__", "wave")} <= names
-    assert f"{project}/cells/unused.txt" not in names
     assert make_bundle(list_sweep_jobs(Path("runs"))) == bundle
 
 
@@ -88,12 +97,11 @@ def test_an_absolute_path_to_a_file_is_refused(project: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("is_absolute", [False, True])
-def test_a_worker_runs_a_skill_of_another_package(project: Path, tmp_path: Path, is_absolute: bool) -> None:
+def test_a_worker_runs_a_skill_of_another_package(project: Path, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     from executive.campaign.cluster.worker import BundlePlugin
 
-    jobs = list_sweep_jobs(tmp_path / "runs" if is_absolute else Path("runs"))
+    jobs = list_sweep_jobs(tmp_path / "runs")
     local = run_job(jobs[0])
     plugin = BundlePlugin(make_bundle(jobs), describe_environment())
     worker = SimpleNamespace(local_directory=str(tmp_path))
@@ -123,7 +131,80 @@ def test_a_worker_with_other_software_is_described() -> None:
 
 
 def test_without_the_extra_the_error_names_it() -> None:
-    with patch.dict(sys.modules, {"distributed": None}), pytest.raises(InputError) as caught:
+    with (
+        patch.dict(sys.modules, {"distributed": None}),
+        pytest.raises(InputError, match="uv sync --extra cl"),
+    ):
         run_jobs_on_cluster([], "tcp://127.0.0.1:1", JobOptions(), lambda *_: None)
-    assert '--cluster needs the packages of the extra "cluster"' in str(caught.value)
-    assert "uv sync --extra cluster" in str(caught.value)
+
+
+def start_dask(folder: Path, *words: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "dask", *words, "--no-dashboard"]
+    return subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True)
+
+
+def wait_for(log: Any, pattern: str) -> str:
+    """Read the log of a program up to a line that contains the pattern, and return the first group."""
+    return next(match[1] for line in log if (match := re.search(pattern, line)))
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
+    """Address of a scheduler, and its two workers; without a nanny, a killed worker stays dead."""
+    pytest.importorskip("distributed")
+    scheduler = start_dask(tmp_path, "scheduler", "--host", "127.0.0.1", "--port", "0")
+    processes = [scheduler]
+    try:
+        address = wait_for(scheduler.stderr, r"Scheduler at:\s*(tcp://\S+)")
+        words = ("worker", address, "--nthreads", "1", "--no-nanny", "--local-directory", str(tmp_path / "w"))
+        processes += [start_dask(tmp_path, *words) for _ in range(2)]
+        for worker in processes[1:]:
+            wait_for(worker.stderr, r"(Registered to)")
+        yield address, processes[1:]
+    finally:
+        for process in processes:
+            process.kill()
+            process.communicate()
+
+
+def sweep(folder: Path, cluster: str | None = None, **options: Any) -> list[RunRow]:
+    with closing(create_sweep(make_settings("sort_fruit", SEEDS, FAKE, {}, None, False), folder)) as database:
+        jobs = list_jobs(database.settings, database.path.parent)
+        run_sweep(jobs, database, JobOptions(**options), cluster)
+        assert [row.run_index for row in database.read_items() if row.state != "placed"] == []
+        return database.read_runs()
+
+
+@pytest.mark.slow
+def test_a_killed_worker_costs_only_time(
+    cluster: tuple[str, list[subprocess.Popen[str]]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address, workers = cluster
+    monkeypatch.chdir(tmp_path)
+    remote = sweep(
+        tmp_path / "remote", address, on_progress=lambda *_: os.kill(workers[0].pid, signal.SIGKILL)
+    )
+    local = sweep(tmp_path / "local")
+    assert [row.status for row in remote] == ["SUCCESS"] * len(SEEDS)
+    for one, other in zip(remote, local, strict=True):
+        assert replace(one, wall_time_s=other.wall_time_s, run_directory=other.run_directory) == other
+        journals = [(Path(row.run_directory) / "journal.jsonl").read_bytes() for row in (one, other)]
+        assert journals[0] == journals[1]
+        assert str(tmp_path / "w") not in (Path(one.run_directory) / "result.json").read_text(
+            encoding="utf-8"
+        )
+
+
+@pytest.mark.slow
+def test_a_scheduler_without_workers_and_none_at_all_are_explained(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    scheduler = start_dask(tmp_path, "scheduler", "--host", "127.0.0.1", "--port", "0")
+    try:
+        address = wait_for(scheduler.stderr, r"Scheduler at:\s*(tcp://\S+)")
+        with pytest.raises(InputError, match="has no workers"):
+            sweep(tmp_path / "runs", address)
+    finally:
+        scheduler.kill()
+        scheduler.communicate()
+    with pytest.raises(InputError, match=r"cannot be reached: .*; start it with `dask scheduler`"):
+        sweep(tmp_path / "runs", address)
