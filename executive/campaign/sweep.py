@@ -10,7 +10,7 @@ from executive.campaign.cluster.cluster import run_jobs_on_cluster
 from executive.campaign.pool import JobOptions, run_jobs
 from executive.campaign.results.database import ResultsDatabase
 from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings
-from executive.campaign.results.summary import SweepResults, summarize_runs
+from executive.campaign.results.sweep_summary import SweepResults, summarize_runs
 from executive.campaign.sweep_job import SweepJob, list_jobs, make_fault_record, run_job
 from executive.view.terminal.summary import format_repeat_command
 

@@ -43,8 +43,8 @@ def command(
     options.check_disjoint(overrides, "--set-a or --set-b", {**overrides_a, **overrides_b})
     with keep_stdout_clean():
         from executive.campaign.results.results_page import write_missing_reports, write_page
-        from executive.campaign.results.summary import SweepResults, compute_differences, pair_runs
         from executive.campaign.results.sweep_folder import create_comparison, make_settings, open_comparison
+        from executive.campaign.results.sweep_summary import SweepResults, compute_differences, pair_runs
         from executive.campaign.sweep import read_results
         from executive.cell.json_values import to_json
         from executive.cli.progress import print_report

@@ -9,7 +9,13 @@ from rich.console import RenderableType
 from rich.table import Table
 
 from executive.campaign.results.rows import describe_variant
-from executive.campaign.results.summary import Difference, Estimate, FailureGroup, RunPair, VariantSummary
+from executive.campaign.results.sweep_summary import (
+    Difference,
+    Estimate,
+    FailureGroup,
+    RunPair,
+    VariantSummary,
+)
 from executive.view.terminal.summary import describe_end
 
 MAX_LISTED_SEEDS = 10

@@ -16,7 +16,7 @@ from executive.campaign.results.database import ResultsDatabase, get_database_pa
 from executive.campaign.results.junit import format_junit
 from executive.campaign.results.requirement import describe_unmet_conditions, parse_requirement
 from executive.campaign.results.rows import ItemRow, RunRecord, RunRow, SkillRow, SweepSettings, make_record
-from executive.campaign.results.summary import (
+from executive.campaign.results.sweep_summary import (
     Estimate,
     FailureGroup,
     SkillSummary,

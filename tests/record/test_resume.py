@@ -34,9 +34,9 @@ from executive.record.result import Result
 from executive.record.resume import resume_run
 from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions
-from executive.testing.world_access import WorldAccess
 from executive.testing.oracle import make_oracle_kind
 from executive.testing.substitutes import make_raising
+from executive.testing.world_access import WorldAccess
 from tests.meanwhile import meanwhile
 
 SEED = 3

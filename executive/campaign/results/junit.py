@@ -7,7 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from executive.campaign.results.rows import RunRow
-from executive.campaign.results.summary import RepeatCommandFactory
+from executive.campaign.results.sweep_summary import RepeatCommandFactory
 from executive.record.atomic_file import write_atomically
 from executive.record.run_directory import convert_os_errors
 from executive.view.text import replace_invalid_xml_characters

@@ -11,7 +11,7 @@ import numpy as np
 
 from executive.campaign.results.database import encode_run
 from executive.campaign.results.rows import RunRow, describe_variant
-from executive.campaign.results.summary import VariantSummary
+from executive.campaign.results.sweep_summary import VariantSummary
 from executive.errors import InputError
 from executive.record.result import Audit
 

@@ -12,7 +12,7 @@ from urllib.parse import quote
 import numpy as np
 
 from executive.campaign.results.rows import describe_variant
-from executive.campaign.results.summary import Difference, RunPair, SweepResults, VariantSummary
+from executive.campaign.results.sweep_summary import Difference, RunPair, SweepResults, VariantSummary
 from executive.record.atomic_file import write_atomically
 from executive.record.run_directory import RunDirectory, convert_os_errors
 from executive.view.report.page import try_write_report
