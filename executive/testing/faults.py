@@ -42,7 +42,7 @@ TIME_TOLERANCE = 1e-9
 UNSURE_CONFIDENCE_FRACTION = 0.9
 """Maximum confidence of the detections of an unsure detector, as a fraction of its threshold."""
 BUMP_DISTANCE = 0.06
-"""tuple[float, float] of an object that is bumped aside [m]."""
+"""Displacement of an object that is bumped aside [m]."""
 BUMP_DIRECTION_COUNT = 8
 """Number of evenly spaced directions that are tried, in order, for a free position of a bumped object."""
 ObjectChoice = int | Literal["node", "nearest"]

@@ -185,14 +185,11 @@ class _FaultLister:
                 yield self._plan(node, reason, occasion, skill_fault, True, cause is not None)
 
     def list_bugs(self, node: SkillNode) -> Iterator[PlannedFault]:
-        """Yield errors that the code of a skill raises: at its start, and half-way in its longest run."""
-        yield self._plan(node, "raises", "first", SkillFault(node.skill, "", (1,)))
-        step_counts = self._steps_by_path.get(node.path, ())
-        max_steps = max(step_counts, default=0)
-        if max_steps >= 2:
-            longest_activation = 1 + step_counts.index(max_steps)
-            bug = SkillFault(node.skill, "", (longest_activation,), max_steps // 2)
-            yield self._plan(node, "raises", "middle", bug)
+        """Yield an error that the code of a skill raises half-way in its longest activation."""
+        step_counts = self._steps_by_path.get(node.path, (0,))
+        longest_activation = 1 + step_counts.index(max(step_counts))
+        bug = SkillFault(node.skill, "", (longest_activation,), max(step_counts) // 2)
+        yield self._plan(node, "raises", "middle", bug)
 
     def list_detector_faults(self) -> Iterator[PlannedFault]:
         """Yield hanging, unsure and dead detectors, from the start and from the middle of the run."""
