@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from executive.events import ItemChanged
 from executive.geometry import Array
 from executive.ledger import outcomes
 from executive.ledger.belief import make_viewpoint_key
-from executive.ledger.bin_contents import find_probable_bin
-from executive.ledger.bin_recovery import BinRecovery
+from executive.ledger.bin_contents import BinRecovery, find_probable_bin
 from executive.ledger.item import ON_TABLE, ItemRecord, State
 from executive.ledger.look import LookUpdate, make_look_event
 from executive.ledger.queries import LedgerQueries
@@ -237,12 +236,14 @@ class Tracker(LedgerQueries):
     def record_interruption(self) -> None:
         """Record an interruption of the run: the tool may have moved any item that is not in a bin."""
         self._bin_recovery = BinRecovery(self._bin_contents)
-        self._mark_as_dropped(self._records.filter_by_state(State.HELD, State.DROPPED))
-
-    def mark_unseen_as_dropped(self) -> None:
-        """Set each item on the table that no look has detected since `record_interruption` to DROPPED."""
-        items = [record for record in self._records.filter_by_state(State.SEEN) if record.belief.is_probable]
-        self._mark_as_dropped([item for item in items if not self._staleness.is_unmoved(item)])
+        for record in self._records.filter_by_state(State.HELD, State.DROPPED, State.SEEN):
+            if record.state is not State.SEEN or record.belief.is_probable:
+                record.change_count = self.change_count
+                record.is_untracked = True
+                record.was_taken_away = False
+                record.bin_log_odds.clear()
+                self._records.change_state(record, State.DROPPED)
+        self.invalidate_positions()
 
     def record_bin_contents(self) -> None:
         """Record an item for each unknown object that a look after `record_interruption` showed in a bin."""
@@ -342,15 +343,6 @@ class Tracker(LedgerQueries):
         else:
             record.set_state(State.REJECTED, self._explain_skipped_item(record))
         self._records.emit(record)
-
-    def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
-        """Set items to DROPPED, so that later looks search for them on the table and in the bins."""
-        assert self._bin_recovery is not None, "items are marked as dropped after `record_interruption`"
-        for record in records:
-            record.change_count, record.is_untracked, record.was_taken_away = self.change_count, True, False
-            record.bin_log_odds.clear()
-            self._records.change_state(record, State.DROPPED)
-        self.invalidate_positions()
 
     def _invalidate_near(self, centre: Array, radius: float) -> None:
         """Record that any object within `radius` [m] of `centre` `(3,)` [m] may have been moved."""

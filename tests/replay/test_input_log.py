@@ -85,12 +85,6 @@ def test_a_world_that_did_more_than_the_journal_knows(
     assert (interruption.kept_step_count, interruption.last_action) == (complete, action)
 
 
-def test_a_command_without_an_event_before_it_is_missing_in_the_journal() -> None:
-    log = InputLog([START, at(5, ToolCommanded("open")), sense(8, 1)])
-    assert log.make_final_interruption(9, 8).last_action == "unknown"
-    assert log.make_final_interruption(9, 7).last_action == "open"
-
-
 def test_actions_stay_unknown_if_the_resumption_was_interrupted_at_once() -> None:
     log = InputLog([START, sense(5, 1), resume(9, 6, "unknown"), sense(9, 2)])
     interruption = log.make_final_interruption(9, 8)
