@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from executive.record.guarded_view import GuardedView
+from executive.record.recorded_run import GuardedView
 
 
 class FailingView:

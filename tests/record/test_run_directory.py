@@ -64,7 +64,7 @@ def test_space_is_spoken_of_where_it_is_what_is_missing(number):
     with pytest.raises(InputError) as raised, convert_os_errors("write"):
         raise OSError(number, reason)
     assert str(raised.value) == (
-        f"cannot write: {reason.lower()}; free some space or name another folder with --runs DIR"
+        f"cannot write: {reason.lower()}; name another folder with --runs DIR"
     )
 
 
@@ -76,7 +76,7 @@ def test_a_full_disk_is_a_sentence_and_leaves_nothing_half_written(tmp_path, mon
     directory = create(tmp_path)
     left = iter(range(room))
     monkeypatch.setattr(os, "fsync", lambda file: None if next(left, None) is not None else full())
-    with pytest.raises(InputError, match="no space left on device; free some space"):
+    with pytest.raises(InputError, match="no space left on device; name another"):
         directory.save_inputs(texts, {})
     names = [path.name for path in directory.path.iterdir()]
     assert sorted(names) == sorted(list(texts)[:room])

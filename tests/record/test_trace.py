@@ -10,7 +10,7 @@ from events import at, frame_searched, item_changed, run_ended, run_started
 
 from executive.events import NodeEnded, NodeStarted, RequestGiven, TargetSelected, TimedEvent, ToolCommanded
 from executive.record.journal_format import decode_event, encode_event
-from executive.record.trace import Trace
+from executive.record.recorder import Trace
 
 FAILED = NodeEnded("sort/Grasp", "FAILURE", "Grasp", "cube-1", "missed", "no seal")
 EVENTS = [

@@ -20,7 +20,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import load_skills
-from executive.record.trace import Trace
+from executive.record.recorder import Trace
 from executive.run.assembly import RunOptions, assemble
 from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.run_context import RunContext

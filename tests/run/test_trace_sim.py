@@ -8,7 +8,7 @@ import pytest
 
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
-from executive.record.trace import Trace
+from executive.record.recorder import Trace
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import make_oracle_kind
 

@@ -73,31 +73,30 @@ class WorldRebuilder:
     def _execute(self, kind: str, numbers: Array) -> None:
         if not np.isfinite(numbers).all():
             raise ValueError("a number is infinite")
-        world, tool = self._world, self._tool
-        match kind:
-            case command_log.RUN_STEP | command_log.IDLE_STEP:
-                self.step_count += kind == command_log.RUN_STEP
-                if self._next_targets[0].size:
-                    world.command_arm(*self._next_targets)
-                self.braking_start = self._next_targets
-                world.step()
-                tool.advance()
-            case command_log.JOINT_TARGETS:
-                self._next_targets = (numbers[1:], float(numbers[0]))
-            case command_log.MOTION_END:
-                self.motion = None
-            case command_log.SET_POSE:
-                world.place_object(int(numbers[0]), Pose.of(numbers[1:4], numbers[4:]))
-            case command_log.REMOVE:
-                world.remove_object(int(numbers[0]))
-            case command_log.VACUUM_ON:
-                tool.close()
-            case command_log.VACUUM_OFF:
-                tool.open()
-            case command_log.SEAL_BREAK:
-                tool.break_seal()
-            case _:
-                raise ValueError("the kind is unknown")
+        world = self._world
+        tool = self._tool
+        if kind in (command_log.RUN_STEP, command_log.IDLE_STEP):
+            self.step_count += kind == command_log.RUN_STEP
+            if self._next_targets[0].size:
+                world.command_arm(*self._next_targets)
+            self.braking_start = self._next_targets
+            world.step()
+            tool.advance()
+        elif kind == command_log.JOINT_TARGETS:
+            self._next_targets = (numbers[1:], float(numbers[0]))
+        elif kind == command_log.MOTION_END:
+            self.motion = None
+        elif kind == command_log.SET_POSE:
+            world.place_object(int(numbers[0]), Pose.of(numbers[1:4], numbers[4:]))
+        elif kind == command_log.REMOVE:
+            world.remove_object(int(numbers[0]))
+        else:
+            actions = {
+                command_log.VACUUM_ON: tool.close,
+                command_log.VACUUM_OFF: tool.open,
+                command_log.SEAL_BREAK: tool.break_seal,
+            }
+            actions[kind]()
 
 
 class SampledMotion:
