@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.special import bdtrc, expit
+from scipy.special import expit
 
 from executive.cell.detection import Detection, ErrorRates, Observation
 from executive.ledger.association import compute_association_distance
-from executive.ledger.belief import Belief, compute_binomial_tail, compute_probability
+from executive.ledger.belief import Belief, compute_probability
 from executive.ledger.bin_contents import update_bin_log_odds
 from executive.ledger.item import ItemRecord
 
@@ -113,13 +113,6 @@ def test_agreeing_looks_reduce_the_standard_error_and_a_push_resets_it() -> None
     assert item.first_position == pytest.approx(HERE), "where it was before it was moved"
 
 
-def test_measurements_count_by_how_good_they_are() -> None:
-    item = record()
-    item.update_position(HERE, 0.001, is_unmoved=True)
-    item.update_position(HERE + np.array([0.011, 0, 0]), 0.0031623, is_unmoved=True)
-    assert item.position[0] - HERE[0] == pytest.approx(0.001, rel=0.02)
-
-
 @pytest.mark.parametrize(
     ("spread", "new", "allowed"),
     [(0.001, 0.001, 0.025), (0.006, 0.008, 0.035), (0.013, 0.013, 0.05), (math.inf, 0.013, 0.05)],
@@ -134,10 +127,3 @@ def test_the_gate_is_as_wide_as_the_measurements_scatter(spread: float, new: flo
 @given(st.floats(-1e4, 1e4))
 def test_a_probability_from_log_odds_is_the_logistic_function_to_the_last_bit(log_odds: float) -> None:
     assert compute_probability(log_odds) == pytest.approx(float(expit(log_odds)), rel=0, abs=1e-300)
-
-
-@pytest.mark.slow
-@given(st.integers(0, 2000), st.integers(0, 2000), st.floats(1e-6, 0.999))
-def test_the_tail_of_a_binomial_distribution_is_that_of_scipy(count: int, more: int, rate: float) -> None:
-    tail = compute_binomial_tail(count, count + more, rate)
-    assert tail == pytest.approx(bdtrc(count - 1, count + more, rate), rel=1e-9, abs=1e-200)

@@ -8,7 +8,6 @@ import pytest
 from ledger_bench import EYE, Bench
 
 from executive.cell.objects import ObjectClass
-from executive.ledger.belief import compute_repeat_probability
 from executive.ledger.certainty import Certainty
 
 DOUBTFUL = replace(EYE, confusion_rate=0.05, repeated=0.8)
@@ -18,11 +17,6 @@ CUBE = ("cube", 0.5, 0.0)
 def record_of(bench: Bench):
     (record,) = bench.ledger.records
     return record
-
-
-def test_the_probability_of_the_same_answer_again_is_that_of_a_copy_or_of_another_such_answer():
-    assert (compute_repeat_probability(0.05, 0.0), compute_repeat_probability(0.05, 1.0)) == (0.05, 1.0)
-    assert compute_repeat_probability(0.05, 0.8) == pytest.approx(0.81)
 
 
 def test_the_same_answer_from_the_same_pose_proves_a_class_only_a_little_more(bench):

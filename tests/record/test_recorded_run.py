@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from unittest.mock import Mock
 
 import py_trees
 import pytest
@@ -14,7 +15,7 @@ from executive.events import RunEnded, RunStarted, TargetSelected
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.record.journal import Journal, read_journal
-from executive.record.recorded_run import RecordOptions, record_run
+from executive.record.recorded_run import GuardedView, RecordOptions, record_run
 from executive.run.assembly import RunOptions
 from executive.run.run import Run
 
@@ -92,3 +93,25 @@ def test_whatever_ends_a_run_early_view_journal_and_cell_are_closed(run, tmp_pat
     left = tmp_path / "runs" / "latest"
     assert not (left / "result.json").exists()
     Journal(left / "journal.jsonl", resume=True).close()
+
+
+@pytest.mark.parametrize(
+    ("method", "calls"),
+    [
+        ("open", ["open", "close"]),
+        ("event", ["open", "event", "close"]),
+        ("close", ["open", "event", "event", "close", "close"]),
+    ],
+)
+def test_a_view_that_failed_is_only_closed(method: str, calls: list[str]) -> None:
+    inner = Mock(spec=["open", "event", "close"])
+    getattr(inner, method).side_effect = ValueError("no ink")
+    inner.side_effect = inner.event
+    view = GuardedView(inner)
+    view.open(None)
+    view(None)
+    view(None)
+    view.close()
+    seen = [name for name, _, _ in inner.method_calls]
+    assert seen == calls
+    assert "failed during the run: ValueError: no ink" in view.problem

@@ -19,11 +19,8 @@ from executive.errors import InputError
 from executive.events import (
     ItemChanged,
     MotionPlanned,
-    NodeEnded,
-    NodeStarted,
     RunResumed,
     TimedEvent,
-    ToolCommanded,
 )
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import load_skills
@@ -109,17 +106,12 @@ def placed(path: Path) -> Counter[str]:
     return counts
 
 
-MISSIONS = ("sort_overhead", "sort_wrist", "kit_fasteners", "pick_on_request")
-WITHIN_A_STEP = [(444, 7), (1203, 3), (2100, 11)]
-CASES = [(name, after, 1) for name in MISSIONS for after in (1, 333, 700, 1100)] + [
-    *(("sort_overhead", *cut) for cut in WITHIN_A_STEP),
-    *(("sort_and_verify", after, 1) for after in (900, 1500, 2100)),
-    ("sort_two_halves", 900, 1),
-    # Between the localization and the update of the ledger, and after the update.
-    *(("two_detectors", after, 1) for after in (713, 714)),
-    # During a transit with a guard, during a weighing, and during the transit of a weighed object.
-    ("sort_guarded", 700, 1),
-    *(("weigh_and_sort", after, 1) for after in (740, 900)),
+CASES = [
+    *(("sort_overhead", *cut) for cut in [(0, 1), (0, 3), (444, 7), (700, 1), (1203, 3), (2100, 11)]),
+    *((name, 700, 1) for name in ("sort_wrist", "kit_fasteners", "pick_on_request", "fill_by_quota")),
+    # During a verification, between the localization and the update of the ledger, in a guard, in a weighing.
+    *[("sort_and_verify", 2100, 1), ("two_detectors", 713, 1), ("sort_guarded", 700, 1)],
+    ("weigh_and_sort", 740, 1),
 ]
 QUICK = ("sort_overhead", 700, 1)
 
@@ -140,38 +132,6 @@ def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name
     assert set(placed(path).values()) <= {1}
     assert redecided(path) == ""
     assert json.loads((path / "result.json").read_text()) == to_json(result)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "setting"), [("sort_until_four", {"enough": "2"}), ("fill_by_quota", {"most": "1"})]
-)
-def test_counters_and_quotas_are_the_same_after_a_kill(missions: Path, tmp_path: Path, name, setting) -> None:
-    loaded = load_mission(missions / f"{name}.yaml", load_skills(), setting)
-    whole = run_of(loaded, tmp_path)
-    whole_bins = list_bins(find_run("latest", tmp_path))
-    path = cut_off(loaded, tmp_path, 700)
-    result = resumed(path)
-    assert (result.status, result.items, result.audit.agrees) == ("SUCCESS", whole.items, True)
-    assert sorted(list_bins(path).values()) == sorted(whole_bins.values())
-    assert redecided(path) == ""
-
-
-def list_bins(path: Path) -> dict[str, str]:
-    """Return the bin of each placed item at the end of a run."""
-    changes = (timed.event for timed in read_journal(path / "journal.jsonl"))
-    return {one.item: one.bin for one in changes if isinstance(one, ItemChanged) and one.state == "placed"}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("nth", [1, 2, 3, 10])
-def test_a_run_that_was_killed_in_its_first_control_step_starts_again(
-    missions: Path, tmp_path: Path, nth: int
-) -> None:
-    path = cut_off(load(missions, "sort_overhead"), tmp_path, 0, nth)
-    result = resumed(path)
-    assert (result.status, result.audit.agrees) == ("SUCCESS", True)
-    assert redecided(path) == ""
 
 
 @pytest.mark.slow
@@ -198,20 +158,8 @@ def test_it_may_be_cut_off_again_and_again(missions: Path, tmp_path: Path) -> No
     assert redecided(path) == ""
 
 
-def moment(path: Path, skill: str) -> int:
-    """Control step in the middle of the second activation of a skill in a whole run."""
-    events = read_journal(path / "journal.jsonl")
-    ticks = [
-        one.tick
-        for one in events
-        if isinstance(one.event, NodeStarted | NodeEnded) and one.event.skill == skill
-    ]
-    return (ticks[2] + ticks[3]) // 2
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("skill", ["Grasp", "Transit"])
-def test_what_fell_from_the_tool_is_picked_again(missions: Path, tmp_path: Path, skill: str) -> None:
+def test_what_fell_from_the_tool_is_picked_again(missions: Path, tmp_path: Path) -> None:
     fell: list[str] = []
 
     def act(world: WorldAccess) -> None:
@@ -219,12 +167,15 @@ def test_what_fell_from_the_tool_is_picked_again(missions: Path, tmp_path: Path,
         world.break_seal()
 
     loaded = load(missions, "sort_overhead")
-    path = cut_off(loaded, tmp_path, moment(Path(run_of(loaded, tmp_path).run), skill))
+    events = read_journal(Path(run_of(loaded, tmp_path).run) / "journal.jsonl")
+    gripped = next(
+        one.tick for one in events if isinstance(one.event, ItemChanged) and one.event.state == "held"
+    )
+    path = cut_off(loaded, tmp_path, gripped + 40)
     meanwhile(path / "world.log", loaded, SEED, act, FakeCell)
     result = resumed(path)
     assert fell
-    assert (result.status, result.audit.agrees) == ("SUCCESS", True)
-    assert result.items.placed == 6
+    assert (result.status, result.audit.agrees, result.items.placed) == ("SUCCESS", True, 6)
     assert set(placed(path).values()) == {1}
 
 
@@ -249,15 +200,13 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["Detect", "Grasp"])
-def test_a_run_that_a_bug_ended_resumes_after_the_repair(missions: Path, tmp_path: Path, name) -> None:
+def test_a_run_that_a_bug_ended_resumes_after_the_repair(missions: Path, tmp_path: Path) -> None:
     skills = load_skills()
-    buggy = {**skills, name: make_raising(skills[name], ZeroDivisionError("a bug"), delay_steps=3)}
+    buggy = {**skills, "Grasp": make_raising(skills["Grasp"], ZeroDivisionError("a bug"), delay_steps=3)}
     first = run_of(replace(load(missions, "sort_overhead"), skills=buggy), tmp_path)
     assert (first.status, "a bug" in first.message) == ("FAULT", True)
     run = Path(first.run)
-    again = resumed(run, skills=buggy)
-    assert again.message == first.message, "it is not mended yet"
+    assert resumed(run, skills=buggy).message == first.message, "it is not mended yet"
     result = resumed(run)
     assert (result.status, result.audit.right) == ("SUCCESS", result.items.seen)
     assert max(placed(run).values()) == 1
@@ -268,11 +217,11 @@ def test_there_must_be_something_to_take_up(missions: Path, tmp_path: Path) -> N
     with pytest.raises(InputError, match=r"ended as SUCCESS; there is nothing to resume"):
         resumed(path)
     (path / "journal.jsonl").write_text("")
-    with pytest.raises(InputError, match=r"was interrupted before its start; run the mission again"):
+    with pytest.raises(InputError, match="was interrupted before its start"):
         resumed(path)
     with pytest.raises(InputError, match=r'"nowhere" is no run directory, .* the last runs there: 20'):
         find_run("nowhere", tmp_path)
-    with pytest.raises(InputError, match=r"it contains no run at all; name the folder of the runs with"):
+    with pytest.raises(InputError, match="it contains no run at all"):
         find_run("latest", tmp_path / "empty")
 
 
@@ -293,8 +242,9 @@ def truncate(path: Path, share: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("share", [0.15, 0.6, 0.8])
-@pytest.mark.parametrize("name", ["sort_overhead", "sort_wrist"])
+@pytest.mark.parametrize(
+    ("name", "share"), [("sort_overhead", 0.15), ("sort_overhead", 0.8), ("sort_wrist", 0.6)]
+)
 def test_a_scene_is_observed_if_the_journal_lacks_actions_of_the_tool(
     missions: Path, tmp_path: Path, name: str, share: float
 ) -> None:
@@ -306,26 +256,7 @@ def test_a_scene_is_observed_if_the_journal_lacks_actions_of_the_tool(
     assert result.audit.agrees
     assert redecided(path) == ""
     (note,) = watcher.notes
-    assert re.match(r"the journal ends \d+ control steps \([\d.]+ s\) before the log of the world", note)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", [ToolCommanded, MotionPlanned])
-def test_a_scene_is_observed_if_the_journal_lacks_the_last_command(
-    missions: Path, tmp_path: Path, kind: type
-) -> None:
-    loaded = load(missions, "sort_overhead")
-    events = read_journal(Path(run_of(loaded, tmp_path).run) / "journal.jsonl")
-    closed = [one.tick for one in events if isinstance(one.event, ToolCommanded)][2]
-    command = next(one.tick for one in events if isinstance(one.event, kind) and one.tick > closed)
-    path = cut_off(loaded, tmp_path, command + 40)
-    lines = (path / "journal.jsonl").read_text().splitlines(keepends=True)
-    lost = next(n for n, one in enumerate(events) if isinstance(one.event, kind) and one.tick == command)
-    (path / "journal.jsonl").write_text("".join(lines[:lost]))
-    watcher = Watcher()
-    result = resumed(path, views=[watcher])
-    assert (result.status, result.items.placed, result.audit.agrees) == ("SUCCESS", 6, True)
-    assert len(watcher.notes) == 1
+    assert re.match(r"the journal ends \d+ control steps before the log of the world", note)
 
 
 @pytest.mark.slow
@@ -365,50 +296,27 @@ def test_a_mission_that_is_decided_otherwise_now_is_not_gone_on_with(missions: P
         resumed(path)
 
 
-def unwilling(lets_go: bool) -> Any:
-    """Return a kind of fake cell whose first object cannot be sealed, or can now."""
+class UnwillingCell(FakeCell):
+    """A fake cell whose first object cannot be sealed."""
 
-    class Unwilling(FakeCell):
-        def __init__(self, *args: Any, **options: Any) -> None:
-            super().__init__(*args, **options)
-            first = self.world.objects[0]
-            if not lets_go:
-                self.tool.can_seal = lambda: (
-                    self.world.find_touched_object(self.arm.tool_pose.position) is not first
-                )
-
-    return Unwilling
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        first = self.world.objects[0]
+        self.tool.can_seal = lambda: self.world.find_touched_object(self.arm.tool_pose.position) is not first
 
 
 @pytest.mark.slow
 def test_what_was_rejected_is_tried_again(missions: Path, tmp_path: Path) -> None:
     loaded = load_mission(missions / "sort_overhead.yaml", load_skills(), {"attempts": "1"})
-    first = run_of(loaded, tmp_path, make_cell=unwilling(lets_go=False))
-    assert (first.status, first.items.placed, first.items.rejected) == ("INCOMPLETE", 5, 1)
+    first = run_of(loaded, tmp_path, make_cell=UnwillingCell)
     path = Path(first.run)
-    again = resumed(path, make_cell=unwilling(lets_go=False))
-    assert (again.status, again.items.placed, again.items.rejected) == ("INCOMPLETE", 5, 1)
-    assert redecided(path) == ""
+    again = resumed(path, make_cell=UnwillingCell)
+    for result in (first, again):
+        assert (result.status, result.items.placed, result.items.rejected) == ("INCOMPLETE", 5, 1)
     with pytest.raises(Cut):
-        resumed(path, make_cell=unwilling(lets_go=True), views=[Cutter(again.ticks + 100)])
-    result = resumed(path, make_cell=unwilling(lets_go=True))
+        resumed(path, views=[Cutter(again.ticks + 100)])
+    result = resumed(path)
     assert (result.status, result.items.placed, result.items.seen) == ("SUCCESS", 6, 6)
     assert result.audit.agrees
     assert set(placed(path).values()) == {1}
-    assert redecided(path) == ""
-    with pytest.raises(InputError, match="ended as SUCCESS"):
-        resumed(path)
-
-
-@pytest.mark.slow
-def test_a_camera_that_was_moved_before_a_run_is_resumed_ends_it(missions: Path, tmp_path: Path) -> None:
-    class Moved(FakeCell):
-        def __init__(self, *args: Any, **options: Any) -> None:
-            super().__init__(*args, **options)
-            self.camera.displacement_message = "camera overhead is not where the cell file says"
-
-    path = cut_off(load(missions, "sort_overhead"), tmp_path, 1200)
-    result = resumed(path, make_cell=Moved)
-    assert (result.status, result.reason) == ("FAILURE", "Detect.camera_moved")
-    assert result.items.placed < result.items.seen
     assert redecided(path) == ""
