@@ -114,15 +114,13 @@ class InputLog:
         readings = (timed.event for timed in self.events if isinstance(timed.event, InputRead))
         values: list[Any] = [each.value for each in readings if each.name.startswith("behaviour.")]
         steps = [value["values"] for value in values if isinstance(value, dict)]
-        # A step contains all values on the blackboard, whose keys begin with a slash.
-        entries = [
-            (key, entry)
-            for step in steps
-            for key, entry in step.items()
-            if step is steps[-1] or not key.startswith("/")
-        ]
-        names = (f'"{key}" ({entry})' for key, entry in entries if isinstance(entry, str))
-        return next((f"JSON cannot restore the value of {name}" for name in names), "")
+        for step in steps:
+            for key, entry in step.items():
+                # A step contains all values on the blackboard, whose keys begin with a slash.
+                is_present = step is steps[-1] or not key.startswith("/")
+                if is_present and isinstance(entry, str):
+                    return f'JSON cannot restore the value of "{key}" ({entry})'
+        return ""
 
     def make_final_interruption(
         self, step_count: int, last_command_tick: int = 0, *, is_complete: bool = True

@@ -1,7 +1,8 @@
-"""The journal and its reader."""
+"""The journal, its reader, and the hash over every decision of a run."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from contextlib import closing
@@ -20,24 +21,13 @@ from events import (
 )
 from jsonschema import Draft7Validator
 
+from executive import events as kinds
 from executive.errors import Fault, InputError, RecordLost
-from executive.events import (
-    BranchChosen,
-    FaultInjected,
-    FaultRaised,
-    InputRead,
-    MotionPlanned,
-    NodeStarted,
-    OperatorAsked,
-    RequestGiven,
-    RunHalted,
-    RunResumed,
-    TargetSelected,
-    ToolCommanded,
-)
+from executive.events import InputRead, NodeEnded, NodeStarted, RunResumed, TargetSelected, ToolCommanded
 from executive.record import journal_format
 from executive.record.journal import Journal, find_run_end, find_run_start, read_journal
 from executive.record.journal_format import EVENT_CLASSES, encode_event, make_journal_schema
+from executive.record.recorder import Trace
 
 NODE, END = NodeStarted("a"), run_ended()
 FIRST = encode_event(at(1, run_started()))
@@ -248,12 +238,13 @@ def test_every_kind_of_event_comes_back_as_it_was(path):
     events = [
         run_started(requests=["cube"], params={"a": [1, 0.5]}), NODE,
         skill_ended("a/Grasp", outputs={"x": [1]}),
-        BranchChosen("a", "again", "Grasp.missed", "no seal"),
+        kinds.BranchChosen("a", "again", "Grasp.missed", "no seal"),
         frame_searched(detected("cube"), unknown_labels=["x"]),
-        item_changed("cube-1"), TargetSelected("cube-1", "cube", 1, "red_bin"), MotionPlanned(True, 0.0, 1.5),
-        ToolCommanded("close"), InputRead("sensor", 1, value), OperatorAsked(["cube"]), RequestGiven(None),
-        FaultInjected("seal_breaks", "a", "cube-1", "cube", [0.5]), RunHalted(True),
-        RunResumed(3, "close", {"python": "3.11"}), FaultRaised("Traceback"), END,
+        item_changed("cube-1"), TargetSelected("cube-1", "cube", 1, "red_bin"), ToolCommanded("close"),
+        kinds.MotionPlanned(True, 0.0, 1.5), InputRead("sensor", 1, value), kinds.OperatorAsked(["cube"]),
+        kinds.RequestGiven(None),
+        kinds.FaultInjected("seal_breaks", "a", "cube-1", "cube", [0.5]), kinds.RunHalted(True),
+        RunResumed(3, "close", {"python": "3.11"}), kinds.FaultRaised("Traceback"), END,
     ]  # fmt: skip
     timed = [at(tick, event) for tick, event in enumerate(events)]
     write(path, *timed)
@@ -287,3 +278,43 @@ def test_every_line_of_a_journal_fits_the_schema(path):
     validator = Draft7Validator(make_journal_schema())
     for line in path.read_text().splitlines():
         validator.validate(json.loads(line))
+
+
+FAILED = NodeEnded("sort/Grasp", "FAILURE", "Grasp", "cube-1", "missed", "no seal")
+EVENTS = [
+    at(0, run_started()),
+    at(1, NodeStarted("sort")),
+    at(2, NodeStarted("sort/Grasp", "Grasp", "cube-1")),
+    at(3, FAILED),
+    at(3, NodeEnded("sort/Look", "SUCCESS", "Look", outputs={"p": [0.1, 0.2]})),
+    at(3, NodeEnded("sort", "FAILURE", reason="Grasp.missed", message="no seal", origin="sort/Grasp")),
+    at(4, frame_searched()),
+    at(5, TargetSelected("cube-1", "cube", 1, "red_bin")),
+    at(6, item_changed("cube-1", "placed", bin="red_bin", label="größe", position=[0.3333, 0.0, 0.0])),
+]
+HASHED = [
+    [1, "status", "sort", "RUNNING", None, None, None],
+    [2, "status", "sort/Grasp", "RUNNING", "", "cube-1", None],
+    [3, "status", "sort/Grasp", "FAILURE", "missed", "cube-1", None],
+    [3, "status", "sort/Look", "SUCCESS", "", "", {"p": [0.1, 0.2]}],
+    [3, "status", "sort", "FAILURE", "Grasp.missed", None, None],
+    [5, "decision", "cube-1", "cube", 1],
+    [6, "item", "cube-1", "placed", "größe", [0.3333, 0.0, 0.0], "red_bin"],
+]
+
+
+def digest(*events):
+    trace = Trace()
+    for event in events:
+        trace(event)
+    return trace.hexdigest()
+
+
+def test_one_line_of_compact_json_is_hashed_per_decision():
+    lines = [json.dumps(line, sort_keys=True, separators=(",", ":")) + "\n" for line in HASHED]
+    assert digest(*EVENTS) == hashlib.sha256("".join(lines).encode()).hexdigest()[:16]
+
+
+@pytest.mark.parametrize("event", [run_started(), frame_searched(), ToolCommanded("open"), run_ended()])
+def test_events_that_decide_nothing_do_not_count(event):
+    assert digest(at(3, event)) == digest()

@@ -53,12 +53,8 @@ def test_the_journal_of_a_run_gives_the_timeline_that_was_observed(mission, tmp_
     assert live.activations and live.items.by_name and live.items.look and live.ended
     assert recorded == live
     # Without history, only the past is missing.
-    assert (
-        replace(
-            run.timeline, has_history=True, activations=live.activations, selection_times=live.selection_times
-        )
-        == live
-    )
+    past = {"activations": live.activations, "selection_times": live.selection_times}
+    assert replace(run.timeline, has_history=True, **past) == live
 
 
 def test_an_activation_lasts_from_the_start_of_its_node_to_its_end() -> None:
@@ -131,9 +127,7 @@ def test_a_failed_skill_has_the_answers_of_the_cell_until_then_without_lists() -
         read("tool.holding", True),
     )  # fmt: skip
     readings = timeline.activation_by_path["tree/Approach"].readings
-    assert [(reading.name, reading.value, reading.clock) for reading in readings] == [
-        ("arm.met", "a wrench", 3)
-    ]
+    assert [(each.name, each.value, each.clock) for each in readings] == [("arm.met", "a wrench", 3)]
 
 
 def test_an_item_has_its_last_sighting_and_failure_and_the_number_of_looks_since_then() -> None:
