@@ -268,23 +268,6 @@ def test_what_is_put_down_stands_there_and_waits_for_a_look(bench: Bench) -> Non
     assert bench.end() == {"cube-1": LEFT}
 
 
-def test_what_only_just_shows_is_not_looked_for_for_ever_but_the_workspace_is(
-    bench: Bench,
-) -> None:
-    bench.look(("cube", 0.53, 0.345), view="full")
-    bench.ledger.invalidate_positions()
-    # The nearest point that stands for the table shows beside the arm, but not what lies a little farther.
-    for _ in range(12):
-        bench.look(view="full", hidden=slice(0, 174))
-    assert bench.ledger.is_table_empty()
-    other = Bench()
-    other.look(("cube", 0.53, 0.235))
-    other.ledger.invalidate_positions()
-    for _ in range(12):
-        other.look(view="full", hidden=slice(0, 230))
-    assert other.ledger.find_uncertain_items() == ["cube-1"]
-
-
 @pytest.mark.parametrize(
     ("thing", "states"),
     [
@@ -301,17 +284,6 @@ def test_what_turns_up_near_by_is_the_same_item_if_somebody_may_have_pushed_it(
         for _ in range(3):
             bench.look(place)
     assert bench.states() == states
-
-
-def test_what_lies_where_something_was_invented_before_the_table_changed_is_new(bench: Bench) -> None:
-    for _ in range(4):
-        bench.look(("cube", 0.6, 0.1))
-    bench.look(("cube", 0.6, 0.1), ("duck", 0.5, 0.0))
-    assert bench.ledger.records[1].belief.existence_probability < 0.5, "nothing was there in four looks"
-    bench.drop("cube-1")
-    for _ in range(3):
-        bench.look(("cube", 0.5, 0.02))
-    assert [record.item for record in bench.ledger.records if record.state.value == "seen"] == ["cube-1"]
 
 
 @pytest.mark.parametrize(
@@ -335,22 +307,6 @@ def test_an_item_is_a_phantom_if_the_tool_found_only_the_table_there_three_times
         bench.ledger.record_touch("cube-2")
     bench.ledger.reject("cube-1", "could not be picked")
     assert bench.end()["cube-1"] == final
-
-
-@pytest.mark.parametrize("contradiction", ["", "it was touched 15 mm above the table"])
-def test_an_item_that_was_touched_exists_although_the_tool_finds_only_the_table_later(
-    bench: Bench, contradiction: str
-) -> None:
-    for _ in range(3):
-        bench.look(CUBE, FAR)
-    bench.ledger.record_touch("cube-2")
-    bench.look(CUBE, FAR)
-    assert bench.ledger.record_touch("cube-1", contradiction, may_have_missed_top=True)
-    for _ in range(3):
-        bench.ledger.record_failed_pick("cube-1", found_table=True)
-        bench.look(CUBE)
-    bench.ledger.reject("cube-1", "could not be picked")
-    assert bench.end()["cube-1"] == ("rejected", "could not be picked")
 
 
 def test_a_phantom_that_the_tool_tried_to_pick_may_turn_up_elsewhere(bench: Bench) -> None:

@@ -107,13 +107,6 @@ def test_of_two_items_the_one_whose_slot_is_empty_is_gone(placed: Bench) -> None
     assert [placed.verify(item, SLOT_2) for item in ("cube-2", "cube-1")] == ["present", "unsure"]
 
 
-def test_an_item_that_was_taken_for_gone_and_is_shown_again_uses_no_second_slot(half_gone: Bench) -> None:
-    for _ in range(2):
-        half_gone.look(SLOT_1, SLOT_2, view="full")
-    assert half_gone.states()["cube-1"] == ("placed", "red_bin")
-    assert half_gone.ledger.find_next_slot_index("red_bin") == 2
-
-
 def test_in_a_bin_with_two_layers_no_item_is_gone(bench: Bench) -> None:
     places = [("cube", 0.44 + 0.09 * (number % 3), 0.09 * (number // 3) - 0.12) for number in range(7)]
     for _ in range(3):
@@ -131,16 +124,6 @@ def test_an_item_on_the_table_is_there_unsure_or_gone(bench: Bench) -> None:
     assert bench.states() == {"cube-1": ("dropped", "")}
 
 
-def test_an_item_that_a_person_moved_far_on_the_table_keeps_its_identity(bench: Bench) -> None:
-    for _ in range(3):
-        bench.look(CUBE, view="full")
-    for _ in range(2):
-        bench.verify("cube-1")
-    for _ in range(2):
-        bench.look(ELSEWHERE)
-    assert bench.states()["cube-1"] == ("seen", "")
-
-
 def test_a_rejected_item_stays_rejected_after_it_was_gone(bench: Bench) -> None:
     for _ in range(3):
         bench.look(CUBE, view="full")
@@ -150,30 +133,6 @@ def test_a_rejected_item_stays_rejected_after_it_was_gone(bench: Bench) -> None:
     for _ in range(2):
         bench.look(ELSEWHERE)
     assert bench.states()["cube-1"] == ("rejected", "no")
-
-
-def test_an_object_that_was_on_the_table_before_the_placement_is_another_item(bench: Bench) -> None:
-    for _ in range(3):
-        bench.look(CUBE, view="full")
-    bench.ledger.record_grasp("cube-1")
-    for _ in range(3):
-        bench.look(ELSEWHERE, view="full")
-    bench.ledger.record_placement("cube-1", "red_bin")
-    bench.place("cube-2")
-    for _ in range(2):
-        bench.verify("cube-1", SLOT_2)
-    assert bench.end() == {
-        "cube-1": ("lost", "known to exist, not found again"),
-        "cube-2": ("placed", "red_bin"),
-    }
-
-
-def test_looks_before_the_placement_are_no_evidence_that_the_item_left_the_bin(bench: Bench) -> None:
-    for _ in range(3):
-        bench.look(CUBE)
-    bench.look()
-    bench.place("cube-1")
-    assert bench.verify("cube-1") == "unsure"
 
 
 def test_what_no_look_can_show_is_hidden(placed: Bench) -> None:

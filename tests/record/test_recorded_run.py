@@ -138,21 +138,6 @@ def test_a_picture_that_cannot_be_drawn_is_reported_and_the_run_continues(tmp_pa
     assert len(read_journal(directory.journal)) == 2
 
 
-def test_the_pictures_are_waited_for_whatever_became_of_the_journal(tmp_path, monkeypatch, full_disk):
-    closed = []
-    monkeypatch.setattr(PictureRecorder, "close", lambda self, wait: closed.append(wait))
-    monkeypatch.setattr(PictureRecorder, "problem", "no pictures were drawn")
-    monkeypatch.setattr(os, "fsync", full_disk)
-    recorder = Recorder(RunDirectory(tmp_path))
-    recorder(at(0, NodeStarted("a")))
-    recorder.close(wait=False)
-    recorder.close()
-    assert closed == [False, True]
-    journal_problem, _, picture_problem = recorder.problem.rpartition("; ")
-    assert "may lack its last lines" in journal_problem
-    assert picture_problem == "no pictures were drawn"
-
-
 RECORD = ("write", "fsync", "replace", "rename")
 WORLD = ("pwrite",)
 

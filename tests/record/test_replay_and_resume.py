@@ -17,7 +17,6 @@ from executive.cell.json_values import to_json
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import InputRead, ItemChanged, RunResumed, TimedEvent, ToolCommanded
-from executive.geometry import GRAVITY
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import load_skills
 from executive.record.journal import read_journal
@@ -28,12 +27,9 @@ from executive.record.resume import resume_run
 from executive.record.run_directory import find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
-from executive.testing.faults import during, seal_fails
-from executive.testing.faults.world_access import WorldAccess
 from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_mission import run_mission
 from executive.testing.substitutes import make_raising
-from tests.meanwhile import meanwhile
 
 SEED = 3
 
@@ -157,27 +153,6 @@ def test_it_may_be_cut_off_again_and_again(missions: Path, tmp_path: Path) -> No
     assert set(placed(path).values()) == {1}
     assert [type(one.event) for one in read_journal(path / "journal.jsonl")].count(RunResumed) == 4
     assert decided_again(path).is_equal
-
-
-@pytest.mark.slow
-def test_what_fell_from_the_tool_is_picked_again(missions: Path, tmp_path: Path) -> None:
-    fell: list[str] = []
-
-    def act(world: WorldAccess) -> None:
-        fell.append(world.held_object.label)
-        world.break_seal()
-
-    loaded = load(missions, "sort_overhead")
-    events = read_journal(Path(run_of(loaded, tmp_path).run) / "journal.jsonl")
-    gripped = next(
-        one.tick for one in events if isinstance(one.event, ItemChanged) and one.event.state == "held"
-    )
-    path = cut_off(loaded, tmp_path, gripped + 40)
-    meanwhile(path / "world.log", loaded, SEED, act, FakeCell)
-    result = resumed(path)
-    assert fell
-    assert (result.status, result.audit.agrees, result.items.placed) == ("SUCCESS", True, 6)
-    assert set(placed(path).values()) == {1}
 
 
 @pytest.mark.slow
@@ -322,14 +297,6 @@ def test_the_same_mission_decides_the_same(missions: Path, tmp_path: Path, name:
     assert done.decisions > 100
 
 
-def test_a_weighing_is_replayed_without_the_tool(missions: Path, tmp_path: Path) -> None:
-    path = recorded(missions, tmp_path, "weigh_and_sort")
-    events = [timed.event for timed in read_journal(path / "journal.jsonl")]
-    readings = [event.value for event in events if isinstance(event, InputRead) and event.name == "tool.load"]
-    assert 0.15 * GRAVITY in [pytest.approx(value) for value in readings]
-    assert decided_again(path).is_equal
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["weigh_and_sort", "sort_wrist"])
 def test_a_simulated_run_is_replayed_without_the_simulator(missions: Path, tmp_path: Path, name: str) -> None:
@@ -354,15 +321,6 @@ def test_the_first_other_decision_of_an_edited_mission_is_reported(missions: Pat
     assert re.match(
         r"recorded: at [\d.]+ s \(step \d+\) TargetSelected: item .*; replayed: at ", done.difference
     )
-
-
-def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
-    file, skills = missions / "sort_overhead.yaml", load_skills()
-    four_times = [during("*/Grasp", seal_fails(), activations=(1, 2, 3, 4))]
-    log = InputLog(run_mission(file, seed=3, faults=four_times).events)
-    assert replay_and_compare(load_mission(file, skills), log, 3).is_equal
-    done = replay_and_compare(load_mission(file, skills, {"attempts": "2"}), log, 3, edited=True)
-    assert done.replayed.event.node == "RejectTarget"
 
 
 def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Path) -> None:
