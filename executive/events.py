@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, TypeAlias
+from typing import Annotated, ClassVar, Final, Literal, TypeAlias
 
 from pydantic import ConfigDict, Field, JsonValue
 
-JOURNAL_FORMAT = 3
+JOURNAL_FORMAT: Final = 3
 """Version of the journal format."""
 
 RunStatus: TypeAlias = Annotated[str, Field(pattern="^(SUCCESS|INCOMPLETE|FAILURE|FAULT|HALTED)$")]
@@ -241,7 +241,7 @@ class RunStarted(Event):
     base: str
     step: float
     versions: Mapping[str, str]
-    format: int = JOURNAL_FORMAT
+    format: Literal[3] = JOURNAL_FORMAT
 
 
 @dataclass(frozen=True)

@@ -201,12 +201,9 @@ class Ledger(Protocol):
         """
 
     def record_interruption(self) -> None:
-        """Record an interruption of the run: the tool may have moved any item that is not in a bin."""
+        """Record an interruption of the run: the tool may have moved any item that is not in a bin.
 
-    def mark_unseen_as_dropped(self) -> None:
-        """Record as dropped every item that no frame has shown since `record_interruption`.
-
-        Later frames are searched for these items on the table and in the bins. An item without a detection
+        Later frames are searched for the items on the table and in the bins. An item without a detection
         until the end of the run is rejected, because its position is unknown.
         """
 

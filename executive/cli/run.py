@@ -64,9 +64,8 @@ def command(
     )
     with keep_stdout_clean():
         from executive.cell.json_values import to_json
-        from executive.record.diagnosis.diagnosis_text import format_diagnosis
-        from executive.record.guarded_view import GuardedView
-        from executive.record.recorded_run import RecordOptions
+        from executive.record.diagnosis.diagnosis import format_diagnosis
+        from executive.record.recorded_run import GuardedView, RecordOptions
         from executive.record.result import find_exit_code
         from executive.record.run_directory import RunDirectory
         from executive.run.assembly import RunOptions

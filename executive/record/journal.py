@@ -15,9 +15,6 @@ from executive.errors import Fault, InputError, RecordLost, describe_os_error, e
 from executive.events import ItemChanged, RunEnded, RunStarted, TimedEvent, ToolCommanded
 from executive.record.journal_format import decode_events, encode_event
 
-LOCK_LIST = Path("/proc/locks")
-"""File in which Linux lists the locks on all files, each with the id of the process that holds the lock."""
-
 
 class Journal:
     """Observer that appends the recorded events to a file, and locks the file against other processes.
@@ -188,21 +185,7 @@ def _lock(fd: int, path: Path) -> None:
     try:
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
-        pid = _find_lock_holder(fd)
-        writer, command = (f"process {pid}", f'"kill {pid}"') if pid else ("another process", "Ctrl-C")
-        problem = f'the run directory "{path.parent}" is in use: {writer} writes its journal'
-        advice = f"wait until that run has ended, or stop it with {command}"
-        raise InputError(f"{problem}, and two runs cannot share it; {advice}") from error
-
-
-def _find_lock_holder(fd: int) -> int | None:
-    """Return the id of the process that has locked the file, or None if the id is unknown."""
-    status = os.fstat(fd)
-    file_id = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}:{status.st_ino}"
-    with contextlib.suppress(OSError):
-        for line in LOCK_LIST.read_text().splitlines():
-            # A line is `1: FLOCK  ADVISORY  WRITE 4711 fe:00:5309462 0 EOF`, with process id and file id.
-            match line.split():
-                case [_, "FLOCK", _, _, pid, locked_file, *_] if locked_file == file_id and int(pid) > 0:
-                    return int(pid)
-    return None
+        raise InputError(
+            f'the run directory "{path.parent}" is in use: another process writes its journal; '
+            "wait until that run has ended, or stop it with Ctrl-C"
+        ) from error

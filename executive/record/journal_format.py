@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, KeysView, Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import is_dataclass
 from operator import attrgetter
 
 from pydantic import JsonValue, TypeAdapter, ValidationError
@@ -24,15 +24,6 @@ EVENT_CLASSES: Mapping[str, type[Event]] = {
 }
 """Classes of the recorded events by kind, which is the name of the class."""
 
-_COMMON_KEYS = ("kind", "tick", "clock")
-"""Keys in the lines of all events: kind of the event, control step, and time [s]."""
-
-_KEYS_BY_KIND: Mapping[str, KeysView[str]] = {
-    kind: dict.fromkeys([*_COMMON_KEYS, *(field.name for field in fields(cls))]).keys()
-    for kind, cls in EVENT_CLASSES.items()
-}
-"""Keys in the line of an event, by the kind of the event."""
-
 _ADAPTER_BY_KIND: Mapping[str, TypeAdapter[Event]] = {k: TypeAdapter(cls) for k, cls in EVENT_CLASSES.items()}
 """Decoder of the fields of an event, by the kind of the event."""
 
@@ -48,7 +39,7 @@ def make_journal_schema() -> dict[str, JsonValue]:
             "tick": {"type": "integer", "minimum": 0, "maximum": MAX_TICK},
             "clock": {"type": "number", "minimum": 0},
         } | schema.get("properties", {})
-        definitions[kind] = schema | {"required": list(_KEYS_BY_KIND[kind]), "additionalProperties": False}
+        definitions[kind] = schema | {"required": list(schema["properties"]), "additionalProperties": False}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": f"An event of a journal, format {JOURNAL_FORMAT}",
@@ -81,24 +72,19 @@ def decode_event(line: bytes) -> TimedEvent:
     entry = from_json(line, allow_inf_nan=False)
     if not isinstance(entry, dict):
         raise ValueError("it contains no JSON object")
-    kind, tick, clock = (entry.get(key) for key in _COMMON_KEYS)
+    kind, tick, clock = (entry.get(key) for key in ("kind", "tick", "clock"))
     if not isinstance(kind, str) or kind not in _ADAPTER_BY_KIND:
         raise ValueError(f'"kind" is {kind!r}; allowed are {", ".join(EVENT_CLASSES)}')
     if isinstance(tick, bool) or not isinstance(tick, int) or not 0 <= tick <= MAX_TICK:
         raise ValueError(f'"tick" is {tick!r}, not an integer from 0 to {MAX_TICK}')
     if isinstance(clock, bool) or not isinstance(clock, int | float) or clock < 0:
         raise ValueError(f'"clock" is {clock!r}, not a time in seconds')
-    keys = _KEYS_BY_KIND[kind]
-    # The symmetric difference contains the missing keys and the unknown keys.
-    if wrong_keys := entry.keys() ^ keys:
-        problem = "has no" if wrong_keys <= keys else "has the unknown"
-        raise ValueError(f'{kind} {problem} key "{min(wrong_keys)}"; its keys are {", ".join(keys)}')
     try:
         event = _ADAPTER_BY_KIND[kind].validate_json(line)
     except ValidationError as error:
         first_error = error.errors(include_url=False)[0]
-        field, message = ".".join(map(str, first_error["loc"])), first_error["msg"]
-        raise ValueError(f'"{field}" of {kind}: {message[:1].lower()}{message[1:]}') from error
+        field = ".".join(map(str, first_error["loc"]))
+        raise ValueError(f'"{field}" of {kind}: {first_error["msg"]}') from error
     return TimedEvent(tick, float(clock), event)
 
 
@@ -106,14 +92,12 @@ def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
     """Return the events in the lines of a journal.
 
     Raises:
-        InputError: The journal has another format, a line contains no event, or the time of an event
-            contradicts its control step.
+        InputError: A line contains no event of this format, or the time of an event contradicts its control
+            step.
     """
     events: list[TimedEvent] = []
     control_period = clock_offset = 0.0
     for line_number, line in enumerate(lines, start=1):
-        if line_number == 1:
-            _check_format(line, file_name)
         try:
             timed = decode_event(line)
             event = timed.event
@@ -124,29 +108,16 @@ def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
                 raise ValueError(f'"tick" {timed.tick} and "clock" {timed.clock} contradict each other')
             if isinstance(event, InputRead) and event.name == "clock" and not event.exception:
                 if not isinstance(event.value, int | float):
-                    problem = f'"value" of the input "clock" is {event.value!r}'
-                    raise ValueError(f"{problem}, not a time in seconds")
+                    raise ValueError(f"the clock is {event.value!r}, not a time in seconds")
                 clock_offset = event.value
             elif isinstance(event, InputRead) and not event.exception:
                 check_input(event.name, event.value)
         except ValueError as error:
             problem = f"{file_name}:{line_number}: this line is no event ({error})"
-            cause = "the file was changed or damaged after the run, because a run only appends to its journal"
+            cause = "an earlier version wrote the file, or somebody changed it after the run"
             raise InputError(f"{problem}; {cause}; restore a copy of the file") from error
         events.append(timed)
     return events
-
-
-def _check_format(line: bytes, file_name: str) -> None:
-    """Raise an InputError if the first line of a journal names another format."""
-    try:
-        entry = from_json(line)
-    except ValueError:
-        return  # `decode_event` describes the mistake.
-    journal_format = entry.get("format", JOURNAL_FORMAT) if isinstance(entry, dict) else JOURNAL_FORMAT
-    if journal_format != JOURNAL_FORMAT:
-        problem = f"this journal has format {journal_format}, and this version reads format {JOURNAL_FORMAT}"
-        raise InputError(f"{file_name}: {problem}; run the mission again")
 
 
 def _to_json_type(value: object) -> object:

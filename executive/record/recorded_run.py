@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
@@ -42,6 +42,47 @@ class View(Protocol):
 
     def show_message(self, message: str) -> None:
         """Show a message about the record of the run."""
+
+
+class GuardedView:
+    """View that forwards all calls to another view, and closes that view after its first error.
+
+    Attributes:
+        problem: Message about the first error of the view, or "".
+    """
+
+    def __init__(self, view: View) -> None:
+        self._view = view
+        self.problem = ""
+
+    def open(self, run: Run) -> None:
+        """Begin to show a run."""
+        self._forward(lambda: self._view.open(run))
+
+    def __call__(self, timed: TimedEvent) -> None:
+        """Show an event."""
+        self._forward(lambda: self._view(timed))
+
+    def close(self) -> None:
+        """Stop showing the run."""
+        self._forward(self._view.close)
+
+    def show_message(self, message: str) -> None:
+        """Show a message about the record of the run."""
+        self._forward(lambda: self._view.show_message(message))
+
+    def _forward(self, call: Callable[[], None]) -> None:
+        """Call the view; after its first error, close the view and ignore all later calls."""
+        if self.problem:
+            return
+        try:
+            call()
+        except Exception as error:
+            view_name = type(self._view).__name__
+            self.problem = f"the view {view_name} failed during the run: {type(error).__name__}: {error}"
+            # A view that stays open would block the screen and the keyboard.
+            with contextlib.suppress(Exception):
+                self._view.close()
 
 
 @dataclass(frozen=True)
@@ -130,7 +171,7 @@ class RecordedRun:
     directory: RunDirectory
     recorder: Recorder
     options: RecordOptions = RecordOptions()
-    earlier_events: Iterable[TimedEvent] = ()
+    earlier_events: Sequence[TimedEvent] = ()
     start_message: str = ""
 
     def __post_init__(self) -> None:
@@ -144,7 +185,7 @@ class RecordedRun:
         """
         run_end, audit = self._execute_with_observers()
         result = self._make_result(seed, run_end, audit, time.perf_counter() - start_time)
-        problems = [self.recorder.problem]
+        problems = list(filter(None, [self.recorder.problem]))
         try:
             write_result(self.directory.result, result)
         except ExecutiveError as error:
@@ -152,17 +193,18 @@ class RecordedRun:
             if result.status != "FAULT":
                 # Without a result file, the output of `--json` must report the problem.
                 result = replace(result, status="FAULT", reason="fault", message=str(error), node="")
-        if any(problems):
-            for view in self.options.views:
-                view.show_message("; ".join(filter(None, problems)))
+        for view in self.options.views if problems else ():
+            view.show_message("; ".join(problems))
         return result
 
     def _make_result(
         self, seed: int, run_end: RunEnded, audit: Mapping[str, int] | None, wall_time: float
     ) -> Result:
         """Return the result of the run from its end, its true object counts `audit`, and `wall_time` [s]."""
-        workcell, path, timeline = self.run.workcell, self.directory.path, self._timeline
-        accounts, arm = workcell.accounts, workcell.cell.arm
+        workcell = self.run.workcell
+        path = self.directory.path
+        timeline = self._timeline
+        accounts = workcell.accounts
         item_counts = accounts.count_states()
         end_values = asdict(run_end)
         end_values["robot_time_s"] = end_values.pop("robot_time")
@@ -177,34 +219,30 @@ class RecordedRun:
             planning=timeline.planning,
             requests=list_requests(timeline),
             wall_time_s=round(wall_time, 3),
-            trace=self.recorder.trace,
+            trace=self.recorder.trace.hexdigest(),
             run=str(path),
-            diagnosis=diagnose(timeline, run_end, self.loaded, path, lambda: arm.at_rest),
+            diagnosis=diagnose(timeline, run_end, self.loaded, path, lambda: workcell.cell.arm.at_rest),
         )
 
     def _execute_with_observers(self) -> tuple[RunEnded, Mapping[str, int] | None]:
         """Execute the run with all observers, close the observers, and return end and audit of the run."""
-        run, views, has_completed = self.run, self.options.views, False
+        run = self.run
+        views = self.options.views
         observers: list[Observer] = [self._timeline, *views]
         if self.options.starts_paused:
             run.control.pause()
-        try:
+        with contextlib.ExitStack() as exit_stack:
+            # An exception is reported at once, without waiting for the pictures.
+            exit_stack.push(lambda exception_type, *_: self.recorder.close(wait=exception_type is None))
+            for view in views:
+                exit_stack.callback(view.close)
             for view in views:
                 view.open(run)
                 if self.start_message:
                     view.show_message(self.start_message)
             for observer in observers:
                 run.add_observer(observer)
-            for timed in self.earlier_events:
-                for observer in observers:
+                for timed in self.earlier_events:
                     observer(timed)
             run.add_recorder(self.recorder)
-            end_and_audit = run.execute(), run.count_ground_truth()
-            has_completed = True
-        finally:
-            with contextlib.ExitStack() as exit_stack:
-                # An exception is reported at once, without waiting for the pictures.
-                exit_stack.callback(self.recorder.close, wait=has_completed)
-                for view in views:
-                    exit_stack.callback(view.close)
-        return end_and_audit
+            return run.execute(), run.count_ground_truth()

@@ -182,16 +182,15 @@ def _to_json(decision: TimedEvent | None) -> dict[str, JsonValue] | None:
     if decision is None:
         return None
     fields = {key: value for key, value in vars(decision.event).items() if value}
-    kind = type(decision.event).__name__
-    return {"tick": decision.tick, "clock": decision.clock, "kind": kind, **fields}
+    return {"tick": decision.tick, "clock": decision.clock, "kind": type(decision.event).__name__, **fields}
 
 
 def _describe_decision(decision: TimedEvent | None) -> str:
     """Return kind, time and fields of a decision as text."""
     if decision is None:
         return "no further decision"
-    event = decision.event
-    fields = {key: value for key, value in vars(event).items() if value and key not in ("outputs", "skill")}
-    values = ", ".join(f"{key} {value}" for key, value in fields.items())
-    text = f"at {decision.clock:.3f} s (step {decision.tick}) {type(event).__name__}: {values}"
+    fields = {key: value for key, value in vars(decision.event).items() if value}
+    values = ", ".join(f"{key} {fields[key]}" for key in fields if key not in ("outputs", "skill"))
+    kind = type(decision.event).__name__
+    text = f"at {decision.clock:.3f} s (step {decision.tick}) {kind}: {values}"
     return shorten_quotations(escape_control_characters(text))

@@ -18,7 +18,6 @@ from executive.record.replayed_run import replay_and_compare
 from executive.record.result import Result, is_resumable, read_result
 from executive.record.run_directory import RunDirectory
 from executive.replay.input_log import UNKNOWN_ACTION, InputLog
-from executive.replay.replayed_cell import ReplayedCell
 from executive.run.assembly import RunOptions, assemble_resumed
 from executive.skill import Skill
 
@@ -63,12 +62,12 @@ def resume_run(
         # The control step of a halt or fault is not compared, because a corrected skill may act differently.
         compared_log = log if log.halt is None else log.select_before(log.halt.tick)
         replay = replay_and_compare(loaded, compared_log, start.seed)
-        if not lacks_only_result and (lost_value := compared_log.find_lost_value()):
-            raise InputError(f'the run in "{path}" cannot be resumed: {lost_value}; run the mission again')
+        problem = "" if lacks_only_result else compared_log.find_lost_value()
         if not replay.is_equal:
-            problem = f'the run in "{path}" cannot be resumed: {replay.difference}'
-            cause = "The executive or a skill has changed since the run, or a skill has unrecorded inputs"
-            raise InputError(f"{problem}. {cause}; install the earlier version, or run the mission again")
+            problem = f"{replay.difference}. The executive or a skill has changed, or has unrecorded inputs"
+        if problem:
+            advice = "run the mission again, or install the version that recorded the run"
+            raise InputError(f'the run in "{path}" cannot be resumed: {problem}; {advice}')
         options = replace(options, seed=start.seed, requests=start.requests, scene=directory.scene)
         run = assemble_resumed(
             loaded, options, log, directory.world_log,
@@ -79,9 +78,15 @@ def resume_run(
         raise
     with closing(run):
         replayed_events = run.replayed_cell.log.events
-        recorder.add_to_trace(replayed_events)
+        for timed in replayed_events:
+            recorder.trace(timed)
         earlier_events = [each for each in replayed_events if isinstance(each.event, EVENTS_WITHOUT_REPLAY)]
-        message = _describe_missing_commands(run.replayed_cell)
+        message = ""
+        interruption = run.replayed_cell.last_interruption
+        if interruption is not None and interruption.last_action == UNKNOWN_ACTION:
+            count = interruption.resume_tick - interruption.kept_step_count
+            problem = f"the journal ends {count} control steps before the log of the world"
+            message = f"{problem} and may lack commands; the scene is observed before the run continues"
         recorded_run = RecordedRun(run, loaded, directory, recorder, record, earlier_events, message)
         return recorded_run.execute(start.seed, start_time)
 
@@ -93,23 +98,12 @@ def _check_end(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
         InputError: The end of the run prevents a resumption.
     """
     end = find_run_end(events)
-    if end is None:
+    if end is None or (is_resumable(end.status) and not end.held_item):
         return False
-    if end.status == "INCOMPLETE" and end.held_item:
-        problem = f"ended with {end.held_item} in the tool and cannot be resumed"
+    problem = f'the run in "{directory.path}" ended as {end.status}'
+    if end.status == "INCOMPLETE":
         advice = "take it out of the tool and run the mission again"
-        raise InputError(f'the run in "{directory.path}" {problem}; {advice}')
+        raise InputError(f"{problem} with {end.held_item} in the tool and cannot be resumed; {advice}")
     if not is_resumable(end.status) and read_result(directory, events) is not None:
-        raise InputError(f'the run in "{directory.path}" ended as {end.status}; there is nothing to resume')
+        raise InputError(f"{problem}; there is nothing to resume")
     return not is_resumable(end.status)
-
-
-def _describe_missing_commands(replayed_cell: ReplayedCell) -> str:
-    """Return a warning if the journal may lack commands to arm or tool, else ""."""
-    interruption = replayed_cell.last_interruption
-    if interruption is None or interruption.last_action != UNKNOWN_ACTION:
-        return ""
-    count = interruption.resume_tick - interruption.kept_step_count
-    steps = f"{count} control steps ({count * replayed_cell.log.control_period:.2f} s)"
-    problem = f"the journal ends {steps} before the log of the world and may lack commands to the tool"
-    return f"{problem}; the scene is observed before the run continues"

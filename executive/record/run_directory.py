@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from datetime import datetime
 from pathlib import Path
 
-from executive.errors import InputError, describe_os_error
+from executive.errors import InputError, explain_os_errors
 from executive.record.atomic_file import write_atomically
 
 LATEST_LINK = "latest"
 """Name of the link to the last run directory."""
 SCENE_FILE = "scene.yaml"
 """Name of the copy of the scene file."""
-NO_SPACE_ERRORS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
-"""Values of `errno` for a full disk, an exceeded quota and a file that is too large."""
 
 
 class RunDirectory:
@@ -84,14 +82,11 @@ def make_dated_folder(runs: Path, name: str, start_time: datetime) -> Path:
         return make_unique_folder(day, f"{start_time.strftime('%H-%M-%S')}_{name}")
 
 
-@contextlib.contextmanager
-def convert_os_errors(action: str, advice: str = "name another folder with --runs DIR") -> Iterator[None]:
+def convert_os_errors(
+    action: str, advice: str = "name another folder with --runs DIR"
+) -> AbstractContextManager[None]:
     """Convert an OSError in the `with` block to an InputError with the failed action and advice."""
-    try:
-        yield
-    except OSError as error:
-        space_advice = "free some space or " if error.errno in NO_SPACE_ERRORS else ""
-        raise InputError(f"cannot {action}: {describe_os_error(error)}; {space_advice}{advice}") from error
+    return explain_os_errors(InputError, f"cannot {action}", advice)
 
 
 def find_run(name: str, runs: Path) -> Path:

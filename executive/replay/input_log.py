@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 from executive.events import (
     InputRead,
-    MotionPlanned,
     RunEnded,
     RunHalted,
     RunResumed,
@@ -21,8 +20,6 @@ from executive.events import (
 
 UNKNOWN_ACTION = "unknown"
 """Value of `Interruption.last_action` if the journal may lack commands to arm or tool."""
-_COMMAND_EVENTS = (ToolCommanded, MotionPlanned)
-"""Kinds of events; an event of one of these kinds precedes each command to arm or tool."""
 
 
 class RecordedInput(NamedTuple):
@@ -117,15 +114,13 @@ class InputLog:
         readings = (timed.event for timed in self.events if isinstance(timed.event, InputRead))
         values: list[Any] = [each.value for each in readings if each.name.startswith("behaviour.")]
         steps = [value["values"] for value in values if isinstance(value, dict)]
-        # A step contains all values on the blackboard, whose keys begin with a slash.
-        entries = [
-            (key, entry)
-            for step in steps
-            for key, entry in step.items()
-            if step is steps[-1] or not key.startswith("/")
-        ]
-        names = (f'"{key}" ({entry})' for key, entry in entries if isinstance(entry, str))
-        return next((f"JSON cannot restore the value of {name}" for name in names), "")
+        for step in steps:
+            for key, entry in step.items():
+                # A step contains all values on the blackboard, whose keys begin with a slash.
+                is_present = step is steps[-1] or not key.startswith("/")
+                if is_present and isinstance(entry, str):
+                    return f'JSON cannot restore the value of "{key}" ({entry})'
+        return ""
 
     def make_final_interruption(
         self, step_count: int, last_command_tick: int = 0, *, is_complete: bool = True
@@ -145,28 +140,16 @@ class InputLog:
         if self.last_tick in incomplete_end_ticks:
             return Interruption(self.last_tick + 1, self.last_action, True, self.last_tick + 1)
         logged_count = self.last_tick + 1 if is_complete else self.last_tick
-        tree_step_count = logged_count if self.halt is None else self.halt.tick
-        kept_count = min(step_count, tree_step_count)
-        is_truncated = step_count > self.last_tick and not is_complete
-        may_lack_commands = self._may_lack_command(last_command_tick, is_truncated)
-        for interruption in reversed(list(self.interruptions.values())):
+        kept_count = min(step_count, logged_count if self.halt is None else self.halt.tick)
+        # Each command is logged before it is executed, also in the last step if the cell was killed in it.
+        may_lack_commands = last_command_tick >= logged_count and step_count > self.last_tick
+        for interruption in reversed(self.interruptions.values()):
             was_resumption_interrupted = interruption.resume_tick >= kept_count
             if was_resumption_interrupted:
                 kept_count = min(kept_count, interruption.kept_step_count)
                 may_lack_commands |= interruption.last_action == UNKNOWN_ACTION
         action = UNKNOWN_ACTION if may_lack_commands else self.last_action
         return Interruption(kept_count, action, kept_count - 1 in incomplete_end_ticks, step_count)
-
-    def _may_lack_command(self, last_command_tick: int, is_truncated: bool) -> bool:
-        """Return True if the log may lack the last command to arm or tool.
-
-        Events are written in order, so that only commands in and after the last logged step may be missing.
-        `is_truncated` is True if the last logged step is incomplete and the cell executed later steps.
-        """
-        if last_command_tick != self.last_tick:
-            return last_command_tick > self.last_tick
-        command_ticks = (timed.tick for timed in self.events if isinstance(timed.event, _COMMAND_EVENTS))
-        return is_truncated or last_command_tick not in command_ticks
 
     def has_ended_before_tick(self, tick: int) -> bool:
         """Return True if the recorded run ended before its tree was ticked in control step `tick`."""

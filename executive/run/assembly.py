@@ -13,7 +13,7 @@ from executive.events import Observer, RequestGiven, RunStarted
 from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission
 from executive.plugins import load_cell_kind
-from executive.replay.input_log import InputLog, Interruption
+from executive.replay.input_log import InputLog
 from executive.replay.replayed_cell import ReplayedCell
 from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.operator import ScriptedOperator, TerminalOperator
@@ -63,9 +63,10 @@ def assemble(loaded: LoadedMission, options: RunOptions, observers: Sequence[Obs
     Raises:
         InputError: The kind of the cell is not installed, or a request names no class of the mission.
     """
-    builder = _RunBuilder(loaded, options, RunContext(observers))
-    workcell = builder.build_workcell()
-    builder.context.connect(workcell, LookaheadPlanner(workcell.cell))
+    context = RunContext(observers)
+    control = RunControl()
+    workcell = _build_workcell(loaded, options, context, control)
+    context.connect(workcell, LookaheadPlanner(workcell.cell))
     start_event = RunStarted(
         mission=loaded.mission.name,
         file=str(loaded.path),
@@ -77,10 +78,9 @@ def assemble(loaded: LoadedMission, options: RunOptions, observers: Sequence[Obs
         step=workcell.cell.clock.step,
         versions=dict(list_versions()),
     )
-    return Run(
-        builder.context, builder.build_tree(), builder.control, loaded.mission.name,
-        start_event=start_event, is_realtime=options.is_realtime,
-    )  # fmt: skip
+    root = _build_tree(loaded, options, context)
+    is_realtime = options.is_realtime
+    return Run(context, root, control, loaded.mission.name, start_event=start_event, is_realtime=is_realtime)
 
 
 def assemble_resumed(
@@ -105,14 +105,17 @@ def assemble_resumed(
     Raises:
         InputError: The kind of the cell is not installed, or its world cannot be reconstructed.
     """
-    builder = _RunBuilder(loaded, options, RunContext())
+    context = RunContext()
+    control = RunControl()
     frame_count, pose_count = (len(log.inputs.get(name, ())) for name in ("camera.frame", "camera.next_pose"))
     request_count = sum(isinstance(timed.event, RequestGiven) for timed in log.events)
-    workcell = builder.build_workcell(ResumePoint(world_log, frame_count, pose_count), request_count)
+    resume_point = ResumePoint(world_log, frame_count, pose_count)
+    workcell = _build_workcell(loaded, options, context, control, resume_point, request_count)
     interruption = log.make_final_interruption(
         workcell.steps, workcell.last_command_step, is_complete=is_complete
     )
-    return builder.build_resumed_run(workcell, log, None if has_ended else interruption)
+    cell = ReplayedCell(workcell, log, None if has_ended else interruption)
+    return _build_resumed_run(loaded, options, context, control, cell)
 
 
 def assemble_replay(
@@ -120,57 +123,46 @@ def assemble_replay(
 ) -> ResumedRun:
     """Return a run that replays a recorded run without hardware or simulation."""
     options = RunOptions(seed, requests=(), make_cell=CellWithoutHardware)
-    builder = _RunBuilder(loaded, options, RunContext(observers))
-    return builder.build_resumed_run(builder.build_workcell(), log)
+    context = RunContext(observers)
+    control = RunControl()
+    cell = ReplayedCell(_build_workcell(loaded, options, context, control), log)
+    return _build_resumed_run(loaded, options, context, control, cell)
 
 
-@dataclass(frozen=True, eq=False)
-class _RunBuilder:
-    """Builder of the work cell, the tree and the run of a mission.
+def _build_workcell(
+    loaded: LoadedMission,
+    options: RunOptions,
+    context: RunContext,
+    control: RunControl,
+    resume_point: ResumePoint | None = None,
+    request_count: int = 0,
+) -> Workcell:
+    """Return the work cell of a run.
 
-    Attributes:
-        loaded, options: Arguments of `assemble`.
-        context: Cell and events of the run; its method `connect` must be called before `build_tree`.
-        control: Control with which other threads stop, pause and step the run.
+    For a resumed run, `resume_point` is the state of the cell at the interruption, and `request_count` the
+    number of requests that the operator had given before.
     """
+    emit = context.emit
+    operator: Operator = TerminalOperator(emit, control, has_keyboard=options.has_keyboard)
+    if options.requests is not None:
+        operator = ScriptedOperator(options.requests, tuple(loaded.routes), emit, request_count)
+    config, base = loaded.cell_config, loaded.cell_path.parent
+    cell_options = CellOptions(
+        operator, base, options.gui, resume=resume_point, scene=options.scene, quotas=loaded.quotas
+    )
+    make_cell = options.make_cell or load_cell_kind(config.kind)
+    return make_cell(config, seed=options.seed, routes=loaded.routes, emit=emit, options=cell_options)
 
-    loaded: LoadedMission
-    options: RunOptions
-    context: RunContext
-    control: RunControl = field(default_factory=RunControl)
 
-    def build_workcell(self, resume_point: ResumePoint | None = None, request_count: int = 0) -> Workcell:
-        """Return the work cell of the run.
+def _build_resumed_run(
+    loaded: LoadedMission, options: RunOptions, context: RunContext, control: RunControl, cell: ReplayedCell
+) -> ResumedRun:
+    """Return a run on a cell that replays a log and, after the interruption at its end, continues."""
+    context.connect(cell)
+    root = _build_tree(loaded, options, context)
+    return ResumedRun(context, cell, root, control, loaded.mission.name, is_realtime=options.is_realtime)
 
-        Args:
-            resume_point: State of the cell at the interruption of the run; None for a new run.
-            request_count: Number of requests that the operator had given before the interruption.
-        """
-        loaded, options, emit = self.loaded, self.options, self.context.emit
-        operator: Operator
-        if options.requests is None:
-            operator = TerminalOperator(emit, self.control, has_keyboard=options.has_keyboard)
-        else:
-            operator = ScriptedOperator(options.requests, tuple(loaded.routes), emit, request_count)
-        config, base = loaded.cell_config, loaded.cell_path.parent
-        cell_options = CellOptions(
-            operator, base, options.gui, resume=resume_point, scene=options.scene, quotas=loaded.quotas
-        )
-        make_cell = options.make_cell or load_cell_kind(config.kind)
-        return make_cell(config, seed=options.seed, routes=loaded.routes, emit=emit, options=cell_options)
 
-    def build_tree(self) -> TreeNode:
-        """Return the behaviour tree of the mission for the cell of `context`."""
-        cell, emit = self.context.cell, self.context.emit
-        return build_tree(self.loaded, self.loaded.skills, cell, Blackboard(), emit, self.options.substitutes)
-
-    def build_resumed_run(
-        self, workcell: Workcell, log: InputLog, interruption: Interruption | None = None
-    ) -> ResumedRun:
-        """Return a run that replays a log and, after the interruption at its end, continues on `workcell`."""
-        replayed_cell = ReplayedCell(workcell, log, interruption)
-        self.context.connect(replayed_cell)
-        return ResumedRun(
-            self.context, replayed_cell, self.build_tree(), self.control, self.loaded.mission.name,
-            is_realtime=self.options.is_realtime,
-        )  # fmt: skip
+def _build_tree(loaded: LoadedMission, options: RunOptions, context: RunContext) -> TreeNode:
+    """Return the behaviour tree of the mission for the cell of `context`."""
+    return build_tree(loaded, loaded.skills, context.cell, Blackboard(), context.emit, options.substitutes)

@@ -4,22 +4,45 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
-from executive.cell.workcell import Workcell
+from executive.cell.workcell import Accounts, Workcell
 from executive.errors import ExecutiveError, Fault, Stopped
 from executive.events import FaultRaised, Observer, RunEnded, RunHalted, RunStarted
+from executive.ledger.outcomes import is_balanced
 from executive.run.garbage_collection import shorten_collections
-from executive.run.outcome import HALTED, LoopEnd, catch_problems, check_items, finalize_items, make_loop_end
 from executive.run.run_context import RunContext, brake_arm
 from executive.run.run_control import RunControl
 from executive.run.signals import halt_on_signals
 from executive.tree.halting import halt
 from executive.tree.tree_node import TreeNode
+
+
+@dataclass(frozen=True)
+class _LoopEnd:
+    """End of the tick loop of a run.
+
+    Attributes:
+        status: Status of the run, before the check of its items.
+        reason: Reason of the failure, for instance `Transit.dropped`; "" on success.
+        message: Sentence that explains the status, or "".
+        node: Path of the node that determined the status, or "".
+        traceback: Traceback of the exception that caused a fault, or "".
+    """
+
+    status: str
+    reason: str = ""
+    message: str = ""
+    node: str = ""
+    traceback: str = ""
+
+
+_HALTED = _LoopEnd("HALTED", "halted", "halted by the user")
+"""End of a tick loop that was halted by a person or by a signal."""
 
 
 class Run:
@@ -88,7 +111,7 @@ class Run:
         The first Ctrl-C halts the tree and brakes the arm; a second Ctrl-C ends the process at once.
         """
         run_end = self._execute_tree()
-        if problems := catch_problems(lambda: self._context.emit(run_end)):
+        if problems := _catch_problems(lambda: self._context.emit(run_end)):
             run_end = replace(run_end, status="FAULT", reason="fault", message=problems[0], node="")
         return run_end
 
@@ -112,24 +135,24 @@ class Run:
         context = self._context
         with halt_on_signals(self.control), shorten_collections():
             loop_end = self._tick_until_end()
-            problems = halt(self.root) + catch_problems(lambda: brake_arm(context.cell, context.advance))
+            problems = halt(self.root) + _catch_problems(lambda: brake_arm(context.cell, context.advance))
         if loop_end.traceback:
             # The arm brakes before this event is emitted, because a full disk must not prevent the braking.
-            problems += catch_problems(lambda: context.emit(FaultRaised(loop_end.traceback)))
+            problems += _catch_problems(lambda: context.emit(FaultRaised(loop_end.traceback)))
         has_succeeded = loop_end.status == "SUCCESS"
-        problems += catch_problems(self._store_held_item)
-        problems += catch_problems(self._store_table_state)
-        problems += catch_problems(lambda: finalize_items(self.workcell.accounts, has_succeeded))
+        problems += _catch_problems(self._store_held_item)
+        problems += _catch_problems(self._store_table_state)
+        problems += _catch_problems(lambda: _finalize_items(self.workcell.accounts, has_succeeded))
         if problems and loop_end.status == "FAULT":
             loop_end = replace(loop_end, message="; ".join([loop_end.message, *problems]))
         elif problems:
-            loop_end = LoopEnd("FAULT", "fault", "; ".join(problems))
+            loop_end = _LoopEnd("FAULT", "fault", "; ".join(problems))
         elif has_succeeded:
-            loop_end = check_items(self.workcell.accounts)
+            loop_end = _check_items(self.workcell.accounts)
         cause = (loop_end.status, loop_end.reason, loop_end.message, loop_end.node)
         return RunEnded(*cause, self._is_table_empty, self._held_item, self.tick, round(self.now, 6))
 
-    def _tick_until_end(self) -> LoopEnd:
+    def _tick_until_end(self) -> _LoopEnd:
         """Tick the tree once in every control step until it ends, or until the run is stopped."""
         context, control, is_tree_ticked = self._context, self.control, False
         tree = self.behaviour_tree
@@ -147,23 +170,26 @@ class Run:
                 if control.is_stopped:
                     break
                 if self.root.status is not Status.RUNNING:
-                    return make_loop_end(self.root.failure)
+                    failure = self.root.failure
+                    if failure is None:
+                        return _LoopEnd("SUCCESS")
+                    return _LoopEnd("FAILURE", str(failure), failure.message, failure.path)
                 context.plan_ahead()
                 context.advance()
                 is_tree_ticked = False
                 if self._is_realtime:
                     time.sleep(max(0.0, self._wall_start + context.now - time.monotonic()))
                 control.wait_while_paused()
-            loop_end = HALTED
+            loop_end = _HALTED
         except Stopped:
-            loop_end = HALTED
+            loop_end = _HALTED
         except Exception as error:
             message = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
             node = error.node if isinstance(error, Fault) else ""
-            loop_end = LoopEnd("FAULT", "fault", message, node, traceback.format_exc())
-        problems = catch_problems(lambda: context.emit(RunHalted(is_tree_ticked)))
+            loop_end = _LoopEnd("FAULT", "fault", message, node, traceback.format_exc())
+        problems = _catch_problems(lambda: context.emit(RunHalted(is_tree_ticked)))
         if problems and loop_end.status != "FAULT":
-            loop_end = LoopEnd("FAULT", "fault", problems[0])
+            loop_end = _LoopEnd("FAULT", "fault", problems[0])
         return loop_end
 
     def _store_held_item(self) -> None:
@@ -176,3 +202,42 @@ class Run:
         """Store whether the ledger contains neither an object to sort nor an undeclared label."""
         ledger = self._context.cell.ledger
         self._is_table_empty = ledger.is_table_empty() and not ledger.unknown_labels
+
+
+def _catch_problems(action: Callable[[], None]) -> list[str]:
+    """Call `action`; return a list with the message of its exception, or an empty list."""
+    try:
+        action()
+    except Exception as error:
+        return [str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"]
+    return []
+
+
+def _check_items(accounts: Accounts) -> _LoopEnd:
+    """Return the end of a run whose tree succeeded, from the states of its items.
+
+    The status is FAILURE if items were lost, else INCOMPLETE if items were rejected, else SUCCESS.
+    """
+    items = accounts.list_items()
+    if lost := [item.item for item in items if item.state == "lost"]:
+        message = f"{len(lost)} object(s) were lost and not found again: {', '.join(lost)}"
+        return _LoopEnd("FAILURE", "lost", message)
+    if rejected := [f"{item.item} ({item.reason})" for item in items if item.state == "rejected"]:
+        message = f"{len(rejected)} object(s) were not sorted: {', '.join(rejected)}"
+        return _LoopEnd("INCOMPLETE", "rejected", message)
+    return _LoopEnd("SUCCESS")
+
+
+def _finalize_items(accounts: Accounts, has_tree_succeeded: bool) -> None:
+    """Let the ledger set the final state of each item, and check the sum of the counts.
+
+    Raises:
+        Fault: The number of seen items is not the sum of the placed, rejected, skipped and lost items.
+    """
+    accounts.set_final_states(completed=has_tree_succeeded)
+    counts = accounts.count_states()
+    if not is_balanced(counts):
+        text = ", ".join(f"{count} {state}" for state, count in counts.items())
+        raise Fault(
+            f"the item counts are inconsistent: {text}; seen must be placed + rejected + skipped + lost"
+        )

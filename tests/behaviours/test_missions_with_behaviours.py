@@ -31,7 +31,7 @@ from executive.testing.run_mission import MissionResult, run_mission
 from executive.testing.substitutes import make_failing
 from executive.tree.node_registry import load_control_nodes
 from tests.benchmarks import kills
-from tests.record.test_resume import Cut, Cutter, redecided, resumed
+from tests.record.test_resume import Cut, Cutter, decided_again, resumed
 
 PROJECT = """\
 [project]
@@ -257,7 +257,7 @@ def test_a_twice_interrupted_run_keeps_its_random_results(write: Write, tmp_path
     run = cut(write(DRAW_THRICE), tmp_path, tick)
     with pytest.raises(Cut):
         resumed(run, views=[Cutter(tick + 10)])
-    assert (resumed(run).status, redecided(run)) == ("SUCCESS", "")
+    assert (resumed(run).status, decided_again(run).difference) == ("SUCCESS", "")
 
 
 @pytest.mark.slow
@@ -282,7 +282,7 @@ def test_what_a_halted_behaviour_wrote_is_restored(write: Write, tmp_path: Path)
 
 def test_a_value_that_json_cannot_restore_prevents_a_resumption(write: Write, tmp_path: Path) -> None:
     run = cut(write("  - PyTree: {class: foreign:Keep}\n  - Wait: {seconds: 1}\n"), tmp_path, 4)
-    assert redecided(run) == ""
+    assert decided_again(run).difference == ""
     with pytest.raises(InputError, match=r'"/kept" \(Status\)'):
         resumed(run)
 

@@ -31,7 +31,7 @@ from executive.ledger.outcomes import is_balanced
 from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.record.journal import Journal, read_journal
-from executive.record.trace import Trace
+from executive.record.recorder import Trace
 from executive.run.assembly import RunOptions, assemble
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command

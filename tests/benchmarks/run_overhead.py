@@ -99,7 +99,7 @@ def _measure_bare_loop(subject: MissionUnderTest, log: Path, frames: FrameLog) -
     for command in commands:
         if command.kind == JOINT_TARGETS:
             client.setJointMotorControlArray(
-                arm, range(joint_count), pybullet.POSITION_CONTROL, targetPositions=command.numbers[1:],
+                arm, range(joint_count), pybullet.POSITION_CONTROL, targetPositions=command.arguments[1:],
                 forces=world.robot.max_torques, positionGains=[1.0] * joint_count,
             )  # fmt: skip
         elif command.kind in (RUN_STEP, IDLE_STEP):

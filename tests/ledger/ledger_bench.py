@@ -25,10 +25,8 @@ def take_frame(number: int = 1, change_count: int = 0, hidden: slice = slice(0, 
     """A frame from above; the columns `hidden` of the image are behind the arm."""
     visible = np.ones((480, 640), bool)
     visible[:, hidden] = False
-    matrix, image = (
-        np.array([[461.0, 0, 320.0], [0, 461.0, 240.0], [0, 0, 1.0]]),
-        np.zeros((1, 1, 3), np.uint8),
-    )
+    matrix = np.array([[461.0, 0, 320.0], [0, 461.0, 240.0], [0, 0, 1.0]])
+    image = np.zeros((1, 1, 3), np.uint8)
     X_WC = looking_down((0.5, 0.0, 1.2))
     return Frame(number, "camera", image, None, matrix, X_WC, float(number), visible, change_count)
 
@@ -51,15 +49,9 @@ class Bench:
             name: Bin(name, np.array(position), size, slots + position[:2])
             for name, position in positions.items()
         }
-        self.ledger = Tracker(
-            self.config,
-            TableConfig(),
-            bins,
-            classes or {},
-            {"cube": ("red_bin", "pink_bin")},
-            {},
-            self.events.append,
-        )
+        routes = {"cube": ("red_bin", "pink_bin")}
+        emit = self.events.append
+        self.ledger = Tracker(self.config, TableConfig(), bins, classes or {}, routes, {}, emit)
         self.frames = 0
 
     def look(

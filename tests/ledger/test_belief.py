@@ -1,4 +1,4 @@
-"""What many looks of a bad detector add up to."""
+"""What many looks of a bad detector add up to, and the weight as evidence about the class."""
 
 from __future__ import annotations
 
@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.special import bdtrc, expit
+from ledger_bench import Bench
+from scipy.special import expit
 
 from executive.cell.detection import Detection, ErrorRates, Observation
+from executive.cell.objects import ObjectClass
+from executive.geometry import GRAVITY
 from executive.ledger.association import compute_association_distance
-from executive.ledger.belief import Belief, compute_binomial_tail, compute_probability
+from executive.ledger.belief import Belief, compute_probability
 from executive.ledger.bin_contents import update_bin_log_odds
 from executive.ledger.item import ItemRecord
+from executive.perception.evidence import compute_weight_log_ratios
 
 GOOD = ErrorRates(threshold=0.5, miss_rate=0.02, confusion_rate=0.0025, false_detections=0.02, jitter=0.7)
 BAD = ErrorRates(threshold=0.5, miss_rate=0.2, confusion_rate=0.1, false_detections=0.5, jitter=5.0)
@@ -113,13 +117,6 @@ def test_agreeing_looks_reduce_the_standard_error_and_a_push_resets_it() -> None
     assert item.first_position == pytest.approx(HERE), "where it was before it was moved"
 
 
-def test_measurements_count_by_how_good_they_are() -> None:
-    item = record()
-    item.update_position(HERE, 0.001, is_unmoved=True)
-    item.update_position(HERE + np.array([0.011, 0, 0]), 0.0031623, is_unmoved=True)
-    assert item.position[0] - HERE[0] == pytest.approx(0.001, rel=0.02)
-
-
 @pytest.mark.parametrize(
     ("spread", "new", "allowed"),
     [(0.001, 0.001, 0.025), (0.006, 0.008, 0.035), (0.013, 0.013, 0.05), (math.inf, 0.013, 0.05)],
@@ -136,8 +133,106 @@ def test_a_probability_from_log_odds_is_the_logistic_function_to_the_last_bit(lo
     assert compute_probability(log_odds) == pytest.approx(float(expit(log_odds)), rel=0, abs=1e-300)
 
 
-@pytest.mark.slow
-@given(st.integers(0, 2000), st.integers(0, 2000), st.floats(1e-6, 0.999))
-def test_the_tail_of_a_binomial_distribution_is_that_of_scipy(count: int, more: int, rate: float) -> None:
-    tail = compute_binomial_tail(count, count + more, rate)
-    assert tail == pytest.approx(bdtrc(count - 1, count + more, rate), rel=1e-9, abs=1e-200)
+STD = 0.05
+LIGHT = ObjectClass("cube", 0.05, 0.0354, mass=0.05, mass_std=0.0)
+HEAVY = ObjectClass("full_cube", 0.05, 0.0354, mass=0.20, mass_std=0.0, looks_like="cube")
+BALL = ObjectClass("ball", 0.05, 0.03, mass=0.20, mass_std=0.0)
+CLASSES = {each.label: each for each in (LIGHT, HEAVY, BALL)}
+CUBE = ("cube", 0.5, 0.0)
+
+
+def seen_belief() -> Belief:
+    belief = Belief("cube", 0.0)
+    belief.add_detection("cube", GOOD)
+    return belief
+
+
+def weigh(belief: Belief, weight: float) -> None:
+    label_map = {label: each.detected_label for label, each in CLASSES.items()}
+    belief.add_weighing(compute_weight_log_ratios(weight, STD, CLASSES), label_map)
+
+
+def seen_bench(classes: dict[str, ObjectClass] = CLASSES) -> Bench:
+    bench = Bench(classes=classes)
+    for _ in range(3):
+        bench.look(CUBE)
+    bench.ledger.record_grasp("cube-1")
+    return bench
+
+
+def test_the_ratio_is_that_of_a_normal_and_a_uniform_distribution() -> None:
+    ratios = compute_weight_log_ratios(0.05 * GRAVITY + 2 * STD, STD, CLASSES)
+    density = math.exp(-2.0) / (STD * math.sqrt(2 * math.pi))
+    assert ratios["cube"] == pytest.approx(math.log(density / 0.1))
+
+
+@pytest.mark.parametrize("weight", [0.5 * GRAVITY, -50.0, 1e4])
+def test_a_weight_far_from_all_classes_leaves_no_certain_class(weight: float) -> None:
+    belief = seen_belief()
+    weigh(belief, weight)
+    assert belief.class_error == pytest.approx(1.0)
+
+
+def test_the_heavy_one_of_two_that_look_alike_is_found_out_and_the_class_stays_as_certain() -> None:
+    belief = seen_belief()
+    before = belief.class_error
+    weigh(belief, 0.20 * GRAVITY)
+    assert (belief.label, belief.detected_label) == ("full_cube", "cube")
+    assert belief.class_error < before
+    assert belief.confusion_p_value == 1.0
+
+
+def test_a_class_that_looks_different_is_no_hypothesis() -> None:
+    belief = Belief("ball", 0.0)
+    belief.add_detection("ball", GOOD)
+    weigh(belief, 0.05 * GRAVITY)
+    assert belief.label == "ball"
+    assert belief.class_error > 0.99
+
+
+def test_looks_after_a_weighing_are_evidence_for_both_classes() -> None:
+    belief = seen_belief()
+    weigh(belief, 0.20 * GRAVITY)
+    gap = belief.log_likelihoods["full_cube"] - belief.log_likelihoods["cube"]
+    belief.add_detection("cube", GOOD)
+    assert belief.log_likelihoods["full_cube"] - belief.log_likelihoods["cube"] == pytest.approx(gap)
+    assert (belief.label, belief.look_count) == ("full_cube", 2)
+
+
+def test_a_weight_of_two_classes_that_weigh_the_same_leaves_the_class_uncertain() -> None:
+    twin = ObjectClass("twin", 0.05, 0.0354, mass=0.05, mass_std=0.0, looks_like="cube")
+    bench = seen_bench({"cube": LIGHT, "twin": twin})
+    contradiction = bench.ledger.record_weight("cube-1", 0.05 * GRAVITY, STD)
+    assert contradiction == "it weighs 0.49 N; expected: cube 0.49 N or twin 0.49 N"
+
+
+@pytest.mark.parametrize(("deviation", "fits"), [(3.5, True), (-3.5, True), (5.0, False), (-5.0, False)])
+def test_a_weight_that_no_class_has_is_a_contradiction_after_any_number_of_looks(
+    deviation: float, fits: bool
+) -> None:
+    bench = seen_bench()
+    for _ in range(20):
+        bench.ledger.records[0].belief.add_detection("cube", GOOD)
+    weight = 0.05 * GRAVITY + deviation * STD
+    assert (bench.ledger.record_weight("cube-1", weight, STD) == "") is fits
+
+
+def test_an_item_that_was_weighed_and_dropped_is_found_again_with_its_class() -> None:
+    bench = seen_bench()
+    assert bench.ledger.record_weight("cube-1", 0.20 * GRAVITY, STD) == ""
+    bench.ledger.record_drop("cube-1")
+    for _ in range(3):
+        (target,) = bench.look(("cube", 0.55, 0.1))
+    assert (target.item, target.label) == ("cube-1", "full_cube")
+    assert bench.ledger.is_certain("cube-1")
+
+
+def test_a_second_weighing_with_the_same_error_leaves_the_class_as_uncertain() -> None:
+    near = {
+        "cube": LIGHT,
+        "full_cube": ObjectClass("full_cube", 0.05, 0.0354, mass=0.06, mass_std=0.0, looks_like="cube"),
+    }
+    bench = seen_bench(near)
+    answers = {bench.ledger.record_weight("cube-1", 0.058 * GRAVITY, STD) for _ in range(6)}
+    assert answers == {"it weighs 0.57 N; expected: cube 0.49 N or full_cube 0.59 N"}
+    assert set(bench.ledger.list_possible_labels("cube-1")) == {"cube", "full_cube"}

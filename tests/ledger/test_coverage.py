@@ -66,11 +66,6 @@ def test_what_the_arm_hides_is_not_believed_empty(coverage: Coverage) -> None:
     assert coverage.max_object_probability == PRIOR_IN_WORKSPACE
 
 
-def test_a_place_is_searched_only_if_all_of_an_object_there_would_show(coverage: Coverage) -> None:
-    coverage.update(look(hidden=slice(323, 640)))
-    assert coverage.find_miss_probability(np.array([0.5, 0.0, 0.025])) == 1.0
-
-
 def test_a_change_brings_the_doubt_back_whatever_a_frame_from_before_shows(coverage: Coverage) -> None:
     for _ in range(2):
         coverage.reset_near(CORNER, 0.07, change_number=1)

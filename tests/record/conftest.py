@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -37,3 +39,13 @@ def cells(monkeypatch: pytest.MonkeyPatch) -> list[FakeCell]:
 
     monkeypatch.setattr("executive.run.assembly.load_cell_kind", lambda name: Cell)
     return made
+
+
+@pytest.fixture
+def full_disk() -> Callable[..., NoReturn]:
+    """A function in place of one of `os` on a full disk."""
+
+    def fail(*args: object) -> NoReturn:
+        raise OSError(28, "No space left on device")
+
+    return fail

@@ -8,7 +8,6 @@ from dataclasses import asdict
 import pytest
 
 from executive.cell.json_values import to_json
-from executive.errors import ExecutiveError
 from executive.record.result import (
     Audit,
     ItemCounts,
@@ -35,9 +34,8 @@ def result(audit=AUDIT, status="SUCCESS", empty=True) -> Result:
 
 @pytest.mark.parametrize(
     ("wanted", "words"),
-    [([], []), (["cube", "rescan"], ["cube", "rescan"]), ([None], ["quit"]),
-     (["cube", None, "duck", None, None], ["cube", "quit", "duck"])],
-)  # fmt: skip
+    [([None], ["quit"]), (["cube", None, "duck", None, None], ["cube", "quit", "duck"])],
+)
 def test_the_end_of_the_list_is_a_wish_to_quit_and_goes_without_saying(wanted, words):
     assert list_requests(Timeline(requests=wanted)) == words
 
@@ -45,40 +43,26 @@ def test_the_end_of_the_list_is_a_wish_to_quit_and_goes_without_saying(wanted, w
 def test_is_written_and_can_be_read_again(tmp_path):
     write_result(tmp_path / "result.json", result())
     written = json.loads((tmp_path / "result.json").read_text())
-    assert list(written) == [
-        "version", "mission", "status", "reason", "message", "node", "held_item", "seed", "items",
-        "unknown_labels", "assumption_reasons", "is_table_empty", "audit", "planning", "requests", "ticks",
-        "robot_time_s", "wall_time_s", "trace", "run", "diagnosis",
-    ]  # fmt: skip
     assert written["audit"] == {"agrees": True, **AUDIT}
     (tmp_path / "journal.jsonl").touch()
     assert to_json(read_result(RunDirectory(tmp_path), [])) == written
 
 
-def test_a_disk_that_does_not_take_it_is_a_sentence(tmp_path):
-    with pytest.raises(ExecutiveError, match=r"cannot write the result .* the journal in the same folder"):
-        write_result(tmp_path / "nowhere" / "result.json", result())
-
-
 @pytest.mark.parametrize(
-    ("audit", "ended", "warning"),
+    ("audit", "empty", "warning"),
     [
-        ({}, {}, ""),
-        (None, {}, ""),
-        ({"right": 1, "wrong_bin": 1}, {}, "THE AUDIT DISAGREES: 1 in a wrong bin; the audit found 1 in "),
-        ({"right": 3, "left": 0}, {}, "THE AUDIT DISAGREES: the audit found 3 in their bins, 0 on the table"),
-        (
-            {"left": 0, "elsewhere": 1},
-            {},
-            "0 on the table and 1 elsewhere; the executive reports 2 placed, 1 re",
-        ),
-        ({"left": 2, "unseen": 1}, {}, "THE AUDIT DISAGREES: 1 never seen; "),
-        ({"left": 2, "unseen": 1}, {"empty": False}, ""),
-        ({"elsewhere": 1, "fell_in_wrong_bin": 1}, {}, "DISAGREES: 1 fallen into a wrong bin; "),
+        ({}, True, ""),
+        (None, True, ""),
+        ({"right": 1, "wrong_bin": 1}, True, "1 in a wrong bin; the audit found 1 in "),
+        ({"right": 3, "left": 0}, True, "the audit found 3 in their bins, 0 on the table"),
+        ({"left": 0, "elsewhere": 1}, True, "1 elsewhere; the executive reports 2 placed, 1 re"),
+        ({"left": 2, "unseen": 1}, True, "1 never seen; "),
+        ({"left": 2, "unseen": 1}, False, ""),
+        ({"elsewhere": 1, "fell_in_wrong_bin": 1}, True, "1 fallen into a wrong bin; "),
     ],
 )
-def test_every_disagreement_of_ledger_and_audit_is_noticed(audit, ended, warning):
-    made = result(audit=None if audit is None else AUDIT | audit, **ended)
+def test_every_disagreement_of_ledger_and_audit_is_noticed(audit, empty, warning):
+    made = result(audit=None if audit is None else AUDIT | audit, empty=empty)
     assert warning in made.disagreement
     assert bool(made.disagreement) == bool(warning)
     assert find_exit_code(made) == (1 if warning else 0)

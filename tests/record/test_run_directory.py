@@ -1,8 +1,8 @@
-"""The directory a run leaves."""
+"""The directory of a run, and files that are there whole or not at all."""
 
 from __future__ import annotations
 
-import errno
+import math
 import os
 from datetime import datetime
 from pathlib import Path
@@ -10,7 +10,10 @@ from pathlib import Path
 import pytest
 
 from executive.errors import InputError
-from executive.record.run_directory import RunDirectory, convert_os_errors, make_dated_folder
+from executive.mission.outline import Connection, OutlineNode
+from executive.record.atomic_file import write_atomically
+from executive.record.recorded_mission import format_tree, read_tree
+from executive.record.run_directory import RunDirectory, make_dated_folder
 
 STARTED = datetime(2026, 11, 21, 3, 15, 42)
 
@@ -22,16 +25,14 @@ def create(runs: Path) -> RunDirectory:
 def test_is_named_after_time_mission_and_seed(tmp_path):
     names = [create(tmp_path / "runs").path.relative_to(tmp_path).as_posix() for _ in range(3)]
     assert names == [f"runs/2026-11-21/03-15-42_sort_s7{end}" for end in ("", "-2", "-3")]
-
-
-def full(*args, **kwargs):
-    raise OSError(28, "No space left on device")
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="not a directory; name another folder with --runs DIR"):
+        create(tmp_path / "file" / "runs")
 
 
 def test_latest_points_to_the_last_run_and_survives_moving_the_folder(tmp_path):
     for number in range(2):
-        directory = create(tmp_path / "runs")
-        directory.save_inputs({"mission.yaml": f"mission: {number}"}, {})
+        create(tmp_path / "runs").save_inputs({"mission.yaml": f"mission: {number}"}, {})
     (tmp_path / "runs").rename(tmp_path / "moved")
     assert (tmp_path / "moved" / "latest" / "mission.yaml").read_text() == "mission: 1"
 
@@ -41,43 +42,52 @@ def test_what_repeats_a_run_is_on_the_disk_and_libraries_lie_where_the_mission_l
     monkeypatch.setattr(os, "fsync", lambda file: synced.append(os.fstat(file).st_ino))
     directory = create(tmp_path)
     libraries = {"library/sorting.yaml": "library: sorting\n", "own.yaml": "library: own\n"}
-    texts = {"mission.yaml": "mission: a  # mine\n", "params.yaml": "{}\n", "cell.yaml": "size: [1, 2]\n"}
-    directory.save_inputs(texts, libraries)
+    texts = {"mission.yaml": "mission: größe\n", "cell.yaml": "size: [1, 2]\n"}
+    directory.save_inputs(texts, {**libraries, "result.json": "no library replaces a result"})
     left = {**libraries, **texts}
     assert {name: (directory.path / name).read_text() for name in left} == left
     assert synced == [(directory.path / name).stat().st_ino for name in left]
+    assert not directory.result.exists()
 
 
-def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(InputError) as raised:
-        create(tmp_path / "file" / "runs")
-    assert str(raised.value) == (
-        f'cannot make a run directory below "{tmp_path}/file/runs": not a directory; '
-        "name another folder with --runs DIR"
-    )
-
-
-@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EFBIG])
-def test_space_is_spoken_of_where_it_is_what_is_missing(number):
-    reason = os.strerror(number)
-    with pytest.raises(InputError) as raised, convert_os_errors("write"):
-        raise OSError(number, reason)
-    assert str(raised.value) == (
-        f"cannot write: {reason.lower()}; free some space or name another folder with --runs DIR"
-    )
-
-
-@pytest.mark.parametrize("room", range(3))
-def test_a_full_disk_is_a_sentence_and_leaves_nothing_half_written(tmp_path, monkeypatch, room):
-    texts = dict.fromkeys(("mission.yaml", "params.yaml", "cell.yaml"), "text")
+@pytest.mark.parametrize("room", range(2))
+def test_a_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch, full_disk, room):
+    texts = dict.fromkeys(("mission.yaml", "cell.yaml"), "text")
     create(tmp_path).save_inputs(texts, {})
     before = (tmp_path / "latest").resolve()
     directory = create(tmp_path)
     left = iter(range(room))
-    monkeypatch.setattr(os, "fsync", lambda file: None if next(left, None) is not None else full())
-    with pytest.raises(InputError, match="no space left on device; free some space"):
+    monkeypatch.setattr(os, "fsync", lambda file: None if next(left, None) is not None else full_disk())
+    with pytest.raises(InputError, match="no space left on device"):
         directory.save_inputs(texts, {})
-    names = [path.name for path in directory.path.iterdir()]
-    assert sorted(names) == sorted(list(texts)[:room])
+    assert [path.name for path in directory.path.iterdir()] == list(texts)[:room]
     assert (tmp_path / "latest").resolve() == before
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_what_was_there_before_stays_where_the_writing_stops(tmp_path, monkeypatch, error):
+    def fails(*args):
+        raise error
+
+    write_atomically(tmp_path / "a.txt", "before")
+    monkeypatch.setattr(Path, "replace", fails)
+    with pytest.raises(type(error)):
+        write_atomically(tmp_path / "a.txt", "after")
+    assert (tmp_path / "a.txt").read_text() == "before"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_a_tree_is_read_as_it_was_written_and_values_that_json_lacks_as_text(tmp_path):
+    file = tmp_path / "tree.json"
+    leaf = OutlineNode(
+        "tree/do/Grasp", "do: Grasp", 1, "", "skill", "Grasp", "do", "on Grasp.missed", ("pick",), "Grasp",
+        "Close the tool.", {"settle": 0.1}, (Connection("target", "target", True),), (), ("missed",),
+    )  # fmt: skip
+    odd = OutlineNode("a", "a", 0, "", "skill", "A", params={"x": math.inf, "y": object})
+    file.write_text(format_tree([leaf, odd]))
+    read_leaf, read_odd = read_tree(file)
+    assert read_leaf == leaf
+    assert read_odd.params["x"] == "Infinity" and "object" in read_odd.params["y"]
+    file.write_text("{}")
+    with pytest.raises(InputError, match="contains no tree of a run"):
+        read_tree(file)

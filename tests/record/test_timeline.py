@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from executive.events import (
     BranchChosen,
     Event,
     FaultInjected,
-    ItemChanged,
     MotionPlanned,
     NodeEnded,
     NodeStarted,
@@ -23,13 +21,11 @@ from executive.events import (
     RequestGiven,
     RunResumed,
     TargetSelected,
-    TimedEvent,
 )
 from executive.record.journal import Journal, read_journal
 from executive.record.timeline.activation import (
     find_last_failure,
     format_counts,
-    get_skill_name,
     group_by_node,
 )
 from executive.record.timeline.timeline import PlanningTotals, Timeline
@@ -57,12 +53,8 @@ def test_the_journal_of_a_run_gives_the_timeline_that_was_observed(mission, tmp_
     assert live.activations and live.items.by_name and live.items.look and live.ended
     assert recorded == live
     # Without history, only the past is missing.
-    assert (
-        replace(
-            run.timeline, has_history=True, activations=live.activations, selection_times=live.selection_times
-        )
-        == live
-    )
+    past = {"activations": live.activations, "selection_times": live.selection_times}
+    assert replace(run.timeline, has_history=True, **past) == live
 
 
 def test_an_activation_lasts_from_the_start_of_its_node_to_its_end() -> None:
@@ -71,29 +63,12 @@ def test_an_activation_lasts_from_the_start_of_its_node_to_its_end() -> None:
         skill_ended("tree/Detect", "FAILURE", reason="unsure", message="too dark"),
         NodeEnded("tree", "FAILURE", reason="Detect.unsure", message="too dark"),
     )  # fmt: skip
+    timeline(at(999, skill_ended("tree/Grasp")))  # an end without a start
     tree, detect = timeline.activations
     assert (tree.start, tree.end, tree.status, tree.failure) == (0, 3, "FAILURE", "Detect.unsure: too dark")
     assert (detect.start_tick, detect.end_tick, detect.skill) == (240, 480, "Detect")
     assert timeline.activation_by_path == {"tree": tree, "tree/Detect": detect}
     assert timeline.root == tree
-
-
-def test_the_item_of_a_skill_may_be_known_at_its_start_or_only_at_its_end() -> None:
-    timeline = folded(
-        skill_started("tree/Approach", "cube-1"), skill_ended("tree/Approach"),
-        skill_started("tree/SelectTarget"), skill_ended("tree/SelectTarget", item="duck-1"),
-    )  # fmt: skip
-    assert [one.item for one in timeline.activations] == ["cube-1", "duck-1"]
-
-
-def test_an_end_without_a_start_is_no_activation() -> None:
-    assert folded(skill_ended("tree/Detect")).activations == []
-
-
-def test_an_activation_that_ran_at_the_end_of_the_record_lasts_until_then() -> None:
-    events = [at(0, NodeStarted("tree")), at(600, read("arm.q", []))]
-    (tree,) = Timeline.from_events(events).activations
-    assert (tree.status, tree.start, tree.end) == ("RUNNING", 0, 2.5)
 
 
 def test_a_node_that_a_resumed_run_starts_again_was_halted_by_the_interruption() -> None:
@@ -152,36 +127,22 @@ def test_a_failed_skill_has_the_answers_of_the_cell_until_then_without_lists() -
         read("tool.holding", True),
     )  # fmt: skip
     readings = timeline.activation_by_path["tree/Approach"].readings
-    assert [(reading.name, reading.value, reading.clock) for reading in readings] == [
-        ("arm.met", "a wrench", 3)
-    ]
+    assert [(each.name, each.value, each.clock) for each in readings] == [("arm.met", "a wrench", 3)]
 
 
-def test_skills_that_run_are_in_the_order_of_their_starts() -> None:
-    timeline = folded(
-        skill_started("tree/Transit"), skill_started("tree/Detect"), skill_ended("tree/Transit"),
-        skill_started("tree/Transit"),
-    )  # fmt: skip
-    assert [one.node for one in timeline.find_running_activations()] == ["tree/Detect", "tree/Transit"]
-
-
-@pytest.mark.parametrize(
-    ("path", "name"),
-    [("tree/do/Grasp", "Grasp"), ("tree/do/2:Detect", "Detect"), ("tree/recover/look/pick", "pick")],
-)
-def test_a_skill_has_its_name_or_label(path: str, name: str) -> None:
-    assert get_skill_name(path) == name
-
-
-def test_an_item_has_its_last_sighting_and_the_number_of_looks_since_then() -> None:
+def test_an_item_has_its_last_sighting_and_failure_and_the_number_of_looks_since_then() -> None:
     far, near = detected("cube", position=[0.9, 0.0, 0.0]), detected("cube", confidence=0.8)
     timeline = folded(
         item_changed("cube-1", position=[0.5, 0.1, 0.0]), frame_searched(far, near, frame=7),
-        frame_searched(frame=8), frame_searched(frame=9),
+        frame_searched(frame=8), frame_searched(detected("ball"), frame=9),
+        skill_started("tree/Grasp", "cube-1"),
+        skill_ended("tree/Grasp", "FAILURE", "cube-1", reason="missed"),
     )  # fmt: skip
     item = timeline.items.by_name["cube-1"]
     assert (item.sighting.frame, item.sighting.confidence, item.unseen_look_count) == (7, 0.8, 2)
-    assert (timeline.items.look.frame, timeline.items.look.found) == (9, 0)
+    assert (timeline.items.look.frame, timeline.items.look.found) == (9, 1)
+    assert list(timeline.items.classes) == ["cube", "ball"]
+    assert item.failure == timeline.activation_by_path["tree/Grasp"]
 
 
 def test_an_item_has_the_times_at_which_the_tool_got_and_lost_it() -> None:
@@ -198,20 +159,6 @@ def test_the_accounts_after_the_end_of_the_tree_leave_the_final_states_as_they_w
     assert list(timeline.items.find_items_in_states("seen", "held")) == ["cube-1"]
 
 
-def test_an_item_has_its_last_failure() -> None:
-    timeline = folded(
-        item_changed("cube-1"), skill_started("tree/Grasp", "cube-1"),
-        skill_ended("tree/Grasp", "FAILURE", "cube-1", reason="missed"),
-    )  # fmt: skip
-    assert timeline.items.by_name["cube-1"].failure == timeline.activation_by_path["tree/Grasp"]
-
-
-def test_a_class_keeps_its_place() -> None:
-    looks = [("sphere", "cube"), ("cube", "duck")]
-    timeline = folded(*(frame_searched(*map(detected, labels)) for labels in looks))
-    assert list(timeline.items.classes) == ["cube", "sphere", "duck"]
-
-
 def test_motions_targets_questions_and_injected_faults_are_kept() -> None:
     selected = TargetSelected("cube-1", "cube", 1, "red_bin")
     timeline = folded(
@@ -222,31 +169,3 @@ def test_motions_targets_questions_and_injected_faults_are_kept() -> None:
     assert (timeline.selections, timeline.selection_times) == ({"cube-1": selected}, [(3.0, "cube-1")])
     assert (timeline.question, timeline.requests) == (None, [None])
     assert timeline.faults == [(6.0, "object removed")]
-
-
-@pytest.mark.slow
-def test_the_memory_of_a_live_run_grows_only_with_its_items(tmp_path, monkeypatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    run = FailedRun("sort_overhead")
-    events: list[TimedEvent] = []
-    run.run.add_observer(events.append)
-    run.slip(2)
-    run.run.execute()
-    timeline, sizes = Timeline(has_history=False), []
-    for number in range(40):
-        for timed in events:
-            if not isinstance(timed.event, FrameCaptured):
-                timeline(timed if number < 20 else _renamed(timed, number))
-        sizes.append(len(pickle.dumps(timeline)))
-    assert sizes[19] < 1.01 * sizes[1]
-    items = len(timeline.items.by_name)
-    assert (sizes[39] - sizes[19]) / (items - items / 21) < 1000
-    assert len(events) > 500
-
-
-def _renamed(timed: TimedEvent, number: int) -> TimedEvent:
-    """Return an event about an item of another name."""
-    event = timed.event
-    if isinstance(event, ItemChanged):
-        event = replace(event, item=f"{event.item}-{number}")
-    return replace(timed, event=event)

@@ -26,11 +26,9 @@ def values(log: InputLog) -> list[object]:
 
 def test_answers_are_in_order_by_the_name_of_the_input() -> None:
     log = InputLog([START, sense(0, False), sense(0, "arm", name="arm.met"), sense(7, True, nth=2)])
-    assert [(one.tick, one.reading.read_number, one.reading.value) for one in log.inputs["tool.holding"]] == [
-        (0, 1, False),
-        (7, 2, True),
-    ]
-    assert (len(log.inputs["arm.met"]), log.inputs.keys()) == (1, {"tool.holding", "arm.met"})
+    found = [(one.tick, one.reading.read_number, one.reading.value) for one in log.inputs["tool.holding"]]
+    assert found == [(0, 1, False), (7, 2, True)]
+    assert (len(log.inputs["arm.met"]), log.control_period) == (1, 1 / 240)
 
 
 def test_an_incomplete_control_step_is_void_once_the_run_was_resumed() -> None:
@@ -42,10 +40,8 @@ def test_an_incomplete_control_step_is_void_once_the_run_was_resumed() -> None:
 
 
 def test_a_second_resumption_voids_only_the_end_of_the_first() -> None:
-    entries = [
-        START, sense(2, 1), sense(3, 2), resume(3, 3), sense(4, 3), sense(6, 4), resume(9, 6), sense(9, 5),
-    ]  # fmt: skip
-    log = InputLog(entries)
+    first = [START, sense(2, 1), sense(3, 2), resume(3, 3), sense(4, 3), sense(6, 4)]
+    log = InputLog([*first, resume(9, 6), sense(9, 5)])
     assert values(log) == [1, 3, 5]
     assert {one.kept_step_count: one.resume_tick for one in log.interruptions.values()} == {3: 3, 6: 9}
 
@@ -58,7 +54,7 @@ def test_the_steps_after_a_halt_do_not_count() -> None:
     assert InputLog([*halted, resume(30, 9)]).halt is None
 
 
-@pytest.mark.parametrize(("steps", "complete"), [(0, 0), (7, 7), (8, 8), (9, 9), (500, 9)])
+@pytest.mark.parametrize(("steps", "complete"), [(0, 0), (8, 8), (500, 9)])
 def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
     steps: int, complete: int
 ) -> None:
@@ -69,12 +65,10 @@ def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
 @pytest.mark.parametrize(
     ("last_command", "is_complete", "complete", "action"),
     [
-        (7, True, 9, "open"),
         (8, True, 9, "open"),
         (9, True, 9, "unknown"),
         (7, False, 8, "open"),
         (8, False, 8, "unknown"),
-        (20, False, 8, "unknown"),
     ],
 )
 def test_a_world_that_did_more_than_the_journal_knows(
@@ -85,12 +79,6 @@ def test_a_world_that_did_more_than_the_journal_knows(
     assert (interruption.kept_step_count, interruption.last_action) == (complete, action)
 
 
-def test_a_command_without_an_event_before_it_is_missing_in_the_journal() -> None:
-    log = InputLog([START, at(5, ToolCommanded("open")), sense(8, 1)])
-    assert log.make_final_interruption(9, 8).last_action == "unknown"
-    assert log.make_final_interruption(9, 7).last_action == "open"
-
-
 def test_actions_stay_unknown_if_the_resumption_was_interrupted_at_once() -> None:
     log = InputLog([START, sense(5, 1), resume(9, 6, "unknown"), sense(9, 2)])
     interruption = log.make_final_interruption(9, 8)
@@ -98,9 +86,8 @@ def test_actions_stay_unknown_if_the_resumption_was_interrupted_at_once() -> Non
 
 
 def test_a_kill_within_a_control_step_loses_no_action() -> None:
-    interruption = InputLog([START, at(8, ToolCommanded("open"))]).make_final_interruption(
-        8, 8, is_complete=False
-    )
+    log = InputLog([START, at(8, ToolCommanded("open"))])
+    interruption = log.make_final_interruption(8, 8, is_complete=False)
     assert (interruption.kept_step_count, interruption.last_action) == (8, "open")
 
 
@@ -118,8 +105,3 @@ def test_a_run_that_ended_as_incomplete_is_reopened() -> None:
     assert log.make_final_interruption(9) == Interruption(10, "", True, 10)
     log = InputLog([*log.events, resume(10, 10), sense(11, 2)])
     assert log.interruptions[10].restarts_tree
-
-
-def test_the_start() -> None:
-    assert InputLog([]).start_event is None
-    assert InputLog([START]).control_period == 1 / 240

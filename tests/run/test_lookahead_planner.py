@@ -110,19 +110,6 @@ def test_the_next_target_is_the_one_that_is_selected_when_the_arm_is_free(bench:
     assert bench.ahead[-1]
 
 
-def test_a_look_on_the_way_has_the_approach_planned_again_where_it_saw_something_new(bench: Bench) -> None:
-    duck = bench.fake.world.put("duck", 0.6, 0.15)
-    targets: list[Target] = []
-
-    def look_again() -> None:
-        duck.position[0] += 0.002
-        targets.extend(bench.look())
-
-    bench.carry(bench.look(), meanwhile=look_again)
-    bench.run(Approach(target=targets[0]))
-    assert bench.ahead == [False, True, True]
-
-
 @pytest.mark.parametrize("change", ["moved", "another"])
 def test_an_approach_that_was_not_foreseen_is_waited_for(bench: Bench, change: str) -> None:
     duck = bench.fake.world.put("duck", 0.6, 0.15)
@@ -142,21 +129,6 @@ def test_a_carry_to_another_bin_is_waited_for_and_the_approach_after_it_is_not(b
     bench.carry(targets[:1], "yellow_bin")
     bench.carry(targets)
     assert bench.ahead == [False, False, True, True]
-
-
-def test_a_grasp_after_a_missed_one_is_planned_ahead_like_the_first(bench: Bench) -> None:
-    targets = bench.look()
-    bench.fake.tool.can_seal = lambda: False
-    with pytest.raises(SkillFailed, match="no seal"):
-        bench.grasp(targets)
-    bench.fake.tool.can_seal = lambda: True
-    selected = bench.run(SelectTarget(targets=bench.look()))
-    bench.run(Approach(target=selected.target))
-    for _ in range(2):
-        bench.fake.tool.open()
-        bench.run(Grasp(target=selected.target))
-    bench.run(Transit(held="cube-1", bin="red_bin"))
-    assert bench.ahead == [False, False, True]
 
 
 @pytest.fixture
@@ -226,19 +198,6 @@ def test_a_target_out_of_reach_fails_in_its_approach_only(
     with pytest.raises(SkillFailed, match=r"the arm reaches") as failure:
         bench.run(Approach(target=duck))
     assert (failure.value.reason, bench.ahead[-1]) == ("unreachable", True)
-
-
-def test_nothing_is_planned_without_a_planner(bench: Bench) -> None:
-    selected = bench.run(SelectTarget(targets=bench.look()))
-    bench.run(Approach(target=selected.target))
-    bench.context.cell.tool.close()
-    bench.context.advance()
-    planner, bench.context.planner = bench.context.planner, None
-    bench.context.plan_ahead()
-    bench.context.planner = planner
-    bench.fake.ledger.record_grasp("cube-1")
-    bench.run(Transit(held="cube-1", bin="red_bin"))
-    assert bench.ahead == [False, False]
 
 
 @pytest.mark.parametrize(("item", "bin"), [("thing-1", "red_bin"), ("cube-1", "nowhere")])

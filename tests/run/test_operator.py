@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import signal
 import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +30,8 @@ CHOICES = ("cube", "sphere", "duck")
 @pytest.mark.parametrize(
     ("word", "meaning"),
     [
-        ("0", "cube"), ("2", "duck"), ("sphere", "sphere"), ("DUCK", "duck"),
-        ("s", "rescan"), ("S", "rescan"), ("rescan", "rescan"), ("q", None), ("Quit", None),
-        ("3", ""), ("-1", ""), ("banana", ""), ("", ""), ("²", ""), ("cube duck", ""),
+        ("0", "cube"), ("2", "duck"), ("DUCK", "duck"), ("S", "rescan"), ("rescan", "rescan"), ("q", None),
+        ("Quit", None), ("3", ""), ("-1", ""), ("banana", ""), ("", ""), ("²", ""),
     ],
 )  # fmt: skip
 def test_what_a_word_means(word: str, meaning: str | None) -> None:
@@ -48,72 +49,39 @@ def test_a_script_is_followed_and_then_quits_for_good() -> None:
     answers = [operator.ask(CHOICES) for _ in range(5)]
     assert answers == ["duck", "cube", "rescan", None, None]
     assert heard == [RequestGiven(answer) for answer in answers]
-
-
-def test_a_script_with_an_unknown_word_is_refused_before_anything_moves() -> None:
-    with pytest.raises(InputError) as caught:
-        ScriptedOperator(["cube", "banana"], CHOICES, Heard())
-    assert str(caught.value) == 'cannot pick "banana"; ask for one of: cube, sphere, duck'
-
-
-class Keyboard:
-    """What somebody types into the terminal."""
-
-    def __init__(self, text: str, *, closed: bool) -> None:
-        reading, writing = os.pipe()
-        os.write(writing, text.encode())
-        self.writing = None if closed else writing
-        if closed:
-            os.close(writing)
-        # Unbuffered, as select sees only what the pipe still holds.
-        self.stdin = io.TextIOWrapper(io.FileIO(reading), write_through=True)
-
-    def close(self) -> None:
-        self.stdin.close()
-        if self.writing is not None:
-            os.close(self.writing)
+    with pytest.raises(InputError, match='cannot pick "banana"; ask for one of: cube, sphere, duck'):
+        ScriptedOperator(["cube", "banana"], CHOICES, heard)
 
 
 @pytest.fixture
-def type_in(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Any:
-    def type_in(text: str, *, closed: bool = False) -> None:
-        keyboard = Keyboard(text, closed=closed)
-        request.addfinalizer(keyboard.close)
-        monkeypatch.setattr("sys.stdin", keyboard.stdin)
+def type_in(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+    """A function that types a text into the terminal, and may close the terminal afterwards."""
+    with contextlib.ExitStack() as files:
 
-    return type_in
+        def type_in(text: str, *, closed: bool = False) -> None:
+            reading, writing = os.pipe()
+            os.write(writing, text.encode())
+            keyboard = files.enter_context(io.FileIO(writing, "w"))
+            if closed:
+                keyboard.close()
+            # Unbuffered, as select sees only what the pipe still holds.
+            stdin = io.TextIOWrapper(io.FileIO(reading), write_through=True)
+            monkeypatch.setattr("sys.stdin", files.enter_context(stdin))
+
+        yield type_in
 
 
 @pytest.mark.parametrize(
-    ("typed", "meant"), [("1\n", "sphere"), (" duck \n", "duck"), ("s\n", "rescan"), ("q\n", None)]
+    ("typed", "meant"), [("1\n", "sphere"), (" duck \n", "duck"), ("q\n", None), ("", None)]
 )
 def test_the_terminal_lists_the_classes_and_takes_numbers_and_names(
     type_in: Any, capsys: pytest.CaptureFixture[str], typed: str, meant: str | None
 ) -> None:
-    type_in(typed)
+    type_in(typed, closed=not typed)
     heard = Heard()
     assert TerminalOperator(heard, RunControl()).ask(CHOICES) == meant
     assert capsys.readouterr().err == "pick what?  0 cube  1 sphere  2 duck  s rescan  q quit > "
     assert heard == [OperatorAsked([*CHOICES]), RequestGiven(meant)]
-
-
-def test_the_terminal_asks_again_after_an_unknown_word(
-    type_in: Any, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    operator = TerminalOperator(Heard(), RunControl())
-    lines = iter(["banana\n", "2\n"])
-    monkeypatch.setattr(operator, "_read_line", lambda: next(lines))
-    assert operator.ask(CHOICES) == "duck"
-    first, second = capsys.readouterr().err.splitlines()
-    assert first.endswith('> cannot pick "banana"')
-    assert second.startswith("pick what?")
-
-
-def test_the_end_of_the_input_means_quit(type_in: Any) -> None:
-    type_in("", closed=True)
-    heard = Heard()
-    assert TerminalOperator(heard, RunControl()).ask(CHOICES) is None
-    assert heard[-1] == RequestGiven(None)
 
 
 @pytest.mark.parametrize("keyboard", [True, False])

@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 from py_trees.common import Status
 
-from executive.cell.detection import Detection
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
-from executive.events import Event, NodeEnded, RequestGiven, RunEnded, TimedEvent, ToolCommanded
+from executive.events import Event, RequestGiven, RunEnded, TimedEvent, ToolCommanded
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
@@ -43,23 +42,11 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
     fake.tool.can_seal = lambda: fake.world.find_touched_object(fake.arm.tool_pose.position) is not stubborn
     outcome, items, audit = run.execute(), run.count_items(), run.count_ground_truth()
     assert (outcome.status, outcome.reason) == ("INCOMPLETE", "rejected")
-    named = next(row.item for row in run.workcell.accounts.list_items() if row.state == "rejected")
-    why = "could not be picked (6 failed attempts)"
-    assert outcome.message == f"1 object(s) were not sorted: {named} ({why})"
+    (rejected,) = (row for row in run.workcell.accounts.list_items() if row.state == "rejected")
+    assert rejected.reason == "could not be picked (6 failed attempts)"
+    assert outcome.message == f"1 object(s) were not sorted: {rejected.item} ({rejected.reason})"
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
-    rejected = next(row for row in run.workcell.accounts.list_items() if row.state == "rejected")
-    assert rejected.reason == "could not be picked (6 failed attempts)"
-
-
-def test_a_reason_nobody_catches_ends_the_mission(missions: Path) -> None:
-    run, _ = make(missions)
-    fake_of(run).detector.make_answer = lambda look, true: "the server is gone"
-    outcome = run.execute()
-    assert (outcome.status, outcome.reason) == ("FAILURE", "Detect.unavailable")
-    assert (outcome.message, outcome.node.rpartition("/")[2]) == (
-        "detector embedded: the server is gone", "Detect",
-    )  # fmt: skip
 
 
 def test_a_bug_in_a_part_is_a_fault_and_the_arm_is_at_rest(missions: Path) -> None:
@@ -100,12 +87,8 @@ def test_requests_are_served_in_order_and_the_rest_is_left(missions: Path) -> No
         fake.world.put(label, x, y)
     outcome, items, audit = run.execute(), run.count_items(), run.count_ground_truth()
     assert outcome.status == "SUCCESS"
-    assert [one.event.request for one in events if isinstance(one.event, RequestGiven)] == [
-        "cube",
-        "rescan",
-        "cube",
-        None,
-    ]
+    requests = [one.event.request for one in events if isinstance(one.event, RequestGiven)]
+    assert requests == ["cube", "rescan", "cube", None]
     assert (items["placed"], items["skipped"]) == (2, 1) == (audit["right"], audit["left"])
 
 
@@ -115,19 +98,6 @@ def test_an_unknown_kind_of_cell_names_the_installed_ones(missions: Path) -> Non
         InputError, match='no installed package offers cells of kind "hardware"; installed: fake, sim'
     ):
         assemble(loaded, RunOptions(1))
-
-
-def test_a_box_that_stays_in_doubt_ends_in_an_empty_table_and_not_in_a_failure(missions: Path) -> None:
-    run, events = make(missions)
-    ghost = Detection("duck", 0.4, (300, 200, 320, 220))
-    fake_of(run).detector.make_answer = lambda look, true: [*true, ghost]
-    fake_of(run).world.objects.clear()
-    outcome = run.execute()
-    assert (outcome.status, outcome.message) == (
-        "INCOMPLETE", "1 object(s) were not sorted: duck-1 (it has no confident detection)",
-    )  # fmt: skip
-    ends = (one.event for one in events if isinstance(one.event, NodeEnded))
-    assert sum((end.skill, end.reason) == ("Detect", "unsure") for end in ends) >= 6
 
 
 def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(missions: Path) -> None:
@@ -152,13 +122,9 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
 
 def test_books_that_do_not_balance_are_a_fault(missions: Path) -> None:
     run, events = make(missions)
-    fake_of(run).ledger.count_states = lambda: {  # type: ignore[method-assign]
-        "seen": 3, "placed": 1, "rejected": 0, "skipped": 0, "lost": 1, "phantom": 0,
-    }  # fmt: skip
+    counts = {"seen": 3, "placed": 1, "rejected": 0, "skipped": 0, "lost": 1, "phantom": 0}
+    fake_of(run).ledger.count_states = lambda: counts  # type: ignore[method-assign]
     outcome = run.execute()
-    assert outcome.status == "FAULT"
-    assert outcome.message == (
-        "the item counts are inconsistent: 3 seen, 1 placed, 0 rejected, 0 skipped, 1 lost, 0 phantom; "
-        "seen must be placed + rejected + skipped + lost"
-    )
+    assert (outcome.status, outcome.reason) == ("FAULT", "fault")
+    assert "the item counts are inconsistent: 3 seen, 1 placed" in outcome.message
     assert isinstance(events[-1].event, RunEnded)

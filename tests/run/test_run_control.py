@@ -90,11 +90,3 @@ def test_something_is_done_between_ticks_and_while_the_run_stands_still() -> Non
     control.call_between_ticks(go_on_after_three)
     control.wait_while_paused()
     assert done == [False, True, True, True]
-
-
-def test_requests_are_recorded_once_in_order() -> None:
-    control = RunControl()
-    assert control.take_request() is None
-    control.add_request("cube")
-    control.add_request("duck")
-    assert [control.take_request() for _ in range(3)] == ["cube", "duck", None]

@@ -9,7 +9,7 @@ from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault
 from executive.ledger.outcomes import REASON_UNTRACKED
-from executive.run.scene_recovery import recover_scene
+from executive.run.resumed_run import recover_scene
 
 
 def recover(fake: FakeCell) -> None:

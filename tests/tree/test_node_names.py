@@ -19,7 +19,7 @@ GRAMMAR = {("mission/model/grammar.py", SEQUENCE_KEYWORD), ("mission/model/gramm
 OTHER_MEANINGS = {
     ("cells/sim/scene_file.py", "any"),  # any class of objects
     ("skill.py", "any"),  # any state of the tool
-    ("record/diagnosis/diagnosis_text.py", "repeat"),  # label before the command that repeats a run
+    ("record/diagnosis/diagnosis.py", "repeat"),  # label before the command that repeats a run
 }
 """Strings that equal a word and mean something else."""
 

@@ -17,7 +17,7 @@ from py_trees.visitors import SnapshotVisitor, VisitorBase
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
-from executive.record.trace import Trace
+from executive.record.recorder import Trace
 from executive.testing.run_mission import run_mission
 from executive.tree.node import ControlNode
 from executive.tree.skill_leaf import SkillLeaf

@@ -110,7 +110,7 @@ class SimCell(SimCellChecks, CellWithoutHardware):
 
     def log_to(self, path: Path) -> None:
         """Record all later commands for the simulated world in a log file."""
-        self._world.log = CommandLog(path, self._world.robot.joint_count)
+        self._world.log = CommandLog(path)
         self._arm.send_command()
 
     def advance(self) -> None:
@@ -145,7 +145,7 @@ class SimCell(SimCellChecks, CellWithoutHardware):
         for command in read_commands(log):
             rebuilder.execute(command)
         self.steps, self.last_command_step = rebuilder.step_count, rebuilder.last_command_step
-        self._world.log = CommandLog(log, self._world.robot.joint_count, resume=True)
+        self._world.log = CommandLog(log, resume=True)
         return rebuilder
 
 

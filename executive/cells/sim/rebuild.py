@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+from typing import Any
+
 import numpy as np
 
 from executive.cell.clock import STEP
@@ -9,6 +12,7 @@ from executive.cells.sim import command_log
 from executive.cells.sim.command_log import Command
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
+from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.motion.joints import JointState
 from executive.motion.trajectory import Trajectory
@@ -17,7 +21,7 @@ from executive.motion.trajectory import Trajectory
 class WorldRebuilder:
     """Executes recorded commands in a new world with the cell file and the seed of the recorded world.
 
-    After each command, the new world is bitwise equal to the recorded world at the same time.
+    After each physics step, the new world is bitwise equal to the recorded world at the same time.
 
     Args:
         world: The new world.
@@ -25,52 +29,61 @@ class WorldRebuilder:
 
     Attributes:
         motion: Motion of the arm, or None if the arm is at rest.
+        braking_start: Joint targets of the last physics step `(n,)` [rad], empty before the first step, and
+            their time since the start of the motion [s]; the arm brakes from there.
         step_count: Number of control steps of the run.
         last_command_step: Number of control steps before the last motion or vacuum command; 0: no command.
     """
 
     def __init__(self, world: World, tool: SuctionTool) -> None:
         self.motion: Trajectory | None = None
-        self.step_count = self.last_command_step = 0
-        self._world, self._tool = world, tool
-        self._joint_targets: Array = np.zeros(0)
-        self._motion_time = 0.0
-        self._applied_targets: tuple[Array, float] | None = None
-        """Joint targets and motion time of the last physics step, if newer targets followed it; else None."""
-
-    @property
-    def braking_start(self) -> tuple[Array, float]:
-        """Joint positions from which the arm brakes `(n,)` [rad], empty without a command; their time [s].
-
-        The time counts from the start of the motion.
-        """
-        # If the arm started from joint targets that no physics step has used, the arm would move by two steps
-        # at once, which may tear a load off the cup.
-        if self._applied_targets and self.motion is not None:
-            return self._applied_targets
-        return self._joint_targets, self._motion_time
+        self.braking_start: tuple[Array, float] = (np.zeros(0), 0.0)
+        self.step_count = 0
+        self.last_command_step = 0
+        self._world = world
+        self._tool = tool
+        self._next_targets = self.braking_start
+        """Joint targets and time that the next physics step uses. Targets that no step has used are ignored:
+        if the arm braked from them, it would move by two steps at once, which may tear a load off the cup."""
 
     def execute(self, command: Command) -> None:
-        """Execute the next command."""
-        kind, numbers, states, _ = command
+        """Execute the next command.
+
+        Raises:
+            InputError: The command is invalid.
+        """
+        kind, arguments = command
         if kind in (command_log.MOTION, command_log.VACUUM_ON, command_log.VACUUM_OFF):
             self.last_command_step = self.step_count
-        world, tool = self._world, self._tool
+        try:
+            if kind == command_log.MOTION:
+                self._start_motion(*arguments)
+            else:
+                self._execute(kind, np.array(arguments, dtype=float))
+        except Exception as error:
+            # A changed log may contain anything, for example a body that does not exist.
+            text = f'the log of the world is damaged: its command "{kind}" cannot be executed: {error}'
+            raise InputError(f"{text}; restore a copy of it, or run the mission again") from error
+
+    def _start_motion(self, duration: float, samples: str) -> None:
+        states = np.frombuffer(base64.b64decode(samples), "<f8").reshape(3, -1, self._world.robot.joint_count)
+        self.motion = Trajectory([SampledMotion(JointState(*states), duration)]) if duration else None
+        self.braking_start = (self.braking_start[0], 0.0)
+
+    def _execute(self, kind: str, numbers: Array) -> None:
+        if not np.isfinite(numbers).all():
+            raise ValueError("a number is infinite")
+        world = self._world
+        tool = self._tool
         if kind in (command_log.RUN_STEP, command_log.IDLE_STEP):
             self.step_count += kind == command_log.RUN_STEP
-            self._applied_targets = None
+            if self._next_targets[0].size:
+                world.command_arm(*self._next_targets)
+            self.braking_start = self._next_targets
             world.step()
             tool.advance()
         elif kind == command_log.JOINT_TARGETS:
-            if self._joint_targets.size:
-                self._applied_targets = self._applied_targets or (self._joint_targets, self._motion_time)
-            self._motion_time, self._joint_targets = numbers[0], np.array(numbers[1:])
-            world.command_arm(self._joint_targets, self._motion_time)
-        elif kind == command_log.MOTION:
-            assert states is not None
-            duration, guarded_start_time, _ = numbers
-            self.motion = Trajectory([SampledMotion(states, duration)], guarded_start_time)
-            self._motion_time = 0.0
+            self._next_targets = (numbers[1:], float(numbers[0]))
         elif kind == command_log.MOTION_END:
             self.motion = None
         elif kind == command_log.SET_POSE:
@@ -78,8 +91,12 @@ class WorldRebuilder:
         elif kind == command_log.REMOVE:
             world.remove_object(int(numbers[0]))
         else:
-            actions = {command_log.VACUUM_ON: tool.close, command_log.VACUUM_OFF: tool.open}
-            actions.get(kind, tool.break_seal)()
+            actions = {
+                command_log.VACUUM_ON: tool.close,
+                command_log.VACUUM_OFF: tool.open,
+                command_log.SEAL_BREAK: tool.break_seal,
+            }
+            actions[kind]()
 
 
 class SampledMotion:
@@ -87,7 +104,7 @@ class SampledMotion:
 
     Args:
         states: States at multiples of `STEP` and at the end; each array has the shape `(N, n)`.
-        duration: Duration of the motion [s].
+        duration: Duration of the motion, not 0 [s].
     """
 
     def __init__(self, states: JointState, duration: float) -> None:
@@ -96,16 +113,11 @@ class SampledMotion:
 
         self.duration = duration
         motion_times = np.append(np.arange(0.0, duration, STEP), duration)
-        if len(motion_times) == 1:  # a motion of duration 0
-            q = BPoly(states.q[None], [0.0, 1.0])
-        else:
-            q = BPoly.from_derivatives(motion_times, np.stack(states, axis=1))
-        self._curves = q, q.derivative(), q.derivative(2)
+        q = BPoly.from_derivatives(motion_times, np.stack(states, axis=1))
+        self._curves = (q, q.derivative(), q.derivative(2))
 
-    def state_at(self, s: float) -> JointState:
-        """Return the state at the time `s` since the start of the motion [s]."""
+    def state_at(self, s: Any) -> JointState:
+        """Return the state at the time `s` since the start of the motion [s], or at each of several times."""
         return JointState(*(curve(s) for curve in self._curves))
 
-    def sample(self, times: Array) -> JointState:
-        """Return the states at `times` `(N,)` [s]."""
-        return JointState(*(curve(times) for curve in self._curves))
+    sample = state_at

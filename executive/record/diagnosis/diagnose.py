@@ -1,25 +1,28 @@
-"""Creation of a diagnosis from timeline, mission and end of a run."""
+"""Creation of a diagnosis from timeline, mission and end of a run: failure path, cause and advice."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
+from executive.errors import RecordLost, Unavailable
 from executive.events import RunEnded
 from executive.mission.load import LoadedMission
-from executive.mission.model.nodes import Node, SkillNode
-from executive.record.diagnosis.advice import list_advice
+from executive.mission.model.instance import get_mission_node, make_inspection_instance
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
+from executive.mission.model.values import Literal
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, FailureNode, ItemFailure, LostItem
-from executive.record.diagnosis.failed_run import FailedRun, describe_cause
 from executive.record.picture_recorder import find_picture
 from executive.record.result import is_resumable
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.activation import Reading, get_skill_name
 from executive.record.timeline.items import ItemHistory, Look, Sighting
 from executive.record.timeline.timeline import Timeline
-from executive.skill import Skill
+from executive.tree.failure import Reason
+from executive.tree.inspection import Advice, PropagatedFailure
+from executive.tree.node_registry import load_control_nodes
 
 DECIDING_INPUTS: Mapping[str, tuple[str, ...]] = {
     "arm": ("arm.met",),  # Recorded name of `arm.collision`.
@@ -28,14 +31,14 @@ DECIDING_INPUTS: Mapping[str, tuple[str, ...]] = {
 }
 """Inputs that decide whether a skill succeeds, by the part of the cell that the skill `uses`."""
 
-_TRACEBACK_LINE = re.compile(r'File "(?P<file>[^"]+)", line (?P<line>\d+), in (?P<function>\S+)')
-"""Pattern of the source location of a function call in a Python traceback."""
+CAMERA_ADVICE = "mount camera and bins as the cell file says, or measure the pose again"
+"""Advice about a displaced camera, which no change of the mission corrects."""
 
-_SKILL_MODULE = "executive/skill.py"
-"""End of the path of the module that defines `Skill`."""
+MAX_NAMED_ITEMS = 5
+"""Maximum number of item names in a sentence."""
 
-_CAUSE_SEPARATOR = "\nThe above exception was the direct cause"
-"""Text that Python prints between an exception and the exception that it caused."""
+_TRACEBACK_LINE = re.compile(r'File "([^"]+)", line (\d+), in (\S+)')
+"""Pattern of a call in a Python traceback: file, line and function."""
 
 
 def diagnose(
@@ -52,20 +55,25 @@ def diagnose(
     """
     if end.status in ("SUCCESS", "INCOMPLETE"):
         return None
-    run = FailedRun(loaded, timeline, end)
+    run = _FailedRun(loaded, timeline, end)
     arm_state = _describe_arm(is_at_rest) if end.status == "FAULT" else "at rest"
-    readings = list(_list_deciding_readings(run, loaded.skills))
+    readings = list(run.list_deciding_readings())
+    node = run.deciding_node
+    is_skill = isinstance(node, SkillNode)
+    node_name = run.format_skill_name(end.node) if is_skill else node.path_name if node else ""
     journal = RunDirectory(run_folder).journal
     has_journal = journal.exists() and journal.stat().st_size > 0
     items = timeline.items.find_items_in_states("seen", "dropped", "held")
     labels = {name: item.last_change.label for name, item in items.items() if name not in run.lost_items}
+    # The last line of a traceback is `module.RecordLost: message`.
+    is_record_lost = f".{RecordLost.__name__}: " in timeline.traceback
     return Diagnosis(
         status=end.status,
         reason=end.reason,
         clock=end.robot_time,
         mission=loaded.tree.span.source.path,
-        verdict=describe_cause(run),
-        node=_make_deciding_node(run),
+        verdict=run.describe_cause(),
+        node=DecidingNode(node.path, node_name, _format_source_location(node)) if node else None,
         item=run.item,
         passed_nodes=[
             FailureNode(entry.node.path, entry.name, _format_source_location(entry.node), entry.explanation)
@@ -73,53 +81,180 @@ def diagnose(
             if entry.explanation or entry is run.failure_path[-1]
         ],
         readings=readings,
-        last_look=_find_last_look(run),
+        last_look=run.find_last_look(),
         lost_items=[_make_lost_item(name, item) for name, item in run.lost_items.items()],
         halted_skills=[run.format_skill_name(path) for path in run.halted_skills],
         unsorted_items=[name for name, label in labels.items() if label in loaded.routes],
         arm_state=arm_state,
         held_item=end.held_item,
         raised_at=_find_exception_location(timeline.traceback),
-        is_recorded=not run.is_record_lost,
-        can_resume=is_resumable(end.status) and (not run.is_record_lost or has_journal),
-        picture=_find_picture_file(run, run_folder),
-        advice=list(list_advice(run, arm_state, readings)),
+        is_recorded=not is_record_lost,
+        can_resume=is_resumable(end.status) and (not is_record_lost or has_journal),
+        picture=run.find_picture_file(run_folder),
+        advice=list(_list_advice(run, arm_state, readings, is_record_lost)),
     )
 
 
-def _list_deciding_readings(run: FailedRun, skills: Mapping[str, type[Skill]]) -> Iterator[Reading]:
-    """Yield the inputs that explain the failure of a skill, the latest first.
+@dataclass(frozen=True)
+class _FailurePathNode:
+    """Node from which a failure propagated to its parent.
 
-    If inputs raised exceptions in the last control step of the skill, only these inputs are yielded.
+    Attributes:
+        node: Node of the mission.
+        name: Name of the node with its subtree: `look: retry`.
+        explanation: Reason why a control node did not handle the failure; "" for other nodes.
+        attempt: Number of the failed attempt and maximum number of attempts; None without attempts.
+        changes: Changes of the node after which the failure would not end the run.
+        is_handler: True if the changes let the node handle the failure, for instance a `try`.
     """
-    node, activation = run.deciding_node, run.deciding_activation
-    if activation is None or not isinstance(node, SkillNode):
-        return
-    exceptions = [each for each in activation.readings if each.raised and each.tick == activation.end_tick]
-    names = [name for part in skills[node.skill].uses for name in DECIDING_INPUTS.get(part, ())]
-    values = [each for each in activation.readings if each.name in names and not each.raised]
-    yield from reversed(exceptions or values)
+
+    node: Node
+    name: str
+    explanation: str = ""
+    attempt: tuple[int, int] | None = None
+    changes: Sequence[Advice] = ()
+    is_handler: bool = False
 
 
-def _make_deciding_node(run: FailedRun) -> DecidingNode | None:
-    node = run.deciding_node
-    if node is None:
-        return None
-    name = run.format_skill_name(node.path) if isinstance(node, SkillNode) else node.path_name
-    return DecidingNode(node.path, name, _format_source_location(node))
+class _FailedRun:
+    """Mission, timeline and end of a run that did not succeed.
+
+    Attributes:
+        failure_path: Nodes from the root to the origin of the failure; empty if no node of the tree failed.
+        lost_items: History of the items whose loss made the run fail, by name of the item.
+        deciding_activation: Last activation of the node that determined the status, or None.
+        deciding_node: Node of the mission that determined the status, or None.
+        halted_skills: Paths of the skills that the end of the run or `deciding_node` halted.
+        item: Name of the item of `deciding_node`, else of a halted skill, else of the first lost item, or "".
+    """
+
+    def __init__(self, loaded: LoadedMission, timeline: Timeline, end: RunEnded) -> None:
+        self.loaded, self.timeline, self.end = loaded, timeline, end
+        is_failure = end.status == "FAILURE"
+        nodes = _find_nodes_on_path(loaded.tree, end.node)
+        self.failure_path = _trace_failure(nodes, timeline, end) if is_failure else []
+        # Lost items make a run fail after its tree has succeeded; then no node determined the status.
+        self.lost_items = {
+            name: item
+            for name, item in timeline.items.by_name.items()
+            if is_failure and not end.node and item.last_change.state == "lost"
+        }
+        self.deciding_activation = timeline.activation_by_path.get(end.node)
+        self.deciding_node = nodes[-1] if nodes else None
+        self.halted_skills = timeline.halted_skills
+        if is_failure:
+            self.halted_skills = self.deciding_activation.halted_skills if self.deciding_activation else ()
+        activations = [self.deciding_activation, *map(timeline.activation_by_path.get, self.halted_skills)]
+        items = [activation.item for activation in activations if activation is not None and activation.item]
+        self.item = next(iter([*items, *self.lost_items]), "")
+
+    def format_skill_name(self, path: str) -> str:
+        """Return the name of a skill with the item of its last activation: `Grasp of cube-1`."""
+        last = self.timeline.activation_by_path.get(path)
+        return get_skill_name(path) + (f" of {last.item}" if last is not None and last.item else "")
+
+    def describe_cause(self) -> str:
+        """Return a sentence with the cause of the end: lost items, or skill, attempt and message."""
+        end, skills = self.end, " and ".join(map(self.format_skill_name, self.halted_skills))
+        skills_text = f" during {skills}" if skills else ""
+        if end.status == "HALTED":
+            return end.message + (" while the operator was asked" if self.timeline.question else skills_text)
+        if names := list(self.lost_items):
+            subject = "object was" if len(names) == 1 else "objects were"
+            omitted = f" and {len(names) - MAX_NAMED_ITEMS} more" if len(names) > MAX_NAMED_ITEMS else ""
+            return f"{len(names)} {subject} lost: {', '.join(names[:MAX_NAMED_ITEMS])}{omitted}"
+        if not self.failure_path:
+            return end.message
+        attempts = (entry.attempt for entry in reversed(self.failure_path) if entry.attempt)
+        attempt, max_attempts = next(attempts, (1, 1))
+        attempt_text = f" on attempt {attempt} of {max_attempts}" if attempt > 1 else ""
+        if attempt == max_attempts > 1:
+            attempt_text = f" on the last of {max_attempts} attempts"
+        if isinstance(self.deciding_node, SkillNode):
+            reason = end.reason.rpartition(".")[2]
+            return f"{self.format_skill_name(end.node)} failed ({reason}){attempt_text}: {end.message}"
+        return f"{self.failure_path[-1].name}{attempt_text}: {end.message}{skills_text}"
+
+    def list_deciding_readings(self) -> Iterator[Reading]:
+        """Yield the inputs that explain the failure of a skill, the latest first.
+
+        If inputs raised exceptions in the last control step of the skill, only these inputs are yielded.
+        """
+        node, activation = self.deciding_node, self.deciding_activation
+        if activation is None or not isinstance(node, SkillNode):
+            return
+        exceptions = [
+            each for each in activation.readings if each.raised and each.tick == activation.end_tick
+        ]
+        uses = self.loaded.skills[node.skill].uses
+        names = [name for part in uses for name in DECIDING_INPUTS.get(part, ())]
+        values = [each for each in activation.readings if each.name in names and not each.raised]
+        yield from reversed(exceptions or values)
+
+    def find_last_look(self) -> Sighting | Look | None:
+        """Return the last look in which `item` was detected; without such a look, the last look."""
+        item = self.timeline.items.by_name.get(self.item)
+        if item is None or item.sighting is None:
+            return self.timeline.items.look
+        return replace(item.sighting, attempts=item.last_change.attempts)
+
+    def find_picture_file(self, run_folder: Path) -> str:
+        """Return the path of the picture of the failure, else of the last selection of the item, else ""."""
+        item = self.timeline.items.by_name.get(self.item)
+        failed = item.failure if self.lost_items and item is not None else self.deciding_activation
+        folder = RunDirectory(run_folder).pictures
+        file = find_picture(folder, self.item, failed.reason if failed is not None else "")
+        file = file or find_picture(folder, self.item, "")
+        return file.relative_to(run_folder).as_posix() if file else ""
+
+
+def _find_nodes_on_path(tree: Node, path: str) -> list[Node]:
+    """Return the nodes from the root to the node at `path`, or [] if no node has this path.
+
+    If a subtree and its body have this path, both are returned, the body last.
+    """
+    for child in tree.children:
+        if nodes := _find_nodes_on_path(child, path):
+            return [tree, *nodes]
+    return [tree] if tree.path == path else []
+
+
+def _trace_failure(nodes: Sequence[Node], timeline: Timeline, end: RunEnded) -> list[_FailurePathNode]:
+    """Return the path of the failure through the nodes from the root to the origin at `end.node`."""
+    skill_or_label, _, reason = end.reason.rpartition(".")
+    # For the ancestors of a node with a label, the failure may also have the name `label.reason`.
+    reasons = {Reason(skill_or_label, reason)}
+    failure_path: list[_FailurePathNode] = []
+    for index, node in reversed(list(enumerate(nodes))):
+        subtrees = [ancestor.name for ancestor in nodes[:index] if isinstance(ancestor, SubtreeNode)]
+        entry = _FailurePathNode(node, f"{subtrees[-1]}: {node.path_name}" if subtrees else node.path_name)
+        activation = timeline.activation_by_path.get(node.path)
+        if isinstance(node, InnerNode) and activation is not None:
+            control = make_inspection_instance(node)
+            children = [child for key in control.keys for child in control.list_children(key)]
+            failed_node = failure_path[-1].node if failure_path else None
+            failure = PropagatedFailure(
+                child=next((child for child in children if get_mission_node(child) is failed_node), None),
+                name=activation.reason, reasons=frozenset(reasons),
+                handled_counts=activation.handled_counts, last_messages=activation.message_by_reason,
+                last_handled_name=activation.last_handled_reason, last_choice=activation.choice,
+                duration=activation.end - activation.start,
+            )  # fmt: skip
+            entry = replace(
+                entry,
+                explanation=control.explain(failure) if failure.child else "",
+                attempt=control.count_attempts(failure),
+                changes=list(control.advise(failure)),
+                is_handler=bool(control.remedy),
+            )
+        failure_path.append(entry)
+        reasons |= {Reason(node.label, reason)} if node.label else set()
+    return failure_path[::-1]
 
 
 def _format_source_location(node: Node) -> str:
     """Return file and line of a node: `missions/sort.yaml:12`."""
     return f"{node.span.source.path}:{node.span.line}"
-
-
-def _find_last_look(run: FailedRun) -> Sighting | Look | None:
-    """Return the last look in which `run.item` was detected; without such a look, the last look."""
-    item = run.timeline.items.by_name.get(run.item)
-    if item is None or item.sighting is None:
-        return run.timeline.items.look
-    return replace(item.sighting, attempts=item.last_change.attempts)
 
 
 def _make_lost_item(name: str, item: ItemHistory) -> LostItem:
@@ -128,17 +263,6 @@ def _make_lost_item(name: str, item: ItemHistory) -> LostItem:
         failure_name = f"{get_skill_name(activation.node)}.{activation.reason}"
         failure = ItemFailure(failure_name, activation.message, activation.end)
     return LostItem(name, item.sighting, item.unseen_look_count, item.pick_time, item.drop_time, failure)
-
-
-def _find_picture_file(run: FailedRun, run_folder: Path) -> str:
-    """Return the path of the picture of the failure, else of the last selection of the item, else ""."""
-    reason = run.end.reason.rpartition(".")[2] if run.end.status == "FAILURE" else ""
-    item = run.timeline.items.by_name.get(run.item)
-    if run.lost_items and item is not None and item.failure is not None:
-        reason = item.failure.reason
-    folder = RunDirectory(run_folder).pictures
-    file = find_picture(folder, run.item, reason) or find_picture(folder, run.item, "")
-    return file.relative_to(run_folder).as_posix() if file else ""
 
 
 def _describe_arm(is_at_rest: Callable[[], bool]) -> str:
@@ -151,11 +275,77 @@ def _describe_arm(is_at_rest: Callable[[], bool]) -> str:
 
 def _find_exception_location(traceback: str) -> str:
     """Return the source location of the first exception: `skills/grasp.py:45, in run`; "" if unknown."""
-    cause = traceback.rpartition(_CAUSE_SEPARATOR)[0] or traceback
-    calls = [match.group("file", "line", "function") for match in _TRACEBACK_LINE.finditer(cause)]
-    if len(calls) > 1 and calls[-1][0].endswith(_SKILL_MODULE) and calls[-1][2] == Skill.failure.__name__:
-        calls.pop()  # The caller of `Skill.failure` is more informative.
+    cause = traceback.partition("\nThe above exception was the direct cause")[0]
+    # The caller of `Skill.failure` is more informative than the method itself.
+    calls = [call for call in _TRACEBACK_LINE.findall(cause) if not call[0].endswith("executive/skill.py")]
     if not calls:
         return ""
     file, line, function = calls[-1]
     return f"{'/'.join(PurePath(file).parts[-2:])}:{line}, in {function}"
+
+
+def _list_advice(
+    run: _FailedRun, arm_state: str, readings: Sequence[Reading], is_record_lost: bool
+) -> Iterator[str]:
+    """Yield sentences with advice, the most urgent first."""
+    end = run.end
+    if arm_state != "at rest":
+        yield f"keep away from the arm until you have seen it stand still: {arm_state}"
+    if end.held_item:
+        object_name = "the object" if end.held_item == "something" else end.held_item
+        can_resume = end.status != "FAILURE"
+        resume_advice = f"to resume this run, leave {object_name} in the tool; " if can_resume else ""
+        yield f"{resume_advice}take {object_name} out of the tool before a new run"
+    else:
+        for name in run.timeline.items.find_items_in_states("held"):
+            yield f"find {name} in the cell: the tool released it at the end of the run"
+    for reading in readings:
+        if reading.raised == Unavailable.__name__:
+            yield f"make sure that {reading.name} answers again"
+        elif reading.name == "arm.met":  # Recorded name of `arm.collision`.
+            yield f"find what the arm collided with: {reading.value}"
+    if is_record_lost:
+        yield "free some space on the disk of the run directory, or name another folder with --runs DIR"
+    elif end.status == "FAULT":
+        yield "repair the code or the cell: a fault is never retried"
+    if end.reason.endswith(".camera_moved"):
+        yield CAMERA_ADVICE
+    elif run.failure_path:
+        yield f"to let the mission continue after {end.reason}: {', or '.join(_list_changes(run))}"
+    for name, item in run.lost_items.items():
+        place = "around ({:.2f}, {:.2f}) m".format(*item.last_change.position)
+        if item.drop_time is not None and (item.sighting is None or item.sighting.clock < item.drop_time):
+            place = "below the place where it was dropped"
+        yield f"look for {name} by hand, {place}"
+
+
+def _list_changes(run: _FailedRun) -> Iterator[str]:
+    """Yield changes of the mission after which the failure would not end the run."""
+    entries = reversed(run.failure_path)
+    changes = [(entry, _format_advice(run, entry, advice)) for entry in entries for advice in entry.changes]
+    remedies = (node.remedy for node in load_control_nodes().values() if node.remedy)
+    new_handler = f"{next(remedies)} {_format_location(run, run.failure_path[-1].node)}"
+    yield next((text for entry, text in changes if entry.is_handler), new_handler)
+    for entry, text in changes:
+        if not entry.is_handler:
+            yield text
+            # Changes of ancestors are omitted: the innermost node with attempts should be changed first.
+            if entry.attempt:
+                return
+
+
+def _format_advice(run: _FailedRun, entry: _FailurePathNode, advice: Advice) -> str:
+    """Return advice with the place of the change: option `--set` for a param, else the line of the node."""
+    changed_node = get_mission_node(advice.child) if advice.child else entry.node
+    value = entry.node.values.get(advice.key) if isinstance(entry.node, InnerNode) else None
+    params = run.loaded.mission.params.items() if isinstance(value, Literal) else ()
+    # If a value comes from a param, its span is the span of the value of the param.
+    name = next((name for name, param in params if param.value.span == getattr(value, "span", None)), "")
+    return (
+        f"{advice.text} {f'with --set {name}=...' if name else f'at {_format_location(run, changed_node)}'}"
+    )
+
+
+def _format_location(run: _FailedRun, node: Node) -> str:
+    """Return the location of a node: the line number, and the file name if it is not the mission file."""
+    return node.span.describe_place(run.loaded.tree.span.source)

@@ -1,12 +1,24 @@
-"""Diagnosis of a run that did not succeed: cause, measured values and advice."""
+"""Diagnosis of a run that did not succeed: cause, measured values and advice, and its text for a person."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+import shlex
+import textwrap
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from executive.record.timeline.activation import Reading
 from executive.record.timeline.items import Look, Sighting
+
+MAX_LINE_WIDTH = 110
+"""Maximum length of a line [characters]."""
+
+_MAX_READINGS = _MAX_LOST_ITEMS = 3
+"""Maximum number of readings, and maximum number of lost items, in the text."""
+
+_LABEL_WIDTH = 12
+"""Width of the column of labels [characters]."""
 
 
 @dataclass(frozen=True)
@@ -117,3 +129,115 @@ class Diagnosis:
     can_resume: bool
     picture: str
     advice: Sequence[str]
+
+
+def make_resume_command(folder: str) -> str:
+    """Return the command that resumes the run in the directory `folder`."""
+    return shlex.join(["executive", "run", "--resume", folder])
+
+
+def format_diagnosis(diagnosis: Diagnosis, folder: str, repeat_command: str, report: str = "") -> list[str]:
+    """Return the lines of a diagnosis, then the unwrapped lines with paths and commands.
+
+    The run directory is `folder`; `report` is the path of the report, or "".
+    """
+    heading = f"{diagnosis.status} after {diagnosis.clock:.2f} s: {diagnosis.verdict}"
+    lines = wrap_lines(heading, "", "  ", max_lines=3) + _format_failure_path(diagnosis)
+    for label, text in list_labelled_sentences(diagnosis):
+        lines += wrap_lines(text, f"{label:{_LABEL_WIDTH}}", " " * _LABEL_WIDTH, max_lines=3)
+    commands = {"record": folder, "report": report, "repeat": repeat_command}
+    if diagnosis.can_resume:
+        commands["resume"] = make_resume_command(folder)
+    return lines + [f"{label:{_LABEL_WIDTH}}{command}" for label, command in commands.items() if command]
+
+
+def list_labelled_sentences(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
+    """Yield label and sentence of each part of a diagnosis, except the verdict and the failure path."""
+    node = diagnosis.node
+    if node is not None and not any(entry.explanation for entry in diagnosis.passed_nodes):
+        yield "where", f"{node.path} ({node.place})"
+    if diagnosis.raised_at:
+        note = '; the whole traceback is in the journal, event "FaultRaised"' if diagnosis.is_recorded else ""
+        yield "raised at", diagnosis.raised_at + note
+    if diagnosis.readings:
+        readings = diagnosis.readings[:_MAX_READINGS]
+        yield "readings", ", ".join(_format_reading(reading, diagnosis.verdict) for reading in readings)
+    for item in diagnosis.lost_items[:_MAX_LOST_ITEMS]:
+        yield "lost", _format_lost_item(item)
+    # The text of a lost item already contains its last look.
+    if not diagnosis.lost_items:
+        yield "last look", _format_look(diagnosis.last_look)
+    if diagnosis.picture:
+        yield "picture", diagnosis.picture
+    tool_texts = {"": "is empty", "something": "holds an unknown object"}
+    arm = "the arm is at rest" if diagnosis.arm_state == "at rest" else f"the arm: {diagnosis.arm_state}"
+    yield "now", f"{arm}, the tool {tool_texts.get(diagnosis.held_item, 'holds ' + diagnosis.held_item)}"
+    if diagnosis.unsorted_items:
+        yield "left to do", f"{len(diagnosis.unsorted_items)}: {', '.join(diagnosis.unsorted_items)}"
+    for sentence in diagnosis.advice:
+        yield "next", sentence
+
+
+def _format_failure_path(diagnosis: Diagnosis) -> list[str]:
+    """Return a line for each node that did not handle the failure, and for the origin of the failure."""
+    node = diagnosis.node
+    rows = [(each.name, each.explanation, each.place) for each in diagnosis.passed_nodes if each.explanation]
+    if not rows or node is None:
+        return []
+    rows.append((node.name, node.path, node.place))
+    width = max(len(name) for name, _, _ in rows)
+    lines = [f"why no node in {diagnosis.mission} handled the failure, from the root down:"]
+    for name, explanation, place in rows:
+        location = re.sub(f"^{re.escape(diagnosis.mission)}:", "line ", place)
+        lines += wrap_lines(f"{explanation} ({location})", f"  {name:{width}}  ", " " * (width + 4))
+    return lines
+
+
+def wrap_lines(text: str, first_indent: str, other_indent: str, *, max_lines: int = 2) -> list[str]:
+    """Return a text as at most `max_lines` indented lines."""
+    return textwrap.wrap(
+        text, MAX_LINE_WIDTH, initial_indent=first_indent, subsequent_indent=other_indent,
+        max_lines=max_lines, placeholder=" ...", break_on_hyphens=False,
+    )  # fmt: skip
+
+
+def _format_reading(reading: Reading, verdict: str) -> str:
+    """Return a reading as text; the message of an exception is omitted if the verdict contains it."""
+    value = f"{reading.value:g}" if isinstance(reading.value, float) else str(reading.value)
+    if not reading.raised:
+        return f"{reading.name} = {value} ({reading.clock:.2f} s)"
+    message = "" if value in verdict else f": {value}"
+    return f"{reading.name} raised {reading.raised} ({reading.clock:.2f} s){message}"
+
+
+def _format_look(look: Sighting | Look | None) -> str:
+    """Return image, detection and counts of the last look as text."""
+    if look is None:
+        return "none so far"
+    image = f"frame {look.frame}, camera {look.camera}, by {look.detector}, at {look.clock:.2f} s"
+    if isinstance(look, Look):
+        return f"{image}: {_format_count(look.found, 'box', 'boxes')}"
+    detection = "" if look.confidence is None else f" as {look.label} {look.confidence:.2f}"
+    counts = f"{_format_count(look.looks, 'look')}, {_format_count(look.attempts, 'failed attempt')} in all"
+    return f"{look.item}{detection}{_format_position(look.position)}: {image}; {counts}"
+
+
+def _format_lost_item(item: LostItem) -> str:
+    """Return last look, drop and last failure of a lost item as text."""
+    text = item.item
+    look = item.look
+    failure = item.last_failure
+    if look is not None:
+        text += f" last detected{_format_position(look.position)} at {look.clock:.2f} s"
+        text += f", not detected in the {_format_count(item.later_looks, 'later look')}"
+    if item.dropped_at is not None and (failure is None or failure.clock != item.dropped_at):
+        text += f"; dropped at {item.dropped_at:.2f} s"
+    return text + (f"; {failure.failure} at {failure.clock:.2f} s: {failure.message}" if failure else "")
+
+
+def _format_position(position: Sequence[float] | None) -> str:
+    return "" if position is None else " at ({:.3f}, {:.3f}, {:.3f}) m".format(*position)
+
+
+def _format_count(count: int, singular: str, plural: str = "") -> str:
+    return f"{count} {singular if count == 1 else plural or singular + 's'}"

@@ -18,7 +18,7 @@ from executive.errors import ExecutiveError
 from executive.mission.text.file_search import get_shipped_folder
 from executive.perception.evidence import describe_unknown_labels
 from executive.record.atomic_file import write_atomically
-from executive.record.diagnosis.diagnosis_text import list_labelled_sentences, make_resume_command
+from executive.record.diagnosis.diagnosis import list_labelled_sentences, make_resume_command
 from executive.record.journal import find_run_end, find_run_start, read_journal
 from executive.record.pictures.palette import PALETTE
 from executive.record.recorded_mission import read_tree

@@ -32,7 +32,7 @@ STEPS = 36
 def swing(config: CellConfig, path: Path, idle: int) -> PictureSource:
     """A log in which the arm swings for some steps; in the middle some steps of nobody's run."""
     home = np.radians(config.arm.poses_deg["home"])
-    commands = CommandLog(path, 7)
+    commands = CommandLog(path)
     for step in range(STEPS):
         commands.append(log.JOINT_TARGETS, step / 240, *(home - 0.02 * step * np.eye(7)[0]))
         commands.append(log.RUN_STEP)

@@ -15,6 +15,7 @@ from executive.cell.workcell import CellOptions, ResumePoint
 from executive.cells.fake.cell import SilentOperator
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.command_log import JOINT_TARGETS, CommandLog
+from executive.errors import InputError
 from executive.events import discard_event
 from executive.geometry import Array
 from executive.mission.load import load_mission
@@ -142,11 +143,21 @@ def test_a_command_that_no_physics_step_has_followed_is_not_skipped(
     log = tmp_path / "log"
     log.write_bytes(one.log.read_bytes())
     time = one.time + STEP
-    CommandLog(log, 7, resume=True).append(JOINT_TARGETS, time, *one.motion.state_at(time).q)
+    CommandLog(log, resume=True).append(JOINT_TARGETS, time, *one.motion.state_at(time).q)
     cell = rebuilt(mission, log)
     cell.advance()
     assert cell._arm._motion_time == pytest.approx(time, abs=STEP / 10)
     cell.close()
+
+
+@pytest.mark.parametrize(
+    "line", [b'["joints", 0, 1]', b'["joints", 0, 1e999, 0, 0, 0, 0, 0, 0]', b'["remove", 999]', b'["jump"]']
+)
+def test_an_impossible_command_is_refused(mission, left: list[Left], tmp_path: Path, line: bytes) -> None:
+    log = tmp_path / "log"
+    log.write_bytes(left[0].log.read_bytes() + line + b'\n["step"]\n')
+    with pytest.raises(InputError, match="the log of the world is damaged"):
+        rebuilt(mission, log)
 
 
 def test_what_happened_meanwhile_is_there_and_took_none_of_the_runs_time(

@@ -17,7 +17,6 @@ def test_a_run_that_ended_leaves_its_report(done, copy):
     ("file", "content", "sentence"),
     [
         ("journal.jsonl", "no JSON\n{}\n", "{run}/journal.jsonl:1: this line is no event (expected ident"),
-        ("journal.jsonl", '{"format": 4}\n', "{run}/journal.jsonl: this journal has format 4, and"),
         ("tree.json", "[{}]", '"{run}/tree.json" contains no tree of a run: field required'),
         ("report.html", None, 'cannot write the report "{run}/report.html": is a directory; '),
         ("frames/000001_odd.jpg", None, "IsADirectoryError: "),
