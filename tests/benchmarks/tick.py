@@ -30,9 +30,9 @@ from executive.record.run_directory import RunDirectory
 from executive.skill import Skill
 from executive.tree.blackboard import Blackboard
 from executive.tree.retry import Retry
-from executive.tree.sequence import Sequence as SequenceNode
+from executive.tree.sequences import Sequence as SequenceNode
 from executive.tree.skill_leaf import SkillLeaf, Wiring
-from executive.tree.timeout import Timeout
+from executive.tree.decorators import Timeout
 from executive.tree.tree_node import NodeContext
 from tests.benchmarks.report import Figures, run_command
 

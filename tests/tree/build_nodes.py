@@ -13,19 +13,19 @@ from py_trees.behaviour import Behaviour
 from executive.events import Emit, discard_event
 from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Reason
-from executive.tree.fallback import Fallback
-from executive.tree.for_each import ForEach
-from executive.tree.invert import Invert
+from executive.tree.sequences import Fallback
+from executive.tree.loops import ForEach
+from executive.tree.decorators import Invert
 from executive.tree.keys import VariableName
 from executive.tree.parallel import Parallel
-from executive.tree.repeat import CounterLimits, Repeat
+from executive.tree.loops import CounterLimits, Repeat
 from executive.tree.retry import Backoff, Retry
-from executive.tree.sequence import Sequence as SequenceNode
-from executive.tree.succeed import Succeed
-from executive.tree.timeout import Timeout
+from executive.tree.sequences import Sequence as SequenceNode
+from executive.tree.decorators import Succeed
+from executive.tree.decorators import Timeout
 from executive.tree.tree_node import NodeContext
 from executive.tree.try_catch import Catch, TryCatch
-from executive.tree.while_loop import While
+from executive.tree.loops import While
 
 Names = Iterable[tuple[str, str]]
 

@@ -15,7 +15,7 @@ from executive.errors import Fault
 from executive.events import BranchChosen
 from executive.skill import In, Skill
 from executive.tree.blackboard import Blackboard
-from executive.tree.for_each import ForEach
+from executive.tree.loops import ForEach
 from executive.tree.halting import halt
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 

@@ -12,7 +12,7 @@ from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.testing.run_mission import run_mission
 from executive.testing.substitutes import make_substitute
-from executive.tree.guard import Guard
+from executive.tree.sequences import Guard
 from skills.has_elapsed import HasElapsed
 
 

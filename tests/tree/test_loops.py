@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from executive.errors import InputError
 from executive.events import BranchChosen, NodeEnded
-from executive.tree.generator_node import GeneratorNode, NodeRun
+from executive.tree.loops import GeneratorNode, NodeRun
 from executive.tree.keys import Child, key
 
 

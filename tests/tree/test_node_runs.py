@@ -25,7 +25,7 @@ from scripted_leaf import Leaf
 
 from executive.events import BranchChosen, Event
 from executive.tree.blackboard import Blackboard
-from executive.tree.for_each import ForEach
+from executive.tree.loops import ForEach
 from executive.tree.try_catch import TryCatch
 
 LOST, EMPTY = [("A", "lost")], [("A", "empty")]

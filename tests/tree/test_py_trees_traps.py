@@ -12,10 +12,10 @@ from py_trees.common import Status
 from scripted_leaf import Leaf
 
 from executive.errors import Fault
-from executive.tree.fallback import Fallback
+from executive.tree.sequences import Fallback
 from executive.tree.halting import halt
 from executive.tree.parallel import Parallel
-from executive.tree.sequence import Sequence
+from executive.tree.sequences import Sequence
 
 
 class Terminated(Leaf):

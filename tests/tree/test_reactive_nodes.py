@@ -12,8 +12,8 @@ from py_trees.common import Status
 from executive.events import BranchChosen, NodeStarted
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
-from executive.tree.fallback import Fallback
-from executive.tree.sequence import Sequence
+from executive.tree.sequences import Fallback
+from executive.tree.sequences import Sequence
 
 
 def reactive(kind: Any, site: Any, children: Any) -> Any:
