@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 from py_trees.common import Status
 
@@ -35,7 +34,7 @@ from executive.record.journal import Journal, read_journal
 from executive.record.trace import Trace
 from executive.run.assembly import RunOptions, assemble
 from tests.benchmarks.forks import ForkRunner
-from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command
+from tests.benchmarks.report import Figures, describe, record_subject, run_command
 
 LIMITS = {"rest_s": 0.5, "deviation_rad": 1e-6, "acceleration_ratio": 1.0, "jerk_ratio": 1.02}
 """Limits of a halt: time to rest, distance of a joint's command from the planned trajectory, and acceleration
@@ -46,9 +45,9 @@ CHILD_TIMEOUT = 120.0
 """Time that a child may take to halt and be checked [s]."""
 
 
-def measure(subject: MissionUnderTest, period_steps: int | None = None) -> Figures:
-    """Halt MISSION at moments all over one run, each time as Ctrl-C would."""
-    period_steps = period_steps or (10 if subject.loaded.cell_config.kind == "sim" else 1)
+def measure(subject: MissionUnderTest, every: int | None = None) -> Figures:
+    """Halt MISSION in every `--every` control steps of one run, each time as Ctrl-C would."""
+    period_steps = every or (10 if subject.loaded.cell_config.kind == "sim" else 1)
     with tempfile.TemporaryDirectory() as folder:
         undisturbed, problem = record_subject(subject, subject.seed, Path(folder))
         if problem:
@@ -264,12 +263,4 @@ class _RunWithHalts:
 
 
 if __name__ == "__main__":
-    run_mission_command(
-        measure,
-        click.option(
-            "--every",
-            "period_steps",
-            type=click.IntRange(min=1),
-            help="Control steps from one halt to the next.",
-        ),
-    )
+    run_command(measure)

@@ -15,12 +15,10 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-import click
 import numpy as np
 
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.config import TableConfig
-from executive.cli.options import runs_option
 from executive.errors import ExecutiveError
 from executive.events import ItemChanged, NodeEnded, NodeStarted, TimedEvent
 from executive.geometry import Array
@@ -35,7 +33,7 @@ from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
 from executive.testing.faults.world_access import TrueObject, WorldAccess
 from tests.benchmarks.forks import ForkRunner
-from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command, show_progress
+from tests.benchmarks.report import Figures, describe, record_subject, run_command, show_progress
 from tests.meanwhile import meanwhile
 
 RESUME_TIMEOUT = 300.0
@@ -213,16 +211,4 @@ def find_handled_twice(events: Sequence[TimedEvent]) -> list[str]:
 
 
 if __name__ == "__main__":
-    run_mission_command(
-        measure,
-        click.option(
-            "--kills", type=click.IntRange(min=1), default=20, show_default=True, help="Number of kills."
-        ),
-        click.option(
-            "--changed", type=click.IntRange(min=0), help="Kills with a changed world.  [default: a quarter]"
-        ),
-        click.option(
-            "--halted", type=click.IntRange(min=0), default=0, help="Kills that are replaced by Ctrl-C."
-        ),
-        runs_option,
-    )
+    run_command(measure)

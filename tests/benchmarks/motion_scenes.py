@@ -1,28 +1,35 @@
-"""Random scenes of the benchmark of motion: objects on the table, one to pick, and a slot in a bin."""
+"""Random scenes of the benchmark of motion, and the motions of the planner as the simulated arm makes them.
+
+A scene has objects on the table, one to pick, and a slot in a bin.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
 from executive.cell.arm import Goal, Task
+from executive.cell.clock import STEP, StepClock
 from executive.cell.config import CellConfig
 from executive.cell.layout import build_bin
 from executive.cell.objects import Load, ObjectClass, Obstacle
+from executive.cells.sim.arm import SimArm
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import build_simulated_class, load_mesh
 from executive.cells.sim.spawn import spawn_objects
 from executive.cells.sim.suction import compute_breakaway_force, measure_contact
-from executive.cells.sim.tool import TOUCH_DISTANCE
-from executive.cells.sim.world import World
-from executive.errors import InputError, Unreachable
-from executive.geometry import make_tool_down_pose
+from executive.cells.sim.tool import TOUCH_DISTANCE, SuctionTool
+from executive.cells.sim.world import World, name_load
+from executive.errors import Blocked, InputError, Unreachable
+from executive.geometry import Pose, make_tool_down_pose
 from executive.manipulation.tool_goals import make_object_goal, make_slot_goal
 from executive.motion.arms import build_planner
 from executive.motion.planner import Planner
+from tests.benchmarks.report import Figures, show_progress
 
 MAX_TRIES = 50
 """Maximum number of scenes drawn to find one whose object can be held and reached."""
@@ -169,3 +176,181 @@ class SceneGenerator:
         if force < tool.min_force:
             raise Unreachable(f"no seal holds the {self._world.labels[body]} at its middle")
         return surface, force
+
+
+MAX_MEASURED_DISTANCE = 0.03
+"""Largest distance that is measured [m]."""
+CLEARANCE_PERIOD_STEPS = 4
+"""Control steps between two measurements of the distances."""
+SETTLE_STEPS = 24
+"""Steps in which a seal forms, as in the skill that grasps."""
+
+
+def execute_pairs(cell: CellConfig, pairs: int, seed: int) -> Figures:
+    """Execute random pairs in the simulated world and return their figures; a released object is removed.
+
+    Raises:
+        InputError: No random scene of the cell has an object that can be picked and placed.
+        Fault: The arm left its path.
+    """
+    with open_world(cell) as (world, planner):
+        execution = _Execution(cell, world, planner, seed)
+        for _ in show_progress(range(pairs), "executed"):
+            execution.execute_pair()
+        return execution.collect_figures()
+
+
+class ClearanceMonitor:
+    """Tracks the smallest clearance of the arm and its load over all measurements.
+
+    Two things that were nearer than the margin when a motion began (two objects side by side, one of them
+    now in the tool, or the load and the table) do not count in that motion.
+
+    Args:
+        world: The simulated world.
+        margin: Distance to be kept [m].
+
+    Attributes:
+        min_distance: The smallest distance so far [m].
+        nearest: The two things with that distance.
+    """
+
+    def __init__(self, world: World, margin: float) -> None:
+        self._world = world
+        self._margin = margin
+        self._ignored_pairs: set[str] = set()
+        self._target_body: int | None = None
+        self.min_distance = math.inf
+        self.nearest = "nothing"
+
+    def begin(self, held: int | None, target_body: int | None = None) -> None:
+        """Begin a motion with the body `held` in the tool; contact with the body `target_body` is allowed."""
+        self._target_body = target_body
+        self._ignored_pairs = {
+            pair for distance, pair in self._measure_pairs(held) if distance < self._margin
+        }
+
+    def measure(self, held: int | None) -> None:
+        """Measure the distances of this moment; `held` is the body in the tool."""
+        for distance, pair in self._measure_pairs(held):
+            if pair not in self._ignored_pairs and distance < self.min_distance:
+                self.min_distance, self.nearest = distance, pair
+
+    def _measure_pairs(self, held: int | None) -> Iterator[tuple[float, str]]:
+        world, near = self._world, self._world.client.getClosestPoints
+        bodies = (world.table, *world.bin_bodies.values(), *world.labels)
+        things = [body for body in bodies if body not in (held, self._target_body)]
+        load = "" if held is None else name_load(world.labels[held])
+        for body in things:
+            for point in near(world.arm, body, MAX_MEASURED_DISTANCE):
+                if point[3] >= world.robot.first_collision_link:
+                    yield point[8], f"{world.name_link(point[3])} - {world.name_body(body)}"
+            for point in near(held, body, MAX_MEASURED_DISTANCE) if load else ():
+                yield point[8], f"{load} - {world.name_body(body)}"
+        for one, other in world.robot.self_collision_pairs:
+            for point in near(world.arm, world.arm, MAX_MEASURED_DISTANCE, linkIndexA=one, linkIndexB=other):
+                yield point[8], f"{world.name_link(one)} - {world.name_link(other)}"
+        for point in near(held, world.arm, MAX_MEASURED_DISTANCE) if load else ():
+            if world.robot.first_collision_link <= point[4] < world.robot.wrist_link:
+                yield point[8], f"{load} - {world.name_link(point[4])}"
+
+
+class _Execution:
+    """An arm and its tool in a simulated world, and the figures so far."""
+
+    def __init__(self, cell: CellConfig, world: World, planner: Planner, seed: int) -> None:
+        self._world = world
+        self._tool = SuctionTool(world, cell.tool)
+        self._arm = SimArm(
+            world, planner, cell, StepClock(lambda: world.step_count * STEP), lambda: self._tool.held_body
+        )
+        self._scenes = SceneGenerator(cell, planner, world, seed)
+        self._margin = cell.motion.margin
+        self._clearance_monitor = ClearanceMonitor(world, self._margin)
+        self._slip = 0.0
+        self._missed = self._dropped = 0
+        self._steps_per_pair: list[int] = []
+        self._failures: list[str] = []
+
+    def execute_pair(self) -> None:
+        """Fetch one more object and carry it into a bin."""
+        scene = self._scenes.draw()
+        try:
+            self._fetch_and_carry(scene)
+        except (Blocked, Unreachable) as error:
+            self._failures.append(f"not planned: {error}")
+        self._tool.open()
+
+    def collect_figures(self) -> Figures:
+        """Return the figures of all pairs."""
+        return {
+            "executed_pairs": len(self._steps_per_pair),
+            "executed_time_s": float(np.mean(self._steps_per_pair)) * STEP if self._steps_per_pair else None,
+            "margin_mm": 1e3 * self._margin,
+            "clearance_mm": 1e3 * self._clearance_monitor.min_distance
+            if math.isfinite(self._clearance_monitor.min_distance)
+            else None,
+            "nearest": self._clearance_monitor.nearest,
+            "slip_mm": 1e3 * self._slip,
+            "missed": self._missed,
+            "dropped": self._dropped,
+            "problems": [*self._failures, *["an object was dropped"] * self._dropped],
+        }
+
+    def _fetch_and_carry(self, scene: Scene) -> None:
+        fetching = self._move(scene.approach, scene.fetch_task, scene, lambda: self._tool.touching)
+        self._tool.close()
+        for _ in range(SETTLE_STEPS):
+            self._step()
+        if not self._tool.holding:
+            self._missed += 1
+            # The arm leaves the table, because the next scene may have an object where the tool is now.
+            self._move(scene.drop, scene.fetch_task, scene, lambda: False)
+            return
+        carrying = self._move(
+            scene.drop, scene.make_carry_task(self._tool.holding_force), scene, lambda: not self._tool.holding
+        )
+        if self._tool.holding:
+            self._steps_per_pair.append(fetching + carrying)
+        else:
+            self._dropped += 1
+
+    def _move(self, goal: Goal, task: Task, scene: Scene, until: Callable[[], bool]) -> int:
+        """Make a motion, braking as soon as `until` holds, and return the number of its steps.
+
+        Raises:
+            Unreachable, Blocked: There is no motion.
+            Fault: The arm left its path.
+        """
+        arm = self._arm
+        motion = arm.plan(goal, task).result()
+        grasp, steps, is_braking = self._locate_in_tool(), 0, False
+        self._clearance_monitor.begin(self._tool.held_body, scene.body)
+        arm.start(motion)
+        while not arm.at_rest:
+            if not is_braking and until():
+                arm.stop()
+                is_braking = True
+            self._step()
+            steps += 1
+            if steps % CLEARANCE_PERIOD_STEPS == 0:
+                self._measure(grasp)
+        if arm.collision is not None:
+            self._failures.append(f"contact: {arm.collision}")
+        return steps
+
+    def _measure(self, grasp: Pose | None) -> None:
+        self._clearance_monitor.measure(self._tool.held_body)
+        now = self._locate_in_tool()
+        if grasp is not None and now is not None:
+            self._slip = max(self._slip, float(np.linalg.norm(now.position - grasp.position)))
+
+    def _locate_in_tool(self) -> Pose | None:
+        """Return the pose of the held object in the tool's frame, or None."""
+        held, world = self._tool.held_body, self._world
+        return None if held is None else world.get_tool_pose().inverse() @ world.get_object_pose(held)
+
+    def _step(self) -> None:
+        self._arm.advance()
+        self._world.step()
+        self._tool.advance()

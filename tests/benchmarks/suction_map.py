@@ -11,16 +11,14 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-import click
 import numpy as np
 
 from executive.cell.config import CellConfig, ToolConfig
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.suction import compute_breakaway_force
-from executive.cells.sim.suction import measure_contact as measure_seal
+from executive.cells.sim.suction import compute_breakaway_force, measure_contact
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
-from tests.benchmarks.report import CELL_OPTIONS, Figures, run_command
+from tests.benchmarks.report import Figures, run_command
 
 SHIPPED_MAP = Path(__file__).with_name("suction_map.csv")
 """File with the map of the cell `overhead`."""
@@ -36,7 +34,7 @@ SETTLE_STEPS = 120
 """Physics steps in which an object comes to rest."""
 
 
-def measure_contact(cell: CellConfig, out: Path | None = None) -> Figures:
+def measure(cell: CellConfig, out: Path | None = None) -> Figures:
     """Measure the suction of cups on the objects of CELL, and write all rows to `--out` as CSV."""
     rows = measure_map(cell)
     if out is not None:
@@ -122,10 +120,10 @@ def _measure_places(world: World, body: int, tool: ToolConfig, places: Iterable[
     for place in places:
         x, y, _ = X_WO.apply([*place, 0.0])
         # Twice: Bullet's ray against a sphere errs by up to 0.8 mm over 0.2 m, by 0.02 mm over 5 mm.
-        seal = measure_seal(world.client, make_tool_down_pose([x, y, top]), {body}, tool.cup_radius, top)
+        seal = measure_contact(world.client, make_tool_down_pose([x, y, top]), {body}, tool.cup_radius, top)
         if seal is not None:
             landed = make_tool_down_pose([x, y, top - seal.distance])
-            seal = measure_seal(world.client, landed, {body}, tool.cup_radius, tool.reach)
+            seal = measure_contact(world.client, landed, {body}, tool.cup_radius, tool.reach)
         gaps.append(math.inf if seal is None else seal.gap)
         tilts.append(math.pi / 2 if seal is None else seal.tilt)
         forces.append(compute_breakaway_force(seal, tool))
@@ -149,8 +147,4 @@ def _quantiles(name: str, values: Sequence[float], digits: int) -> Figures:
 
 
 if __name__ == "__main__":
-    run_command(
-        measure_contact,
-        *CELL_OPTIONS[:1],
-        click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV file to write."),
-    )
+    run_command(measure)
