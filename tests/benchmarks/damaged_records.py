@@ -12,8 +12,8 @@ import math
 import os
 import shutil
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
@@ -21,21 +21,21 @@ from typing import Any
 
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cells.sim.command_log import is_command_log
-from executive.errors import ExecutiveError, InputError
-from executive.events import NodeEnded, RunResumed, TimedEvent
+from executive.cli.main import main
+from executive.errors import InputError
+from executive.events import NodeEnded, TimedEvent
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.replayed_run import replay_and_compare, replay_run
+from executive.record.replayed_run import replay_and_compare
 from executive.record.result import Result
 from executive.record.resume import resume_run
 from executive.record.run_directory import LATEST_LINK, RunDirectory, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
-from executive.view.report.page import write_report
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.hostile_input import find_problems, run_in_child, summarize
 from tests.benchmarks.kills import RESUME_TIMEOUT, run_and_kill
-from tests.benchmarks.report import Figures, describe, run_command, show_progress
+from tests.benchmarks.report import Figures, SilentView, describe, run_command, show_progress
 
 MIN_AGREEMENT = 0.9
 """Smallest share of resumed runs in which ledger and audit have to agree."""
@@ -117,29 +117,8 @@ def _damage_bytes(rng: Random, content: bytes) -> bytes:
     return content[:start] + changed + content[start + len(part) :]
 
 
-class Reached(BaseException):
-    """Ends a resumed run at its first live control step."""
-
-
-class StopAtFirstTick:
-    """View that ends a resumed run as soon as its cell has taken over."""
-
-    def open(self, run: object) -> None:
-        """Do nothing."""
-
-    def __call__(self, timed: TimedEvent) -> None:
-        if isinstance(timed.event, RunResumed):
-            raise Reached
-
-    def close(self) -> None:
-        """Do nothing."""
-
-    def show_message(self, message: str) -> None:
-        """Do nothing."""
-
-
 @dataclass
-class Snapshots(StopAtFirstTick):
+class Snapshots(SilentView):
     """View that keeps the log of the world and the length of the journal at the end of each skill.
 
     Attributes:
@@ -178,18 +157,16 @@ def measure(
         whole = find_run(LATEST_LINK, base / "whole")
         rows = []
         problems = []
-        commands = {"report": _report, "replay": _replay, "resume": _resume_to_first_tick}
-        for name, command in commands.items():
+        commands = {"report": ["report"], "replay": ["replay"], "resume": ["run", "--quiet", "--resume"]}
+        for name, words in commands.items():
             results = []
             for seed in show_progress(range(reports if name == "report" else others), name):
                 path = _copy_run(whole, base / "copy")
                 damage = damage_run(Random(seed), path)
                 with TemporaryDirectory() as logs:
-                    # The default binds the present values.
-                    results.append(
-                        run_in_child(lambda act=command, run=path: _run(act, subject, run), base, Path(logs))
-                    )
-                problems += [f"{name} {seed}, {damage}: {one}" for one in find_problems([name], results[-1])]
+                    act = partial(main, [*words, str(path)])
+                    results.append(run_in_child(act, base, Path(logs)))
+                problems += [f"{name} {seed}, {damage}: {one}" for one in find_problems(words, results[-1])]
                 shutil.rmtree(path)
             rows.append({"command": name, **summarize(results)})
         groups = {
@@ -226,40 +203,6 @@ def _copy_run(source: Path, target: Path) -> Path:
     if (source / "frames").is_dir():
         shutil.copytree(source / "frames", target / "frames", copy_function=os.link)
     return target
-
-
-def _run(command: Callable[[MissionUnderTest, Path], str], subject: MissionUnderTest, path: Path) -> None:
-    """Run a command, print the difference or error that it finds, and exit as `executive` does."""
-    code = 0
-    try:
-        if message := command(subject, path):
-            code = 1
-    except ExecutiveError as error:
-        code = error.exit_code
-        message = str(error)
-    except Reached:
-        message = ""
-    except Exception as error:
-        code = 3
-        message = f"internal error: {type(error).__name__}: {error}"
-    print(message, flush=True)
-    raise SystemExit(int(code))
-
-
-def _report(subject: MissionUnderTest, path: Path) -> str:
-    read_journal(path / "journal.jsonl")
-    write_report(path)
-    return ""
-
-
-def _replay(subject: MissionUnderTest, path: Path) -> str:
-    return replay_run(path, read_journal(path / "journal.jsonl"), subject.loaded.skills).difference
-
-
-def _resume_to_first_tick(subject: MissionUnderTest, path: Path) -> str:
-    options = RunOptions(subject.seed, make_cell=subject.make_cell)
-    resume_run(path, subject.loaded.skills, options, RecordOptions([StopAtFirstTick()], saves_pictures=False))
-    return ""
 
 
 def _resume_truncated(

@@ -16,12 +16,11 @@ from py_trees.trees import BehaviourTree
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
-from executive.events import TimedEvent
 from executive.geometry import Array
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
 from executive.run.run import Run
-from tests.benchmarks.report import Figures, describe, run_command, show_progress
+from tests.benchmarks.report import Figures, SilentView, describe, run_command, show_progress
 
 MAX_STEP_TIME = 0.005
 """Limit of the wall time of a control step [s]."""
@@ -31,7 +30,7 @@ EXCLUDED_ACCESSES = ("arm.plan", "camera.", "detector.", "request.", "plan.")
 """Beginnings of the names of the accesses whose times do not count."""
 
 
-class StepTimer:
+class StepTimer(SilentView):
     """View of a run that measures its control steps.
 
     Attributes:
@@ -46,15 +45,6 @@ class StepTimer:
     def open(self, run: Run) -> None:
         """Measure the time between the starts of all ticks."""
         run.behaviour_tree.add_pre_tick_handler(self._begin_step)
-
-    def __call__(self, timed: TimedEvent) -> None:
-        """Ignore an event."""
-
-    def close(self) -> None:
-        """Do nothing."""
-
-    def show_message(self, message: str) -> None:
-        """Ignore a message."""
 
     def intercept(self, access: Access) -> Any:
         """Execute an access to the cell, and exclude its time if it plans, captures or detects."""

@@ -126,8 +126,7 @@ class SceneGenerator:
                 continue
             return scene
         raise InputError(
-            f"none of {MAX_TRIES} random scenes of cell {self._cell.cell} has an object that can be picked "
-            "and placed; move its bins or its table nearer to the arm"
+            f"none of {MAX_TRIES} scenes of cell {self._cell.cell} has an object to pick and place"
         )
 
     def _make_scene(self, bodies: tuple[int, ...]) -> Scene:
@@ -187,61 +186,116 @@ SETTLE_STEPS = 24
 
 
 def execute_pairs(cell: CellConfig, pairs: int, seed: int) -> Figures:
-    """Execute random pairs in the simulated world and return their figures; a released object is removed.
-
-    Raises:
-        InputError: No random scene of the cell has an object that can be picked and placed.
-        Fault: The arm left its path.
-    """
+    """Execute random pairs in the simulated world and return their figures; a released object is removed."""
     with open_world(cell) as (world, planner):
-        execution = _Execution(cell, world, planner, seed)
+        execution = _Execution(cell, world, planner)
+        scenes = SceneGenerator(cell, planner, world, seed)
         for _ in show_progress(range(pairs), "executed"):
-            execution.execute_pair()
-        return execution.collect_figures()
+            execution.execute_pair(scenes.draw())
+    distance, nearest = execution.clearance
+    return {
+        "executed_pairs": len(execution.steps_per_pair),
+        "executed_time_s": float(np.mean(execution.steps_per_pair or [math.nan])) * STEP,
+        "margin_mm": 1e3 * cell.motion.margin,
+        "clearance_mm": 1e3 * distance,
+        "nearest": nearest,
+        "slip_mm": 1e3 * execution.slip,
+        "missed": execution.missed_count,
+        "problems": execution.problems,
+    }
 
 
-class ClearanceMonitor:
-    """Tracks the smallest clearance of the arm and its load over all measurements.
+class _Execution:
+    """An arm and its tool in a simulated world, and the figures so far.
 
     Two things that were nearer than the margin when a motion began (two objects side by side, one of them
     now in the tool, or the load and the table) do not count in that motion.
 
-    Args:
-        world: The simulated world.
-        margin: Distance to be kept [m].
-
     Attributes:
-        min_distance: The smallest distance so far [m].
-        nearest: The two things with that distance.
+        clearance: Smallest distance of the arm and its load in all measurements [m], and the two things.
+        slip: Largest motion of a held object in the tool [m].
+        missed_count: Number of objects that the tool did not hold.
+        steps_per_pair: Number of control steps of each pair.
+        problems: Motions without a plan, collisions and dropped objects.
     """
 
-    def __init__(self, world: World, margin: float) -> None:
+    def __init__(self, cell: CellConfig, world: World, planner: Planner) -> None:
+        clock = StepClock(lambda: world.step_count * STEP)
         self._world = world
-        self._margin = margin
-        self._ignored_pairs: set[str] = set()
-        self._target_body: int | None = None
-        self.min_distance = math.inf
-        self.nearest = "nothing"
+        self._tool = SuctionTool(world, cell.tool)
+        self._arm = SimArm(world, planner, cell, clock, lambda: self._tool.held_body)
+        self._margin = cell.motion.margin
+        self.clearance = (math.inf, "nothing")
+        self.slip = 0.0
+        self.missed_count = 0
+        self.steps_per_pair: list[int] = []
+        self.problems: list[str] = []
 
-    def begin(self, held: int | None, target_body: int | None = None) -> None:
-        """Begin a motion with the body `held` in the tool; contact with the body `target_body` is allowed."""
-        self._target_body = target_body
-        self._ignored_pairs = {
-            pair for distance, pair in self._measure_pairs(held) if distance < self._margin
-        }
+    def execute_pair(self, scene: Scene) -> None:
+        """Fetch one more object and carry it into a bin."""
+        try:
+            self._fetch_and_carry(scene)
+        except (Blocked, Unreachable) as error:
+            self.problems.append(f"not planned: {error}")
+        self._tool.open()
 
-    def measure(self, held: int | None) -> None:
-        """Measure the distances of this moment; `held` is the body in the tool."""
-        for distance, pair in self._measure_pairs(held):
-            if pair not in self._ignored_pairs and distance < self.min_distance:
-                self.min_distance, self.nearest = distance, pair
+    def _fetch_and_carry(self, scene: Scene) -> None:
+        tool = self._tool
+        fetching = self._move(scene.approach, scene.fetch_task, scene, lambda: tool.touching)
+        tool.close()
+        for _ in range(SETTLE_STEPS):
+            self._step()
+        if not tool.holding:
+            self.missed_count += 1
+            # The arm leaves the table, because the next scene may have an object where the tool is now.
+            self._move(scene.drop, scene.fetch_task, scene, lambda: False)
+            return
+        task = scene.make_carry_task(tool.holding_force)
+        carrying = self._move(scene.drop, task, scene, lambda: not tool.holding)
+        if tool.holding:
+            self.steps_per_pair.append(fetching + carrying)
+        else:
+            self.problems.append("an object was dropped")
 
-    def _measure_pairs(self, held: int | None) -> Iterator[tuple[float, str]]:
-        world, near = self._world, self._world.client.getClosestPoints
-        bodies = (world.table, *world.bin_bodies.values(), *world.labels)
-        things = [body for body in bodies if body not in (held, self._target_body)]
+    def _move(self, goal: Goal, task: Task, scene: Scene, until: Callable[[], bool]) -> int:
+        """Make a motion, braking as soon as `until` holds, and return the number of its steps.
+
+        Raises:
+            Unreachable, Blocked: There is no motion.
+            Fault: The arm left its path.
+        """
+        arm = self._arm
+        motion = arm.plan(goal, task).result()
+        grasp = self._locate_in_tool()
+        steps = 0
+        is_braking = False
+        ignored = {pair for distance, pair in self._measure_distances(scene.body) if distance < self._margin}
+        arm.start(motion)
+        while not arm.at_rest:
+            if not is_braking and until():
+                arm.stop()
+                is_braking = True
+            self._step()
+            steps += 1
+            if steps % CLEARANCE_PERIOD_STEPS == 0:
+                distances = self._measure_distances(scene.body)
+                self.clearance = min(self.clearance, *(one for one in distances if one[1] not in ignored))
+                now = self._locate_in_tool()
+                if grasp is not None and now is not None:
+                    self.slip = max(self.slip, float(np.linalg.norm(now.position - grasp.position)))
+        if arm.collision is not None:
+            self.problems.append(f"contact: {arm.collision}")
+        return steps
+
+    def _measure_distances(self, target_body: int) -> Iterator[tuple[float, str]]:
+        """Yield the distance [m] and the names of two near things; contact with the target is allowed."""
+        world = self._world
+        near = world.client.getClosestPoints
+        held = self._tool.held_body
         load = "" if held is None else name_load(world.labels[held])
-        for body in things:
+        for body in (world.table, *world.bin_bodies.values(), *world.labels):
+            if body in (held, target_body):
+                continue
             for point in near(world.arm, body, MAX_MEASURED_DISTANCE):
                 if point[3] >= world.robot.first_collision_link:
                     yield point[8], f"{world.name_link(point[3])} - {world.name_body(body)}"
@@ -254,100 +308,10 @@ class ClearanceMonitor:
             if world.robot.first_collision_link <= point[4] < world.robot.wrist_link:
                 yield point[8], f"{load} - {world.name_link(point[4])}"
 
-
-class _Execution:
-    """An arm and its tool in a simulated world, and the figures so far."""
-
-    def __init__(self, cell: CellConfig, world: World, planner: Planner, seed: int) -> None:
-        self._world = world
-        self._tool = SuctionTool(world, cell.tool)
-        self._arm = SimArm(
-            world, planner, cell, StepClock(lambda: world.step_count * STEP), lambda: self._tool.held_body
-        )
-        self._scenes = SceneGenerator(cell, planner, world, seed)
-        self._margin = cell.motion.margin
-        self._clearance_monitor = ClearanceMonitor(world, self._margin)
-        self._slip = 0.0
-        self._missed = self._dropped = 0
-        self._steps_per_pair: list[int] = []
-        self._failures: list[str] = []
-
-    def execute_pair(self) -> None:
-        """Fetch one more object and carry it into a bin."""
-        scene = self._scenes.draw()
-        try:
-            self._fetch_and_carry(scene)
-        except (Blocked, Unreachable) as error:
-            self._failures.append(f"not planned: {error}")
-        self._tool.open()
-
-    def collect_figures(self) -> Figures:
-        """Return the figures of all pairs."""
-        return {
-            "executed_pairs": len(self._steps_per_pair),
-            "executed_time_s": float(np.mean(self._steps_per_pair)) * STEP if self._steps_per_pair else None,
-            "margin_mm": 1e3 * self._margin,
-            "clearance_mm": 1e3 * self._clearance_monitor.min_distance
-            if math.isfinite(self._clearance_monitor.min_distance)
-            else None,
-            "nearest": self._clearance_monitor.nearest,
-            "slip_mm": 1e3 * self._slip,
-            "missed": self._missed,
-            "dropped": self._dropped,
-            "problems": [*self._failures, *["an object was dropped"] * self._dropped],
-        }
-
-    def _fetch_and_carry(self, scene: Scene) -> None:
-        fetching = self._move(scene.approach, scene.fetch_task, scene, lambda: self._tool.touching)
-        self._tool.close()
-        for _ in range(SETTLE_STEPS):
-            self._step()
-        if not self._tool.holding:
-            self._missed += 1
-            # The arm leaves the table, because the next scene may have an object where the tool is now.
-            self._move(scene.drop, scene.fetch_task, scene, lambda: False)
-            return
-        carrying = self._move(
-            scene.drop, scene.make_carry_task(self._tool.holding_force), scene, lambda: not self._tool.holding
-        )
-        if self._tool.holding:
-            self._steps_per_pair.append(fetching + carrying)
-        else:
-            self._dropped += 1
-
-    def _move(self, goal: Goal, task: Task, scene: Scene, until: Callable[[], bool]) -> int:
-        """Make a motion, braking as soon as `until` holds, and return the number of its steps.
-
-        Raises:
-            Unreachable, Blocked: There is no motion.
-            Fault: The arm left its path.
-        """
-        arm = self._arm
-        motion = arm.plan(goal, task).result()
-        grasp, steps, is_braking = self._locate_in_tool(), 0, False
-        self._clearance_monitor.begin(self._tool.held_body, scene.body)
-        arm.start(motion)
-        while not arm.at_rest:
-            if not is_braking and until():
-                arm.stop()
-                is_braking = True
-            self._step()
-            steps += 1
-            if steps % CLEARANCE_PERIOD_STEPS == 0:
-                self._measure(grasp)
-        if arm.collision is not None:
-            self._failures.append(f"contact: {arm.collision}")
-        return steps
-
-    def _measure(self, grasp: Pose | None) -> None:
-        self._clearance_monitor.measure(self._tool.held_body)
-        now = self._locate_in_tool()
-        if grasp is not None and now is not None:
-            self._slip = max(self._slip, float(np.linalg.norm(now.position - grasp.position)))
-
     def _locate_in_tool(self) -> Pose | None:
         """Return the pose of the held object in the tool's frame, or None."""
-        held, world = self._tool.held_body, self._world
+        held = self._tool.held_body
+        world = self._world
         return None if held is None else world.get_tool_pose().inverse() @ world.get_object_pose(held)
 
     def _step(self) -> None:

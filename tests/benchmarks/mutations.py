@@ -21,6 +21,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from itertools import accumulate
 from pathlib import Path
 from queue import Queue
 
@@ -87,9 +88,7 @@ class Mutation:
 def find_mutations(path: Path, source: str) -> Iterator[Mutation]:
     """Yield every mutation of the four kinds in one module; text, messages and imports are left unchanged."""
     lines = source.encode().splitlines(keepends=True)
-    starts = [0]
-    for line in lines:
-        starts.append(starts[-1] + len(line))
+    starts = [0, *accumulate(map(len, lines))]
     tree = ast.parse(source)
     functions = _name_functions(tree)
 
@@ -186,10 +185,8 @@ def find_again(former: Mutation, mutations: Sequence[Mutation]) -> Mutation | No
     The file may have another name, then the class, then the line breaks of the statement.
     """
     equal = [one for one in mutations if _get_change(one) == _get_change(former)]
-    same_text = [one for one in equal if one.text == former.text]
-    same_function = [one for one in same_text if one.function == former.function]
-    same_file = [one for one in same_function if one.path == former.path]
-    for found in (same_file, same_function, same_text, equal):
+    for names in (("text", "function", "path"), ("text", "function"), ("text",), ()):
+        found = [one for one in equal if all(getattr(one, name) == getattr(former, name) for name in names)]
         if found and len({(one.path, one.function) for one in found}) == 1:
             return min(found, key=lambda one: abs(one.line - former.line))
     return None

@@ -34,8 +34,10 @@ from executive.cli.options import (
 )
 from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import ExecutiveError
+from executive.events import TimedEvent
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
+from executive.run.run import Run
 
 Figures = dict[str, Any]
 """Figures of a benchmark by name; a name ends with the unit."""
@@ -59,6 +61,22 @@ OPTION_TYPES: dict[str, Any] = {
     "Path": click.Path(path_type=Path, dir_okay=False),
 }
 """Types of the options that only one benchmark has, by the annotation of the parameter."""
+
+
+class SilentView:
+    """View of a run that shows nothing; subclasses observe the events."""
+
+    def open(self, run: Run) -> None:
+        """Do nothing."""
+
+    def __call__(self, timed: TimedEvent) -> None:
+        """Ignore an event."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+    def show_message(self, message: str) -> None:
+        """Ignore a message."""
 
 
 def run_command(measure: Callable[..., Figures]) -> None:

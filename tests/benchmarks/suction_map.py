@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,10 @@ def measure(cell: CellConfig, out: Path | None = None) -> Figures:
     """Measure the suction of cups on the objects of CELL, and write all rows to `--out` as CSV."""
     rows = measure_map(cell)
     if out is not None:
-        write_map(rows, out)
+        with out.open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
     # JSON has no word for infinity.
     plain = [{key: None if value == math.inf else value for key, value in row.items()} for row in rows]
     return {"cell": cell.cell, "map": plain}
@@ -52,8 +56,7 @@ def measure_map(
     Cups of all sizes have the vacuum (force per lip area) and the tolerances of the cell's tool.
     """
     rows = []
-    world = World(cell)
-    try:
+    with closing(World(cell)) as world:
         for label in cell.objects:
             places = {offset: list(_find_places(cell, label, offset)) for offset in offsets}
             body = world.add_object(label, _pose_on_table(cell, label), (1.0, 1.0, 1.0))
@@ -66,26 +69,14 @@ def measure_map(
                     key = {"label": label, "cup_radius": radius, "offset": offset}
                     rows.append({**key, **_measure_places(world, body, tool, places[offset])})
             world.remove_object(body)
-    finally:
-        world.close()
     return rows
 
 
-def write_map(rows: Sequence[Figures], path: Path) -> None:
-    """Write the rows as CSV with a header, in SI units."""
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-
-
 def read_map(path: Path = SHIPPED_MAP) -> list[Figures]:
-    """Return the rows of a file that `write_map` wrote."""
+    """Return the rows of a written map."""
     with path.open(newline="") as file:
-        return [
-            {key: text if key == "label" else float(text) for key, text in line.items()}
-            for line in csv.DictReader(file)
-        ]
+        lines = list(csv.DictReader(file))
+    return [{key: text if key == "label" else float(text) for key, text in line.items()} for line in lines]
 
 
 def _pose_on_table(cell: CellConfig, label: str) -> Pose:
@@ -127,23 +118,15 @@ def _measure_places(world: World, body: int, tool: ToolConfig, places: Iterable[
         gaps.append(math.inf if seal is None else seal.gap)
         tilts.append(math.pi / 2 if seal is None else seal.tilt)
         forces.append(compute_breakaway_force(seal, tool))
-    return {
-        "placements": len(gaps),
-        **_quantiles("gap", gaps, 6),
-        **_quantiles("tilt", tilts, 4),
-        "sealed": round(float(np.mean(np.array(forces) >= tool.min_force)), 4),
-        **_quantiles("force", forces, 3),
-    }
+    sealed = round(float(np.mean(np.array(forces) >= tool.min_force)), 4)
+    row = {"placements": len(gaps), **_quantiles("gap", gaps, 6), **_quantiles("tilt", tilts, 4)}
+    return {**row, "sealed": sealed, **_quantiles("force", forces, 3)}
 
 
 def _quantiles(name: str, values: Sequence[float], digits: int) -> Figures:
     """Return quantiles without interpolation, which fails next to infinite values."""
-    low, median, high = np.quantile(values, [0.1, 0.5, 0.9], method="lower").tolist()
-    return {
-        f"{name}_p10": round(low, digits),
-        f"{name}_median": round(median, digits),
-        f"{name}_p90": round(high, digits),
-    }
+    quantiles = np.quantile(values, [0.1, 0.5, 0.9], method="lower").round(digits).tolist()
+    return dict(zip((f"{name}_p10", f"{name}_median", f"{name}_p90"), quantiles, strict=True))
 
 
 if __name__ == "__main__":

@@ -87,10 +87,6 @@ def test_a_reason_and_a_number_of_iterations_end_the_loop_as_before(
     assert choices(events) == ["done"]
 
 
-def test_another_failure_is_passed_on(leaf: Any, counting_site: NodeContext, ticks: Any) -> None:
-    assert ticks(repeat(counting_site, leaf("A", "S", "broken"), placed=4)) == "RF"
-
-
 def test_details_name_the_limits(leaf: Any, counting_site: NodeContext) -> None:
     node = repeat(counting_site, leaf("A"), until=[("A", "lost")], placed=4, elapsed=1.5)
     assert node.detail == "until A.lost, placed: 4, elapsed: 1.5"

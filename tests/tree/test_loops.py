@@ -10,8 +10,8 @@ from py_trees.common import Status
 
 from executive.errors import InputError
 from executive.events import BranchChosen, NodeEnded
-from executive.tree.loops import GeneratorNode, NodeRun
 from executive.tree.keys import Child, key
+from executive.tree.loops import GeneratorNode, NodeRun
 
 
 def test_a_failed_condition_is_a_success_with_a_report(leaf: Any, site: Any, ticks: Any, events: Any) -> None:

@@ -21,10 +21,12 @@ from build_nodes import (
     while_loop,
 )
 from py_trees.behaviour import Behaviour
+from py_trees.common import Status
 from scripted_leaf import Leaf
 
 from executive.events import BranchChosen, Event
 from executive.tree.blackboard import Blackboard
+from executive.tree.halting import halt
 from executive.tree.loops import ForEach
 from executive.tree.try_catch import TryCatch
 
@@ -37,6 +39,7 @@ class Make:
     def __init__(self) -> None:
         self.log: list[str] = []
         self.choices: list[str] = []
+        self.leaves: list[Leaf] = []
         self.site = make_site("node", "", self._emit)
 
     def __call__(self, *texts: str) -> list[Leaf]:
@@ -44,7 +47,8 @@ class Make:
 
     def one(self, text: str) -> Leaf:
         name, _, scripts = text.partition(": ")
-        return Leaf(name, tuple(scripts.split(" | ")) if scripts else ("S",), self.log)
+        self.leaves.append(Leaf(name, tuple(scripts.split(" | ")) if scripts else ("S",), self.log))
+        return self.leaves[-1]
 
     def each(self, elements: list[Any], text: str) -> ForEach:
         return for_each(self.site, self.one(text), Blackboard(), "it", elements)
@@ -58,9 +62,16 @@ class Make:
             self.choices.append(f"{event.choice}, {event.reason}")
 
 
-@pytest.mark.parametrize(
-    ("build", "ticks", "order", "failure"),
-    [
+def tick_to_end(node: Behaviour) -> list[str]:
+    """Tick a node to its end, at most 12 times, and return its statuses."""
+    statuses: list[str] = []
+    while len(statuses) < 12 and statuses[-1:] in ([], ["RUNNING"]):
+        node.tick_once()
+        statuses.append(node.status.value)
+    return statuses
+
+
+CASES: list[tuple[Callable[[Make], Behaviour], str, str, str | None]] = [
         (lambda m: sequence(m.site, m("A: R S", "B", "C: R S")), "RRS", "A B C", None),
         (lambda m: sequence(m.site, m("A", "B: lost", "C")), "F", "A B", "B.lost"),
         (lambda m: sequence(m.site, m("A: lost | S")), "FS", "A A", None),
@@ -130,8 +141,10 @@ class Make:
         (lambda m: lead(m.site, m("A: R lost", "B: R R R S")), "RF", "A B -B", "A.lost"),
         (lambda m: lead(m.site, m("A: R R R S", "B: R S")), "RRRS", "A B", None),
         (lambda m: lead(m.site, m("A: R S", "B: R R R S")), "RSRS", "A B -B A B -B", None),
-    ],
-)  # fmt: skip
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("build", "ticks", "order", "failure"), CASES)
 def test_statuses_order_and_failure(
     build: Callable[[Make], Behaviour], ticks: str, order: str, failure: str | None
 ) -> None:
@@ -145,6 +158,24 @@ def test_statuses_order_and_failure(
         f"{name[1:]} halted" if name.startswith("-") else name for name in order.split()
     ]
     assert (str(node.failure) if node.failure else None) == failure
+
+
+@pytest.mark.parametrize("build", [case[0] for case in CASES])
+@pytest.mark.parametrize("halt_tick", [1, 2])
+def test_a_halted_node_ends_its_running_leaves_once_and_runs_again_as_a_fresh_one(
+    build: Callable[[Make], Behaviour], halt_tick: int
+) -> None:
+    make = Make()
+    node = build(make)
+    fresh = tick_to_end(build(Make()))
+    for _ in range(halt_tick):
+        node.tick_once()
+    running = [f"{leaf.name} halted" for leaf in make.leaves if leaf.status is Status.RUNNING]
+    make.log.clear()
+    assert (halt(node), sorted(make.log), halt(node)) == ([], sorted(running), [])
+    for leaf in make.leaves:
+        leaf.rewind()
+    assert tick_to_end(node) == fresh
 
 
 @pytest.mark.parametrize(
