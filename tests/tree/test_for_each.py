@@ -93,16 +93,6 @@ def test_the_variable_is_gone_however_it_ends(end: str, make: Any, scope: Blackb
     assert dict(scope) == {"other": 1}
 
 
-def test_a_loop_that_ended_does_not_touch_the_variable_again(
-    make: Any, scope: Blackboard, ticks: Any
-) -> None:
-    node = make(["a"])
-    ticks(node)
-    scope.update({"it": "somebody else's"})
-    node.stop()
-    assert scope["it"] == "somebody else's"
-
-
 def test_a_list_that_nothing_wrote_is_a_fault(make: Any, scope: Blackboard) -> None:
     scope.update({"targets": []})
     with pytest.raises(Fault) as caught:

@@ -12,10 +12,7 @@ from py_trees.composites import Selector
 from py_trees.trees import BehaviourTree
 from py_trees.visitors import VisitorBase
 
-from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault
-from executive.record.trace import Trace
-from executive.testing.run_mission import run_mission
 
 
 class Notes(VisitorBase):
@@ -70,17 +67,3 @@ def test_a_child_without_a_status_is_a_fault_under_visitors_too(leaf: Any, site:
     broken.update = lambda: None
     with pytest.raises(Fault, match="A was ticked but has no status"):
         list(sequence(site(), [broken]).tick())
-
-
-def put_a_duck(cell: FakeCell) -> None:
-    cell.world.objects.clear()
-    cell.world.put("duck", 0.5, 0.1)
-
-
-def test_visitors_change_no_decision_of_a_run() -> None:
-    traces = []
-    for visitors in ([Notes()], []):
-        trace = Trace()
-        run_mission("sort_overhead", visitors=visitors, observers=[trace], arrange=put_a_duck)
-        traces.append(trace.hexdigest())
-    assert traces[0] == traces[1]
