@@ -51,13 +51,6 @@ def list_choices(events: Any) -> list[str]:
     return [event.choice for event in events if isinstance(event, BranchChosen)]
 
 
-def test_a_text_names_the_variable_that_holds_the_list(
-    make: Any, scope: Blackboard, ticks: Any, used: Any
-) -> None:
-    scope.update({"todo": ("a", 2)})
-    assert (ticks(make("todo")), used) == ("RRS", ["a", 2])
-
-
 def test_the_list_is_the_one_of_the_start(make: Any, scope: Blackboard, ticks: Any, used: Any) -> None:
     todo = ["a", "b"]
     scope.update({"todo": todo})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from build_nodes import fallback, invert, sequence
+from build_nodes import fallback, sequence
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from scripted_leaf import Leaf
@@ -46,16 +46,6 @@ def test_children_that_finished_are_not_terminated_by_a_new_round_nor_by_a_halt(
     messages = [line for line in log if line.startswith("A: ")]
     # Its own end, once a round, and nothing else.
     assert messages == [f"A: INVALID to {status.value}", f"A: {status.value} to {status.value}"]
-
-
-def test_halting_does_not_reach_a_child_that_never_ran(leaf: Any, site: Any) -> None:
-    log: list[str] = []
-    never = Terminated("never", ("S",), log)
-    node = sequence(site(), [leaf("A", "R"), invert(site("invert"), never)])
-    node.tick_once()
-    halt(node)
-    node.stop(Status.INVALID)
-    assert log == []
 
 
 def test_the_old_status_of_an_unticked_child_has_no_effect_and_is_not_reported(

@@ -163,7 +163,6 @@ def test_a_failure_that_it_passes_on_is_explained(project: Path) -> None:
     ("source", "message"),
     [
         ("class Race:\n    pass\n", "is not a ControlNode subclass"),
-        ("import nothing_of_this_name\n", "cannot be loaded: ModuleNotFoundError"),
         (RACE.replace('keyword = "race"', 'keyword = "run"'), 'in lower case: "run"'),
         (RACE.replace("def compute_flow", "def flow"), "has no method compute_flow"),
         (RACE.replace("do: Children", "status: Children"), 'cannot have the key "status"'),
