@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import sys
@@ -55,24 +54,18 @@ def test_every_end_of_a_child_is_reported(function: Any, answer: tuple[Any, str]
     assert ForkRunner(0.3).call(function) == answer
 
 
-@pytest.mark.parametrize("words", [["--json"], ["--count", "3"]])
-def test_figures_are_a_table_or_json_and_problems_an_exit_code(
-    words: list[str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+def test_figures_are_a_table_and_problems_an_exit_code(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def measure(count: int = 2) -> report.Figures:
         return {"runs": count, "rows": [{"part": "a", "s": 0.123456}], "problems": ["bad", "bad"]}
 
-    monkeypatch.setattr(sys, "argv", ["benchmark", *words])
+    monkeypatch.setattr(sys, "argv", ["benchmark", "--count", "3"])
     with pytest.raises(SystemExit, match="1"):
         report.run_command(measure)
-    out = capfd.readouterr().out
-    if words == ["--json"]:
-        assert json.loads(out) == measure()
-    else:
-        lines = [line.split() for line in out.splitlines()]
-        assert all(
-            line in lines for line in (["runs", "3"], ["a", "0.1235"], ["problems", "2"], ["2", "x", "bad"])
-        )
+    lines = [line.split() for line in capfd.readouterr().out.splitlines()]
+    for line in (["runs", "3"], ["a", "0.1235"], ["problems", "2"], ["2", "x", "bad"]):
+        assert line in lines
 
 
 def test_halts_of_a_fake_cell_are_in_order_and_a_wrong_ledger_is_found() -> None:
@@ -124,7 +117,7 @@ def test_growth_is_found() -> None:
 
 
 def test_control_steps_and_ticks_are_measured(tmp_path: Path) -> None:
-    (row,) = longest_step.measure(load(), tmp_path, count=1)["runs"]
+    (row,) = longest_step.measure(load(**{"cell.table.objects": "[1, 1]"}), tmp_path, count=1)["runs"]
     assert row["steps"] > 100 and 0 < row["longest_cpu_ms"] <= row["longest_ms"] * 1.1
     assert 0 < tick.measure_ticks(10, blocks=3)["ratio"] <= tick.MAX_RATIO
     assert tick.measure_changes(10, 3, tmp_path / "ticks")["changes"] == 20
