@@ -179,6 +179,7 @@ def test_a_halted_node_ends_its_running_leaves_once_and_runs_again_as_a_fresh_on
     [
         (lambda m: fallback(m.site, m("A: lost", "B", "C")), ["choice 2 of 3, A.lost"]),
         (lambda m: m.caught("A: lost", (LOST, "B")), ["catch, A.lost"]),
+        (lambda m: succeed(m.site, m.one("A: lost")), ["succeed despite the failure, A.lost"]),
         (
             lambda m: retry(m.site, m.one("A: lost"), 3, [], m.one("B: broken")),
             ["attempt 2 of 3, A.lost", "give up: the recovery failed, B.broken"],
