@@ -9,10 +9,9 @@ from math import inf, isfinite
 from executive.skill import Seconds
 from executive.tree.failure import format_reasons
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, find_fixed_point, join_states
-from executive.tree.generator_node import NodeRun
 from executive.tree.inspection import Advice, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeySection, Reasons, key
-from executive.tree.loop import Loop
+from executive.tree.loops import Loop, NodeRun
 
 _GIVE_UP = "give up: the recovery failed"
 """Choice that a retry reports after a failure of its recovery."""

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from executive.tree.failure import Failure, Reason, format_reasons
 from executive.tree.flow import Flow, FlowFunction, FlowState, join_states
-from executive.tree.generator_node import GeneratorNode, NodeRun
 from executive.tree.inspection import Advice, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeySection, Reasons, key
+from executive.tree.loops import GeneratorNode, NodeRun
 
 
 class Catch(KeySection):

@@ -32,38 +32,25 @@ def count_code_lines(source: str) -> int:
 
 
 def _docstring_lines(tree: ast.Module) -> set[int]:
+    """Return the lines of all statements that are only a text: docstrings, also those below constants."""
     lines: set[int] = set()
     for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            strings = [one for one in node.body if _is_string(one)]
-        else:
-            continue
-        for one in strings:
-            lines.update(range(one.lineno, (one.end_lineno or one.lineno) + 1))
+        if isinstance(node, ast.Expr) and isinstance(getattr(node.value, "value", None), str):
+            lines.update(range(node.lineno, (node.end_lineno or node.lineno) + 1))
     return lines
 
 
-def _is_string(statement: ast.stmt) -> bool:
-    """Return True for a docstring of a module, class or function, and for one below a constant."""
-    return (
-        isinstance(statement, ast.Expr)
-        and isinstance(statement.value, ast.Constant)
-        and isinstance(statement.value.value, str)
-    )
-
-
 def main() -> None:
-    """Print the code lines of every package of `executive/` and `skills/`, and the lines of all tests."""
+    """Print the code lines of every package of `executive/` and `skills/`, and those of the tests."""
     sizes: Counter[str] = Counter()
-    for root in ("executive", "skills"):
-        for path in (ROOT / root).rglob("*.py"):
-            parts = path.relative_to(ROOT).parts
-            sizes["/".join(parts[:-1][:2])] += count_code_lines(path.read_text())
+    for path in [path for root in ("executive", "skills", "tests") for path in (ROOT / root).rglob("*.py")]:
+        parts = path.relative_to(ROOT).parts[:-1]
+        sizes["/".join(parts[:2])] += count_code_lines(path.read_text())
     for name, size in sorted(sizes.items()):
         print(f"{size:7,}  {name}")
-    print(f"{sum(sizes.values()):7,}  code lines of executive/ and skills/")
-    tests = sum(len(path.read_text().splitlines()) for path in (ROOT / "tests").rglob("*.py"))
-    print(f"{tests:7,}  lines of tests")
+    tests = sum(size for name, size in sizes.items() if name.startswith("tests"))
+    print(f"{sizes.total() - tests:7,}  code lines of executive/ and skills/")
+    print(f"{tests:7,}  code lines of tests/")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Damaged records of a run: each is read, replayed, resumed and filmed, or refused with a message.
+"""Damaged records of a run: each is read, replayed and resumed, or refused with a message.
 
 One run of a mission is recorded; all damaged records are copies of it. A copy is damaged at random; or its
 journal is cut off, while the world went on; or the run is killed, and the last blocks of its logs are
@@ -7,70 +7,118 @@ removed. Each command runs in a forked child.
 
 from __future__ import annotations
 
-import random
+import json
+import math
+import os
 import shutil
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from random import Random
 from tempfile import TemporaryDirectory
-
-import click
+from typing import Any
 
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cells.sim.command_log import is_command_log
-from executive.cli.options import runs_option
-from executive.errors import ExecutiveError, InputError
-from executive.events import NodeEnded, RunResumed, TimedEvent
+from executive.cli.main import main
+from executive.errors import InputError
+from executive.events import NodeEnded, TimedEvent
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.replayed_run import replay_and_compare, replay_run
+from executive.record.replayed_run import replay_and_compare
 from executive.record.result import Result
 from executive.record.resume import resume_run
 from executive.record.run_directory import LATEST_LINK, RunDirectory, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
-from executive.view.film.film import write_film
-from executive.view.film.formats import choose_format
-from executive.view.film.run_state import FilmSource
-from executive.view.report.page import write_report
-from tests.benchmarks.damage import BLOCK, copy_run, damage_run
 from tests.benchmarks.forks import ForkRunner
-from tests.benchmarks.hostile_input import CommandResult, find_problems, run_in_child
-from tests.benchmarks.kills import run_and_kill
-from tests.benchmarks.report import Figures, describe, run_mission_command, show_progress
+from tests.benchmarks.hostile_input import find_problems, run_in_child, summarize
+from tests.benchmarks.kills import RESUME_TIMEOUT, run_and_kill
+from tests.benchmarks.report import Figures, SilentView, describe, run_command, show_progress
 
-RESUME_TIMEOUT = 300.0
-"""Time that a child may take to resume a run [s]."""
 MIN_AGREEMENT = 0.9
 """Smallest share of resumed runs in which ledger and audit have to agree."""
 MAX_LOST_BLOCKS = 2
 """Largest number of blocks that are removed from the end of a log."""
+BLOCK = 4096
+"""Size of a block of a disk [bytes]."""
+ODD_VALUES = (
+    None, True, -1, 0, 7, 10**12, -0.5, 1e308, math.inf, "", "x", "\x1b[31m", "x" * 500, [], [1], ["x"], {},
+    {"a": 1},
+)  # fmt: skip
+"""Values that replace a value of an event."""
+OTHER_FILES = ("tree.json", "cell.yaml", "mission.yaml", "params.yaml", "result.json", "world.log", "frames")
+"""Files of a run directory besides its journal."""
 
 
-class Reached(BaseException):
-    """Ends a command at its first live control step, or at its first picture."""
+def damage_run(rng: Random, path: Path) -> str:
+    """Damage the journal of a run or, in one case of five, another file; return the damage in words."""
+    file = path / (rng.choice(OTHER_FILES) if rng.random() < 0.2 else "journal.jsonl")
+    if file.is_dir():
+        file = rng.choice([file, *sorted(file.iterdir())])
+    kind = rng.choice(("file", "bytes", "end"))
+    if file.name == "journal.jsonl":
+        kind = rng.choice(("value", "value", "value", "number", "number", "key", "line", "bytes", "end"))
+    if kind == "file" or not file.is_file():
+        shutil.rmtree(file, ignore_errors=True)
+        file.unlink(missing_ok=True)
+        return f"no {file.name}"
+    content = file.read_bytes()
+    if kind == "bytes":
+        content = _damage_bytes(rng, content)
+    elif kind == "end":
+        content = content[: rng.randrange(len(content) + 1)] + rng.choice((b"", bytes(BLOCK)))
+    else:
+        content = _damage_event(rng, content, kind)
+    # A picture is a link to the file of another copy of the run.
+    file.unlink()
+    file.write_bytes(content)
+    return f"{kind} in {file.name}"
 
 
-class StopAtFirstTick:
-    """View that ends a resumed run as soon as its cell has taken over."""
+def _damage_event(rng: Random, content: bytes, kind: str) -> bytes:
+    """Return a journal with another line, key, value or number in one event."""
+    lines = content.splitlines(keepends=True)
+    number = rng.randrange(len(lines))
+    line = lines[number]
+    if kind == "line":
+        lines[number] = rng.choice(
+            (b"", line * 2, rng.choice(lines), b"\n", b"null\n", b"[" * 9999, line[:-9] + b"\n")
+        )
+        return b"".join(lines)
+    event = json.loads(line)
+    if kind == "key":
+        key = rng.choice(list(event))
+        event[rng.choice((key + "s", "x", key.upper()))] = event.pop(key)
+    else:
+        places = [
+            (holder, key)
+            for holder, key in _list_places(event)
+            if kind == "value" or type(holder[key]) in (int, float)
+        ]
+        holder, key = rng.choice(places)
+        holder[key] = rng.choice([value for value in ODD_VALUES if kind == "value" or type(value) is int])
+    lines[number] = json.dumps(event).encode() + b"\n"
+    return b"".join(lines)
 
-    def open(self, run: object) -> None:
-        """Do nothing."""
 
-    def __call__(self, timed: TimedEvent) -> None:
-        if isinstance(timed.event, RunResumed):
-            raise Reached
+def _list_places(value: Any) -> list[tuple[Any, Any]]:
+    """Return the holder and the key of each value inside of `value`, at any depth."""
+    keys = list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    return [(value, key) for key in keys] + [place for key in keys for place in _list_places(value[key])]
 
-    def close(self) -> None:
-        """Do nothing."""
 
-    def show_message(self, message: str) -> None:
-        """Do nothing."""
+def _damage_bytes(rng: Random, content: bytes) -> bytes:
+    """Return content with some other bytes, with a part missing or repeated, or with a block of zeros."""
+    start = rng.randrange(max(len(content), 1))
+    part = content[start : start + rng.choice((1, 1, 20, BLOCK))]
+    changed = rng.choice((rng.randbytes(len(part)), b"", part * 2, bytes(len(part))))
+    return content[:start] + changed + content[start + len(part) :]
 
 
 @dataclass
-class Snapshots(StopAtFirstTick):
+class Snapshots(SilentView):
     """View that keeps the log of the world and the length of the journal at the end of each skill.
 
     Attributes:
@@ -90,22 +138,16 @@ class Snapshots(StopAtFirstTick):
             self.worlds.append(world.stat().st_size if is_command_log(world) else world.read_bytes())
             self.lengths.append(directory.journal.stat().st_size)
 
-    def restore(self, number: int, path: Path) -> None:
-        """Make the log of the world in a copy of the run directory what it was at a snapshot."""
-        world, kept = path / "world.log", self.worlds[number]
-        world.write_bytes(world.read_bytes()[:kept] if isinstance(kept, int) else kept)
-
 
 def measure(
     subject: MissionUnderTest,
     runs_folder: Path,
-    reports: int,
-    others: int,
-    films: int,
-    truncations: int,
-    kills: int,
+    reports: int = 1000,
+    others: int = 200,
+    truncations: int = 300,
+    kills: int = 100,
 ) -> Figures:
-    """Damage records of a run of MISSION, and read, replay, resume and film them."""
+    """Damage records of a run of MISSION, and read, replay and resume them."""
     runs_folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix=".damaged-", dir=runs_folder) as folder:
         base = Path(folder).resolve()  # The children have another working directory.
@@ -113,26 +155,27 @@ def measure(
         if snapshots is None:
             raise InputError(f"the run cannot be recorded: {problem}")
         whole = find_run(LATEST_LINK, base / "whole")
-        commands = {
-            "report": (reports, _report),
-            "replay": (others, lambda path: _replay(subject, path)),
-            "resume": (others, lambda path: _resume_to_first_tick(subject, path)),
-            "film": (films, _film_first_picture),
-        }
-        rows, problems = [], []
-        for name, (number, command) in commands.items():
+        rows = []
+        problems = []
+        commands = {"report": ["report"], "replay": ["replay"], "resume": ["run", "--quiet", "--resume"]}
+        for name, words in commands.items():
             results = []
-            for seed in show_progress(range(number), name):
-                result, damage = _run_on_damaged(command, whole, base, seed)
-                results.append(result)
-                problems += [f"{name} {seed}, {damage}: {found}" for found in find_problems([name], result)]
-            rows.append({"command": name, **_summarize(results)})
-        cut = [
-            _resume_truncated(subject, whole, base, snapshots, n)
-            for n in show_progress(range(truncations), "cut")
-        ]
-        killed = [_resume_killed(subject, base, n, snapshots) for n in show_progress(range(kills), "killed")]
-    groups = {"truncated journal": cut, "killed": killed}
+            for seed in show_progress(range(reports if name == "report" else others), name):
+                path = _copy_run(whole, base / "copy")
+                damage = damage_run(Random(seed), path)
+                with TemporaryDirectory() as logs:
+                    act = partial(main, [*words, str(path)])
+                    results.append(run_in_child(act, base, Path(logs)))
+                problems += [f"{name} {seed}, {damage}: {one}" for one in find_problems(words, results[-1])]
+                shutil.rmtree(path)
+            rows.append({"command": name, **summarize(results)})
+        groups = {
+            "truncated journal": [
+                _resume_truncated(subject, whole, base, snapshots, case)
+                for case in show_progress(range(truncations), "cut")
+            ],
+            "killed": [_resume_killed(subject, base, case) for case in show_progress(range(kills), "killed")],
+        }
     for name, done in groups.items():
         problems += [f"{name} {one['case']}: {problem}" for one in done for problem in one["problems"]]
         agreed = sum(one["agrees"] for one in done)
@@ -154,95 +197,44 @@ def _record_whole(subject: MissionUnderTest, runs: Path) -> Snapshots:
     return snapshots
 
 
-def _run_on_damaged(
-    command: Callable[[Path], None], whole: Path, base: Path, seed: int
-) -> tuple[CommandResult, str]:
-    """Run a command on a damaged copy of a run; return its result and the damage."""
-    path = copy_run(whole, base / "copy")
-    damage = damage_run(seed, path)
-
-    def act() -> None:
-        try:
-            command(path)
-        except ExecutiveError as error:
-            raise SystemExit(_tell(error.exit_code, str(error))) from error
-        except Reached:
-            pass
-        except Exception as error:
-            raise SystemExit(_tell(3, f"internal error: {type(error).__name__}: {error}")) from error
-        raise SystemExit(0)
-
-    with TemporaryDirectory() as logs:
-        result = run_in_child(act, base, Path(logs))
-    shutil.rmtree(path)
-    return result, damage
-
-
-def _tell(code: int, message: str) -> int:
-    """Print a message and return the exit code."""
-    print(message, flush=True)
-    return code
-
-
-def _report(path: Path) -> None:
-    read_journal(path / "journal.jsonl")
-    write_report(path)
-
-
-def _replay(subject: MissionUnderTest, path: Path) -> None:
-    if difference := replay_run(path, read_journal(path / "journal.jsonl"), subject.loaded.skills).difference:
-        raise SystemExit(_tell(1, difference))
-
-
-def _resume_to_first_tick(subject: MissionUnderTest, path: Path) -> None:
-    options = RunOptions(subject.seed, make_cell=subject.make_cell)
-    resume_run(path, subject.loaded.skills, options, RecordOptions([StopAtFirstTick()], saves_pictures=False))
-
-
-def _film_first_picture(path: Path) -> None:
-    def stop(done: int, number: int) -> None:
-        raise Reached
-
-    write_film(
-        FilmSource(RunDirectory(path)),
-        path / "film.mp4",
-        choose_format(None, False),
-        speed=1.0,
-        workers=1,
-        progress=stop,
-    )
+def _copy_run(source: Path, target: Path) -> Path:
+    """Copy a run directory, its pictures as links, and return the copy."""
+    shutil.copytree(source, target, ignore=shutil.ignore_patterns("frames"))
+    if (source / "frames").is_dir():
+        shutil.copytree(source / "frames", target / "frames", copy_function=os.link)
+    return target
 
 
 def _resume_truncated(
     subject: MissionUnderTest, whole: Path, base: Path, snapshots: Snapshots, case: int
 ) -> Figures:
     """Cut the journal off before a snapshot of the world, and resume the run."""
-    rng = random.Random(case)
+    rng = Random(case)
     number = rng.randrange(len(snapshots.lengths))
-    path = copy_run(whole, base / f"cut-{case}")
+    path = _copy_run(whole, base / f"cut-{case}")
     (path / "result.json").unlink()
-    snapshots.restore(number, path)
+    world = path / "world.log"
+    kept = snapshots.worlds[number]
+    world.write_bytes(world.read_bytes()[:kept] if isinstance(kept, int) else kept)
     length = rng.randrange(snapshots.lengths[number])
     _truncate(path / "journal.jsonl", length)
     return _resume(subject, path, f"{case}, journal cut at {length}, world at snapshot {number}")
 
 
-def _resume_killed(subject: MissionUnderTest, base: Path, case: int, snapshots: Snapshots) -> Figures:
+def _resume_killed(subject: MissionUnderTest, base: Path, case: int) -> Figures:
     """Kill a run, remove the last blocks of its journal and of a log of its world, and resume it."""
-    rng, runs = random.Random(case), base / f"killed-{case}"
+    rng = Random(case)
+    runs = base / f"killed-{case}"
     duration = 2.0
     while not run_and_kill(subject, subject.seed + case, runs, rng.uniform(0.0, duration)):
         duration *= 0.9
     path = find_run(LATEST_LINK, runs)
-    lost = []
-    for file in ("journal.jsonl", "world.log"):
-        if file == "journal.jsonl" or is_command_log(path / file):
-            size = (path / file).stat().st_size
-            kept = max(size - 1, 0) // BLOCK * BLOCK - BLOCK * rng.randrange(MAX_LOST_BLOCKS)
+    for file in (path / "journal.jsonl", path / "world.log"):
+        if file.name == "journal.jsonl" or is_command_log(file):
+            kept = (file.stat().st_size - 1) // BLOCK * BLOCK - BLOCK * rng.randrange(MAX_LOST_BLOCKS)
             # The header of the log of a world is on the disk before the run begins.
-            _truncate(path / file, max(kept, 0 if file == "journal.jsonl" else 40))
-            lost.append(f"{file} cut at {kept} of {size}")
-    return _resume(subject, path, f"{case}, {', '.join(lost)}")
+            _truncate(file, max(kept, 0 if file.name == "journal.jsonl" else 40))
+    return _resume(subject, path, str(case))
 
 
 def _truncate(file: Path, length: int) -> None:
@@ -259,19 +251,13 @@ def _resume(subject: MissionUnderTest, path: Path, case: str) -> Figures:
         except InputError as error:
             has_begun = "was interrupted before its start" not in str(error)
             return {"agrees": True, "status": "refused", "problems": [str(error)] if has_begun else []}
-        after = InputLog(read_journal(path / "journal.jsonl"))
         problems = find_wrong_claims(result)
+        after = InputLog(read_journal(path / "journal.jsonl"))
         if difference := replay_and_compare(subject.loaded, after, result.seed).difference:
             problems.append(f"the replay differs: {difference}")
-        return {
-            "agrees": not result.disagreement,
-            "status": result.status,
-            "problems": problems,
-        }
+        return {"agrees": not result.disagreement, "status": result.status, "problems": problems}
 
     figures, problem = ForkRunner(RESUME_TIMEOUT).call(resume)
-    if not (figures and figures["problems"]) and not problem:
-        shutil.rmtree(path)
     return {"case": case, **(figures or {"agrees": False, "status": "none", "problems": [problem]})}
 
 
@@ -281,24 +267,15 @@ def find_wrong_claims(result: Result) -> list[str]:
     Ledger and audit may disagree only if the run is incomplete, names items, and claims no placement that
     the audit did not find.
     """
-    ending = f"{result.status} {result.reason}: {result.message}"
+    ending = f"it ended with {result.status} {result.reason}: {result.message}"
     if result.status == "FAULT":
-        return [f"it ended with {ending}"]
+        return [ending]
     if not result.disagreement or result.audit is None:
         return []
     is_named = result.status == "INCOMPLETE" and "-" in result.message
     if is_named and result.items.placed <= result.audit.right:
         return []
-    return [f"it ended with {ending}; the ledger says {result.items}, the audit {result.audit}"]
-
-
-def _summarize(results: list[CommandResult]) -> Figures:
-    codes = Counter(result.exit_code for result in results)
-    return {
-        "records": len(results),
-        "exit codes": ", ".join(f"{number} x {code}" for code, number in sorted(codes.items())),
-        "max_cpu_time_s": max((result.cpu_time for result in results), default=0.0),
-    }
+    return [f"{ending}; the ledger says {result.items}, the audit {result.audit}"]
 
 
 def _count(done: list[Figures]) -> Figures:
@@ -307,26 +284,9 @@ def _count(done: list[Figures]) -> Figures:
         "runs": len(done),
         "agree": sum(one["agrees"] for one in done),
         "problems": sum(bool(one["problems"]) for one in done),
-        "statuses": ", ".join(f"{number} x {status}" for status, number in statuses.most_common()),
+        "statuses": ", ".join(f"{count} x {status}" for status, count in statuses.most_common()),
     }
 
 
 if __name__ == "__main__":
-    number = click.IntRange(min=0)
-    run_mission_command(
-        measure,
-        click.option(
-            "--reports", type=number, default=1000, show_default=True, help="Damaged records for `report`."
-        ),
-        click.option(
-            "--others", type=number, default=200, show_default=True, help="Those for `replay` and `--resume`."
-        ),
-        click.option("--films", type=number, default=200, show_default=True, help="Those for `film`."),
-        click.option(
-            "--truncations", type=number, default=300, show_default=True, help="Truncated journals."
-        ),
-        click.option(
-            "--kills", type=number, default=100, show_default=True, help="Killed runs with lost blocks."
-        ),
-        runs_option,
-    )
+    run_command(measure)

@@ -65,11 +65,10 @@ class ForkRunner:
     def call(self, function: Callable[[], Any]) -> tuple[Any, str]:
         """Call `function` in a child; return its result, or None and the reason why there is none."""
         answer = self.fork_and_wait()
-        if answer is None:
-            try:
-                result = function(), ""
-            except BaseException as error:
-                result = None, f"{type(error).__name__}: {error}"
-            self.send_and_exit(result)
-        sent, problem = answer
-        return sent or (None, problem)
+        if answer is not None:
+            result, problem = answer
+            return result or (None, problem)
+        try:
+            self.send_and_exit((function(), ""))
+        except BaseException as error:
+            self.send_and_exit((None, f"{type(error).__name__}: {error}"))

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from executive.cell.bins import BIN_THICKNESS
-from executive.cell.config import CellConfig
-from executive.cell.protocols import Routes
-from executive.cell.workcell import CellOptions
 from executive.cells.ground_truth import UNKNOWN_LABEL, FinalObject, count_outcomes
 from executive.cells.sim.cell import SimCell, list_final_objects
-from executive.events import Emit, ItemChanged
+from executive.events import ItemChanged
 from executive.ledger.item import State
 from executive.mission.load import load_mission
 from executive.perception.detectors.requests import ClosableDetector
@@ -23,13 +19,15 @@ from executive.perception.envelope.rated_detectors import build_rated_detectors
 from executive.plugins import load_cell_kind, load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.result import find_exit_code
 from executive.run.assembly import RunOptions
 from tests.benchmarks.forks import ForkRunner
-from tests.benchmarks.report import WALL_TIME_LIMIT
 
-HUNG, FAULT = "HUNG", "FAULT"
-"""Status of a run that exceeded its wall time, and of a run whose process ended without a result."""
+HUNG = "HUNG"
+"""Status of a run that exceeded its wall time."""
+FAULT = "FAULT"
+"""Status of a run whose process ended without a result."""
+WALL_TIME_LIMIT = 180.0
+"""Wall time after which a run counts as hung and is killed, unless an option says otherwise [s]."""
 END_PLACES = ("wrong_bin", "right", "left", "elsewhere")
 """Keys of the audit of which a single object counts in one at most."""
 DetectorMaker = Callable[..., Mapping[str, ClosableDetector]]
@@ -38,13 +36,7 @@ DetectorMaker = Callable[..., Mapping[str, ClosableDetector]]
 
 @dataclass(frozen=True)
 class Report:
-    """What the journal says last about an item.
-
-    Attributes:
-        label: Class.
-        state: State.
-        reason: Reason of the state, or "".
-    """
+    """Class and state of an item after its last change in the journal, with the reason of the state or ""."""
 
     label: str
     state: str
@@ -63,7 +55,7 @@ class FoundObject:
     Attributes:
         label: True class, or `unknown`.
         place: One of `END_PLACES`; "" for an unknown object outside of bins that no item was seen near.
-        bin: The bin that it lies in, or "".
+        bin: The bin that it lies in; None or "" outside of all bins.
         fell_in_wrong_bin: True if it fell from the tool into a wrong bin; `place` is then `elsewhere`.
         items: Items that stand for it: the one with which it was carried last, else those first seen where
             it stood.
@@ -72,15 +64,10 @@ class FoundObject:
 
     label: str
     place: str
-    bin: str
+    bin: str | None
     fell_in_wrong_bin: bool
     items: tuple[str, ...]
     reports: tuple[Report, ...] = ()
-
-    @property
-    def is_known(self) -> bool:
-        """True if it is of a class of the cell."""
-        return self.label != UNKNOWN_LABEL
 
     @property
     def is_in_wrong_bin(self) -> bool:
@@ -96,39 +83,24 @@ class AuditedRun:
         mission: Name of the mission.
         seed: Seed of the run.
         status: Status in `result.json`, `HUNG` or `FAULT`.
-        exit_code: Exit code of `executive run`; -1 if there is no result.
         message: Message of the result, or why there is none.
-        items: Counts of the ledger.
-        audit: Counts of the audit, and `agrees`.
         objects: The objects; none if there is no result.
-        robot_time_s: Time on the clock of the run [s]; without a result, as far as its journal tells.
-        wall_time_s: Wall time [s].
-        cpu_time_s: Processor time of the run's process, all threads [s].
+        robot_time: Time on the clock of the run [s].
         run: Run directory; "" if there is none.
     """
 
     mission: str
     seed: int
     status: str
-    exit_code: int
     message: str
-    items: Mapping[str, int]
-    audit: Mapping[str, int | bool]
-    objects: tuple[FoundObject, ...]
-    robot_time_s: float
-    wall_time_s: float
-    cpu_time_s: float
-    run: str
-
-    @staticmethod
-    def without_result(mission: str, seed: int, status: str, message: str) -> AuditedRun:
-        """Return what is known of a run that ended without a result."""
-        return AuditedRun(mission, seed, status, -1, message, {}, {}, (), 0.0, 0.0, 0.0, "")
+    objects: tuple[FoundObject, ...] = ()
+    robot_time: float = 0.0
+    run: str = ""
 
     @property
     def known(self) -> list[FoundObject]:
         """The objects of the cell's classes."""
-        return [one for one in self.objects if one.is_known]
+        return [one for one in self.objects if one.label != UNKNOWN_LABEL]
 
     @property
     def right(self) -> int:
@@ -161,32 +133,19 @@ class AuditedCell(SimCell):
         objects: The objects; empty before `audit`.
     """
 
-    def __init__(
-        self,
-        config: CellConfig,
-        *,
-        seed: int,
-        routes: Routes,
-        emit: Emit,
-        options: CellOptions,
-        build_detectors: DetectorMaker,
-    ) -> None:
-        super().__init__(
-            config, seed=seed, routes=routes, emit=emit, options=options, build_detectors=build_detectors
-        )
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
         self.objects: tuple[FoundObject, ...] = ()
-        self._labels = dict(self._world.labels)
         self._carried: dict[int, str] = {}
 
     def advance(self) -> None:
         """Let one physics step pass, and note the item with which a body is carried."""
         super().advance()
         body = self._tool.held_body
-        if body is None:
-            return
-        for record in self.accounts.records:
-            if record.state is State.HELD:
-                self._carried[body] = record.item
+        if body is not None:
+            for record in self.accounts.records:
+                if record.state is State.HELD:
+                    self._carried[body] = record.item
 
     def audit(self) -> dict[str, int]:
         """Return what really became of the objects, and keep it object by object."""
@@ -196,49 +155,24 @@ class AuditedCell(SimCell):
 
     def _find(self, body: int, final_object: FinalObject) -> FoundObject:
         """Return the true end of a body."""
-        places = self._world.rest_positions[body]
         gate = self.config.ledger.gate
-        bins = self.cell.bins
-        counts = count_outcomes([final_object], self.accounts.records, bins, self.routes, gate)
-        seen_there = tuple(
+        records = self.accounts.records
+        counts = count_outcomes([final_object], records, self.cell.bins, self.routes, gate)
+        items = [
             record.item
-            for record in self.accounts.records
-            if any(float(np.linalg.norm(record.first_position[:2] - place[:2])) <= gate for place in places)
-        )
-        carried = self._carried.get(body)
-        inside = ""
-        if body in self._world.labels:
-            position = self._world.get_object_pose(body).position
-            inside = next((name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS)), "")
+            for record in records
+            for position in final_object.rest_positions
+            if np.linalg.norm(record.first_position[:2] - position[:2]) <= gate
+        ]
+        if body in self._carried:
+            items = [self._carried[body]]
         return FoundObject(
-            label=self._labels[body],
+            label=final_object.label,
             place=next((place for place in END_PLACES if counts[place]), ""),
-            bin=inside,
+            bin=final_object.bin,
             fell_in_wrong_bin=bool(counts["fell_in_wrong_bin"]),
-            items=seen_there if carried is None else (carried,),
+            items=tuple(dict.fromkeys(items)),
         )
-
-
-class AuditedCellMaker:
-    """Makes an audited cell and keeps it; `detectors` makes its detectors.
-
-    Attributes:
-        made: The cell; set once it is made.
-    """
-
-    made: AuditedCell
-
-    def __init__(self, detectors: DetectorMaker = build_rated_detectors) -> None:
-        self._detectors = detectors
-
-    def __call__(
-        self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
-    ) -> AuditedCell:
-        """Return a cell made from a cell file."""
-        self.made = AuditedCell(
-            config, seed=seed, routes=routes, emit=emit, options=options, build_detectors=self._detectors
-        )
-        return self.made
 
 
 def run_audited(
@@ -250,55 +184,33 @@ def run_audited(
     wall_time_limit: float = WALL_TIME_LIMIT,
 ) -> AuditedRun:
     """Record a run below `runs` in a forked process, which is killed after `wall_time_limit` [s]."""
-    began = time.time()
     answer, problem = ForkRunner(wall_time_limit).call(
         lambda: _run_in_this_process(mission, seed, runs, scene, detectors)
     )
     if isinstance(answer, AuditedRun):
         return answer
-    status = HUNG if "was killed" in problem else FAULT
-    run = AuditedRun.without_result(mission, seed, status, problem)
-    journals = runs.glob(f"*/*_s{seed}/journal.jsonl")
-    journal = next((path for path in journals if path.stat().st_mtime >= began), None)
-    if journal is None:
-        return run
-    clock = max((timed.clock for timed in read_journal(journal)), default=0.0)
-    message = f"{problem}; its clock had come to {clock:.1f} s"
-    return replace(run, message=message, robot_time_s=clock, run=str(journal.parent))
+    return AuditedRun(mission, seed, HUNG if "was killed" in problem else FAULT, problem)
 
 
 def _run_in_this_process(
     mission: str, seed: int, runs: Path, scene: Path | None, detectors: DetectorMaker
 ) -> AuditedRun:
-    skills = load_skills()
-    loaded = load_mission(mission, skills, {}, load_cell_kind)
-    maker = AuditedCellMaker(detectors)
-    options = RunOptions(seed, make_cell=maker, scene=scene)
+    cells: list[AuditedCell] = []
+
+    def make_cell(*arguments: Any, **options: Any) -> AuditedCell:
+        cells.append(AuditedCell(*arguments, **options, build_detectors=detectors))
+        return cells[0]
+
+    loaded = load_mission(mission, load_skills(), {}, load_cell_kind)
+    options = RunOptions(seed, make_cell=make_cell, scene=scene)
     result = record_run(loaded, options, runs, RecordOptions(saves_pictures=False))
-    reports = read_reports(Path(result.run) / "journal.jsonl")
+    reports = {
+        timed.event.item: Report(timed.event.label, timed.event.state, timed.event.reason)
+        for timed in read_journal(Path(result.run) / "journal.jsonl")
+        if isinstance(timed.event, ItemChanged)
+    }
     objects = tuple(
         replace(one, reports=tuple(reports[item] for item in one.items if item in reports))
-        for one in maker.made.objects
+        for one in cells[0].objects
     )
-    return AuditedRun(
-        mission=mission,
-        seed=seed,
-        status=result.status,
-        exit_code=find_exit_code(result),
-        message=result.message,
-        items=asdict(result.items),
-        audit=asdict(result.audit),
-        objects=objects,
-        robot_time_s=result.robot_time_s,
-        wall_time_s=result.wall_time_s,
-        # A forked process begins at zero.
-        cpu_time_s=round(time.process_time(), 3),
-        run=result.run,
-    )
-
-
-def read_reports(journal: Path) -> dict[str, Report]:
-    """Return what a journal says last about each item, by item."""
-    events = (timed.event for timed in read_journal(journal))
-    changes = (event for event in events if isinstance(event, ItemChanged))
-    return {change.item: Report(change.label, change.state, change.reason) for change in changes}
+    return AuditedRun(mission, seed, result.status, result.message, objects, result.robot_time_s, result.run)

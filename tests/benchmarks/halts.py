@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 from py_trees.common import Status
 
@@ -34,7 +33,7 @@ from executive.record.journal import Journal, read_journal
 from executive.record.recorder import Trace
 from executive.run.assembly import RunOptions, assemble
 from tests.benchmarks.forks import ForkRunner
-from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command
+from tests.benchmarks.report import Figures, describe, record_subject, run_command
 
 LIMITS = {"rest_s": 0.5, "deviation_rad": 1e-6, "acceleration_ratio": 1.0, "jerk_ratio": 1.02}
 """Limits of a halt: time to rest, distance of a joint's command from the planned trajectory, and acceleration
@@ -49,9 +48,9 @@ MAX_MOVEMENT_AT_REST = 1e-5
 """Maximum movement of a joint of an arm at rest [rad]; for a fake arm, movement of the tool [m]."""
 
 
-def measure(subject: MissionUnderTest, period_steps: int | None = None) -> Figures:
-    """Halt MISSION at moments all over one run, each time as Ctrl-C would."""
-    period_steps = period_steps or (10 if subject.loaded.cell_config.kind == "sim" else 1)
+def measure(subject: MissionUnderTest, every: int | None = None) -> Figures:
+    """Halt MISSION in every `--every` control steps of one run, each time as Ctrl-C would."""
+    period_steps = every or (10 if subject.loaded.cell_config.kind == "sim" else 1)
     with tempfile.TemporaryDirectory() as folder:
         undisturbed, problem = record_subject(subject, subject.seed, Path(folder))
         if problem:
@@ -104,18 +103,10 @@ def find_worst(halts: Sequence[Figures]) -> list[Figures]:
     """Return for each limited figure its largest value, the tick of the halt, and the limit."""
     worst = []
     for name, allowed in LIMITS.items():
-        measured = [(halt[name], halt["tick"]) for halt in halts if halt[name] is not None]
-        if measured:
-            value, tick = max(measured)
+        value, tick = max((halt.get(name, -math.inf), halt["tick"]) for halt in halts)
+        if math.isfinite(value):
             worst.append({"figure": name, "value": value, "tick": tick, "allowed": allowed})
     return worst
-
-
-def check_limits(halt: Figures) -> Iterator[str]:
-    """Yield a sentence for every limit that a halt exceeded."""
-    for name, allowed in LIMITS.items():
-        if halt[name] is not None and halt[name] > allowed:
-            yield f"{name} is {halt[name]:.4g}; {allowed:g} is allowed"
 
 
 def check_ledger(items: Mapping[str, int], audit: Mapping[str, int] | None) -> Iterator[str]:
@@ -200,23 +191,18 @@ class _RunWithHalts:
         self._journal_path = folder / "journal.jsonl"
         self._journal = Journal(self._journal_path)
         self._trace = Trace()
-        self._commands: deque[Array] | list[Array] = deque(maxlen=COMMANDS_BEFORE_STOP)
-        self._commands_before_stop = 0
+        self._commands: deque[Array] = deque(maxlen=COMMANDS_BEFORE_STOP)
         self._motion: Trajectory | None = None
         self._halts: list[Figures] = []
         self._halt: Figures = {}
-        config = subject.loaded.cell_config
-        self._limits = JointLimits.from_config(config.arm.limits)
+        self._limits = JointLimits.from_config(subject.loaded.cell_config.arm.limits)
 
         def make_cell(*args: Any, **options: Any) -> CellWrapper:
             inner = subject.make_cell(*args, **options)
             return WatchedCell(inner, before=self._fork_and_halt_if_due, after=self._keep_command)
 
-        self._run = assemble(
-            subject.loaded,
-            RunOptions(subject.seed, subject.requests, make_cell=make_cell),
-            [lambda event: self._journal(event), self._trace],
-        )
+        options = RunOptions(subject.seed, subject.requests, make_cell=make_cell)
+        self._run = assemble(subject.loaded, options, [lambda event: self._journal(event), self._trace])
         self._arm = self._run.workcell.cell.arm
 
     def run(self, undisturbed: Figures) -> list[Figures]:
@@ -228,7 +214,7 @@ class _RunWithHalts:
         try:
             outcome = self._run.execute()
             if self._forks.is_child:
-                self._halt.update(self._check(outcome))
+                self._check(outcome)
         except BaseException:
             if not self._forks.is_child:
                 raise
@@ -243,8 +229,7 @@ class _RunWithHalts:
             raise KeyboardInterrupt
         if self._trace.hexdigest() != undisturbed["trace"]:
             raise ExecutiveError(
-                f"the run with halts ended as {outcome.status} after {outcome.ticks} ticks, and differs from "
-                f"the run without them, which took {undisturbed['ticks']} ticks"
+                f"the run with halts ended as {outcome.status}, and differs from that without"
             )
         return self._halts
 
@@ -256,55 +241,45 @@ class _RunWithHalts:
         """Fork if a halt is due: the child requests a stop and goes on; the parent keeps the result."""
         if self._forks.is_child or self._run.tick % self._period_steps:
             return
-        unknown = dict.fromkeys(LIMITS)
-        self._halt = {"tick": self._run.tick, "moving": not self._arm.at_rest, "holds": "", **unknown}
+        self._halt = {"tick": self._run.tick, "moving": not self._arm.at_rest, "holds": ""}
         answer = self._forks.fork_and_wait()
         if answer is not None:
             result, problem = answer
             self._halts.append(result or {**self._halt, "problems": [problem]})
             return
-        self._journal_path = Path(
-            shutil.copyfile(self._journal_path, self._journal_path.with_name("child.jsonl"))
-        )
+        self._journal_path = shutil.copyfile(self._journal_path, self._journal_path.with_name("child.jsonl"))
         self._journal = Journal(self._journal_path, resume=True)
-        self._commands, self._commands_before_stop = [*self._commands], len(self._commands)
+        self._commands = deque(self._commands)
+        self._halt["commands_before_stop"] = len(self._commands)
         self._motion = self._arm._motion if isinstance(self._arm, SimArm) else None
         self._run.control.stop()
 
-    def _check(self, outcome: RunEnded) -> Figures:
-        """Return the figures and problems of the halt that this child has made."""
-        run, workcell = self._run, self._run.workcell
+    def _check(self, outcome: RunEnded) -> None:
+        """Add the figures and problems of the halt that this child has made."""
+        run = self._run
         self._journal.close()
-        halt = {**self._halt, "holds": outcome.held_item}
-        halt["rest_s"] = (outcome.ticks - halt["tick"]) * workcell.cell.clock.step
+        halt = self._halt
+        halt["holds"] = outcome.held_item
+        halt["rest_s"] = (outcome.ticks - halt["tick"]) * run.workcell.cell.clock.step
+        if self._motion is not None:
+            before_stop = halt["commands_before_stop"]
+            halt.update(measure_braking([*self._commands], before_stop, self._motion, self._limits))
         problems = [
             *check_journal(read_journal(self._journal_path), outcome),
             *check_ledger(run.count_items(), run.count_ground_truth()),
-            *check_arm_at_rest(workcell),
+            *check_arm_at_rest(run.workcell),
         ]
-        self._journal_path.unlink()
-        if workcell.cell.tool.holding != bool(outcome.held_item):
+        if run.workcell.cell.tool.holding != bool(outcome.held_item):
             problems.append(f'the held item of the run is "{outcome.held_item}", the tool says otherwise')
         if (outcome.status, outcome.reason) != ("HALTED", "halted"):
             problems.append(f"the run ended as {outcome.status} {outcome.reason}: {outcome.message}")
-        running = [node.name for node in run.root.iterate() if node.status is Status.RUNNING]
-        if running:
+        if running := [node.name for node in run.root.iterate() if node.status is Status.RUNNING]:
             problems.append(f"still running: {', '.join(running)}")
-        if self._motion is not None:
-            halt.update(
-                measure_braking(self._commands, self._commands_before_stop, self._motion, self._limits)
-            )
-        problems += check_limits(halt)
-        return {**halt, "problems": problems}
+        for name, allowed in LIMITS.items():
+            if halt.get(name, 0.0) > allowed:
+                problems.append(f"{name} is {halt[name]:.4g}; {allowed:g} is allowed")
+        halt["problems"] = problems
 
 
 if __name__ == "__main__":
-    run_mission_command(
-        measure,
-        click.option(
-            "--every",
-            "period_steps",
-            type=click.IntRange(min=1),
-            help="Control steps from one halt to the next.",
-        ),
-    )
+    run_command(measure)

@@ -1,8 +1,8 @@
 """Commands with hostile input: internal errors, exit codes, time, memory and control characters.
 
-Each command runs in a forked child process, so that all modules are imported already. A command has a
-problem if it has an internal error, exceeds a limit, ends with another exit code than 0, 1, 2 or 4, or prints
-a control character or one character more than 200 times in a row.
+The seed of a case decides its files and its command, which runs in a forked child process, so that all
+modules are imported already. A command has a problem if it has an internal error, exceeds a limit, ends with
+another exit code than 0, 1, 2 or 4, or prints a control character or one character more than 200 times.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from random import Random
 
-import click
+import cv2
+import numpy as np
 
 from executive.cli.main import COMMANDS, main
-from executive.cli.options import seed_option
 from executive.plugins import load_skills
-from tests.benchmarks.hostile_files import Arguments, TextMaker, write_data_set, write_model, write_odd_paths
 from tests.benchmarks.report import Figures, run_command, show_progress
 
 MAX_CPU_TIME = 5.0
@@ -40,8 +40,181 @@ EXIT_CODES = (0, 1, 2, 4)
 FORBIDDEN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]|(.)\1{200}")
 """Control characters but tab and new line, and one character more than 200 times in a row."""
 
-Writer = Callable[[int, Path], Arguments]
-"""Writes the files of the case with a seed into a folder, and returns a command."""
+MISSIONS = Path(__file__).parents[2] / "missions"
+ODD_WORDS = (
+    "\x1b[31mred\x1b[0m", "\x07", "\x00", "\x9b2J", "\u202eabc", "a/b", "../x", "", " ", "\n", "x" * 5_000,
+    "nan", "-inf", "1e308", "-1e308", "1e-300", "9" * 400, "é" * 100, "\U0001f980", "$", "!!python/name:os",
+)  # fmt: skip
+"""Words that replace a word of a file."""
+MAX_REPEATED_TEXT = 4_000_000
+"""Largest text that repeats one line of a file [characters]."""
+DATA_SETS: tuple[dict[str, str], ...] = (
+    {
+        "_annotations.coco.json": json.dumps(
+            {
+                "images": [{"id": 1, "file_name": "a.jpg", "width": 64, "height": 48}],
+                "annotations": [{"id": 1, "image_id": 1, "category_id": 3, "bbox": [10, 20, 30, 20]}],
+                "categories": [{"id": 3, "name": "duck"}],
+            },
+            indent=1,
+        )
+    },
+    {
+        "../data.yaml": "train: train/images\nval: valid/images\nnc: 2\nnames: {0: cube, 1: duck}\n",
+        "labels/a.txt": "1 0.5 0.5 0.25 0.5\n0 0.1 0.1 0.3 0.1 0.3 0.2\n",
+    },
+)
+"""Files of a COCO and of a YOLO folder, relative to the folder of the split `train`, `valid` or `test`."""
+MODEL_FILES = {
+    "cell.yaml": (
+        "cell: hostile\nbase: overhead.yaml\nobjects:\n  cube: {MODEL, height: 0.05, radius: 0.0354}\n"
+    ),
+    "mission.yaml": (
+        "mission: hostile\ncell: cell.yaml\nroutes: {cube: red_bin, sphere: red_bin, duck: red_bin}\n"
+        "tree: [MoveToScan]\n"
+    ),
+    "m.urdf": (
+        "<robot name='r'><link name='l'><inertial><mass value='0.1'/><inertia ixx='1e-4' ixy='0' ixz='0' "
+        "iyy='1e-4' iyz='0' izz='1e-4'/></inertial><visual><geometry><box size='0.05 0.05 0.05'/></geometry>"
+        "</visual><collision><geometry><mesh filename='m.obj'/></geometry></collision></link></robot>\n"
+    ),
+    "m.obj": "v 0 0 0\nv 0.05 0 0\nv 0 0.05 0\nv 0 0 0.05\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n",
+    "m.onnx": "model",
+    "labels.txt": "cube\nsphere\nduck\n",
+}
+"""Files of a mission with an object and a detector of its own."""
+
+Arguments = list[str]
+"""Arguments of the command `executive`."""
+Writer = Callable[[Random, Path], Arguments]
+"""Writes the files of a case into a folder, and returns a command."""
+
+
+def write_texts(rng: Random, folder: Path) -> Arguments:
+    """Write a mission and damage it, its cell or its library; return a command that checks it."""
+    mission = rng.choice(sorted(MISSIONS.glob("*.yaml"))).read_text()
+    cell = re.search(r"^cell: (\S+)$", mission, re.MULTILINE)
+    names = ["mission.yaml", "mission.yaml", "library/sorting.yaml", *([cell[1]] if cell else [])]
+    name = rng.choice(names)
+    text = mission if name == "mission.yaml" else (MISSIONS / name).read_text()
+    (folder / "mission.yaml").write_text(mission)
+    (folder / name).parent.mkdir(exist_ok=True)
+    (folder / name).write_bytes(damage_text(rng, text))
+    return ["check", "mission.yaml", *rng.choice(([], ["--json"]))]
+
+
+def write_data_set(rng: Random, folder: Path) -> Arguments:
+    """Write a COCO or YOLO folder with one image, damage it, and return a command that reads it."""
+    split = folder / "data" / rng.choice(("train", "valid", "test"))
+    texts = rng.choice(DATA_SETS)
+    image = split / ("images/a.jpg" if "labels/a.txt" in texts else "a.jpg")
+    image.parent.mkdir(parents=True)
+    cv2.imwrite(str(image), np.full((48, 64, 3), 120, np.uint8))
+    for name, text in texts.items():
+        (split / name).parent.mkdir(exist_ok=True)
+        (split / name).write_text(text)
+    for _ in range(rng.choice((1, 1, 2))):
+        damage_file(rng, rng.choice([*[split / name for name in texts] * 2, image]))
+    return ["evaluate", "--dataset", "data", "--cell", "overhead", "--out", "measured.json", "--json"]
+
+
+def write_model(rng: Random, folder: Path) -> Arguments:
+    """Write a cell with a damaged URDF, mesh or detector model, and return a command that reads it."""
+    model = rng.choice(("mesh: m.obj", "urdf: m.urdf"))
+    for name, text in MODEL_FILES.items():
+        (folder / name).write_text(text.replace("MODEL", model))
+    if rng.random() < 0.2:
+        with (folder / "cell.yaml").open("a") as cell:
+            cell.write("detectors: {embedded: {kind: rfdetr, model_path: m.onnx, labels: labels.txt}}\n")
+    damage_file(rng, folder / rng.choice(("m.urdf", "m.obj", "m.obj", "m.onnx", "labels.txt")))
+    dataset = ["dataset", "cell.yaml", "--images", "1", "--workers", "1", "--out", "out"]
+    return rng.choice((["check", "mission.yaml"], dataset))
+
+
+def write_odd_paths(rng: Random, folder: Path) -> Arguments:
+    """Return a command with an odd path or number."""
+    (folder / "folder.yaml").mkdir()
+    os.mkfifo(folder / "pipe.yaml")
+    (folder / "dangling.yaml").symlink_to("nowhere")
+    (folder / "loop.yaml").symlink_to("loop.yaml")
+    (folder / "garbage.yaml").write_bytes(rng.randbytes(300))
+    odd = [word for word in ODD_WORDS if "\0" not in word]
+    local = ["folder.yaml", "pipe.yaml", "dangling.yaml", "loop.yaml", "garbage.yaml", "no.yaml", "x" * 300]
+    path = rng.choice([*odd, *local, *local, "/etc/passwd", "/dev/null", "/dev/full", "/proc/self/mem", "~"])
+    fake = ["sort_overhead", "--set", "cell.kind=fake"]
+    return rng.choice(
+        [
+            ["check", path], ["run", path], ["tree", path], ["run", "--resume", path], ["replay", path],
+            ["report", path], ["skills", path], ["schema", path], [path],
+            ["run", *fake, "--seed", path], ["run", *fake, "--runs", path], ["sweep", *fake, "--seeds", path],
+            ["run", *fake, "--set", path], ["run", *fake, "--request", path], ["run", *fake, "--scene", path],
+            ["check", "sort_overhead", "--set", f"cell.objects.cube.urdf={path}"],
+            ["check", "sort_overhead", "--set", f"cell.table.colour={path}"],
+            ["evaluate", "--weights", path, "--dataset", "folder.yaml"], ["evaluate", "--dataset", path],
+            ["evaluate", "--cell", path], ["dataset", path, "--out", "out"],
+            ["dataset", "overhead", "--images", "1", "--workers", "1", "--out", path],
+        ]
+    )  # fmt: skip
+
+
+def damage_text(rng: Random, text: str) -> bytes:
+    """Return a text with odd or exchanged words, repetitions, deep nesting, aliases, or wrong bytes."""
+    lines = text.splitlines(keepends=True)
+    line = rng.randrange(len(lines))
+    count = rng.choice((10, 200, 3_000, 50_000, 300_000))
+    odd_word = rng.choice(ODD_WORDS)
+    words = list(re.finditer(r"[\w.$]+", text))
+    word = rng.choice(words)
+    before = text[: word.start()]
+    after = text[word.end() :]
+    repetitions = min(count, 1 + MAX_REPEATED_TEXT // len(lines[line]))
+    bomb = "".join(f"k{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]\n" for n in range(1, rng.choice((3, 9))))
+    changed = rng.choice(
+        (
+            before + odd_word + after,
+            before + rng.choice(words)[0] + after,
+            before + json.dumps(odd_word) + after,
+            "".join(lines[:line] + lines[line + 1 :]),
+            "".join(lines[:line] + [lines[line]] * repetitions + lines[line + 1 :]),
+            "".join([*lines[:line], "  " + lines[line], *lines[line + 1 :]]),
+            before + "[" * count + after,
+            before + "{a: " * min(count, 50_000) + after,
+            before + "[" + "1," * count + "]" + after,
+            text + "".join(f"key{n}: 1\n" for n in range(count)),
+            text + "again: 1\n" * count,
+            before + "{parallel: [" + "Wait," * min(count, 50_000) + "]}" + after,
+            before + "x" * count + after,
+            "k0: &a0 x\n" + bomb + text,
+        )
+    )
+    content = changed.encode(rng.choice(("utf-8",) * 4 + ("utf-16", "utf-8-sig", "latin-1")), "replace")
+    if rng.random() < 0.1:
+        start = rng.randrange(len(content))
+        content = content[:start] + rng.randbytes(rng.choice((1, 9, 1_000))) + content[start:]
+    return content
+
+
+def damage_file(rng: Random, file: Path) -> None:
+    """Change the content of a file, or put something else in its place."""
+    if rng.random() < 0.75 and file.is_file() and file.suffix != ".jpg":
+        text = file.read_text(errors="replace")
+        file.write_bytes(damage_text(rng, text if re.search(r"\w", text) else "a"))
+        return
+    if file.is_dir() and not file.is_symlink():
+        file.rmdir()
+    file.unlink(missing_ok=True)
+    size = rng.choice((0, 1, 5_000, 20_000_001, 3_000_000_000))
+    replace = rng.choice(
+        (
+            lambda: os.mkfifo(file),
+            file.mkdir,
+            lambda: file.symlink_to(rng.choice(("/etc/passwd", "nowhere", file.name, "../../other"))),
+            lambda: file.write_bytes(rng.randbytes(min(size, 5_000))),
+            lambda: (file.touch(), os.truncate(file, size)),
+            lambda: None,
+        )
+    )
+    replace()
 
 
 @dataclass(frozen=True)
@@ -55,34 +228,30 @@ class CommandResult:
     memory: float
 
 
-def measure(texts: int, data_sets: int, models: int, seed: int) -> Figures:
+def measure(texts: int = 5000, data_sets: int = 300, models: int = 300, seed: int = 0) -> Figures:
     """Run commands with hostile missions, cells, libraries, data sets, models and paths."""
     for name in COMMANDS:
         import_module(f"executive.cli.{name}")
     load_skills()
     groups: list[tuple[str, int, Writer]] = [
-        ("texts", texts, TextMaker().write),
+        ("texts", texts, write_texts),
         ("data sets", data_sets, write_data_set),
         ("models", models // 2, write_model),
         ("paths", models - models // 2, write_odd_paths),
     ]
-    rows, problems = [], []
-    for group, number, write in groups:
+    rows: list[Figures] = []
+    problems: list[str] = []
+    for group, count, write in groups:
         results = []
-        for case in show_progress(range(seed, seed + number), group):
-            result, arguments, found = run_case(write, case)
+        for case in show_progress(range(seed, seed + count), group):
+            with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as logs:
+                arguments = write(Random(case), Path(folder))
+                result = run_in_child(lambda words=arguments: main(words), Path(folder), Path(logs))
             results.append(result)
+            found = find_problems(arguments, result)
             problems += [f"{group} {case}, {' '.join(arguments)[:80]}: {problem}" for problem in found]
-        rows.append({"group": group, **_summarize(results)})
+        rows.append({"group": group, **summarize(results)})
     return {"seed": seed, "groups": rows, "problems": problems}
-
-
-def run_case(write: Writer, case: int) -> tuple[CommandResult, Arguments, list[str]]:
-    """Run the command of a case in a new folder, and return its result, its arguments and its problems."""
-    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as logs:
-        arguments = write(case, Path(folder))
-        result = run_in_child(lambda: main(arguments), Path(folder), Path(logs))
-    return result, arguments, find_problems(arguments, result)
 
 
 def run_in_child(command: Callable[[], object], folder: Path, logs: Path) -> CommandResult:
@@ -104,11 +273,21 @@ def run_in_child(command: Callable[[], object], folder: Path, logs: Path) -> Com
         finally:
             os._exit(99)
     status, usage = _wait(child)
-    texts = [file.read_bytes().decode(errors="backslashreplace") for file in outputs]
+    output, errors = (file.read_bytes().decode(errors="backslashreplace") for file in outputs)
     cpu_time = usage.ru_utime + usage.ru_stime
-    return CommandResult(
-        os.waitstatus_to_exitcode(status), texts[0], texts[1], cpu_time, usage.ru_maxrss / 1e3
-    )
+    return CommandResult(os.waitstatus_to_exitcode(status), output, errors, cpu_time, usage.ru_maxrss / 1e3)
+
+
+def _wait(child: int) -> tuple[int, resource.struct_rusage]:
+    """Wait for a child, kill it after `MAX_WALL_TIME`, and return its status and its use of resources."""
+    end = time.monotonic() + MAX_WALL_TIME
+    while True:
+        pid, status, usage = os.wait4(child, os.WNOHANG)
+        if pid:
+            return status, usage
+        if time.monotonic() > end:
+            os.kill(child, signal.SIGKILL)
+        time.sleep(0.002)
 
 
 def find_problems(arguments: Arguments, result: CommandResult) -> list[str]:
@@ -135,34 +314,16 @@ def find_problems(arguments: Arguments, result: CommandResult) -> list[str]:
     return problems
 
 
-def _wait(child: int) -> tuple[int, resource.struct_rusage]:
-    """Wait for a child, kill it after `MAX_WALL_TIME`, and return its status and its use of resources."""
-    end = time.monotonic() + MAX_WALL_TIME
-    while True:
-        pid, status, usage = os.wait4(child, os.WNOHANG)
-        if pid:
-            return status, usage
-        if time.monotonic() > end:
-            os.kill(child, signal.SIGKILL)
-        time.sleep(0.002)
-
-
-def _summarize(results: list[CommandResult]) -> Figures:
+def summarize(results: list[CommandResult]) -> Figures:
+    """Return the exit codes of commands, and their largest CPU time and memory."""
     codes = Counter(result.exit_code for result in results)
     return {
         "cases": len(results),
-        "exit codes": ", ".join(f"{number} × {code}" for code, number in sorted(codes.items())),  # noqa: RUF001
+        "exit codes": ", ".join(f"{count} x {code}" for code, count in sorted(codes.items())),
         "cpu_time_s": max((result.cpu_time for result in results), default=0.0),
         "memory_mb": max((result.memory for result in results), default=0.0),
     }
 
 
 if __name__ == "__main__":
-    number = click.IntRange(min=0)
-    run_command(
-        measure,
-        click.option("--texts", type=number, default=5000, help="Number of mission, cell and library files."),
-        click.option("--data-sets", type=number, default=300, help="Number of data sets."),
-        click.option("--models", type=number, default=300, help="Number of models and paths."),
-        seed_option,
-    )
+    run_command(measure)

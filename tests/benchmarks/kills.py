@@ -15,12 +15,9 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-import click
 import numpy as np
 
 from executive.campaign.mission_under_test import MissionUnderTest
-from executive.cell.config import TableConfig
-from executive.cli.options import runs_option
 from executive.errors import ExecutiveError
 from executive.events import ItemChanged, NodeEnded, NodeStarted, TimedEvent
 from executive.geometry import Array
@@ -33,9 +30,9 @@ from executive.record.resume import resume_run
 from executive.record.run_directory import LATEST_LINK, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
-from executive.testing.world_access import TrueObject, WorldAccess
+from executive.testing.world_access import WorldAccess
 from tests.benchmarks.forks import ForkRunner
-from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command, show_progress
+from tests.benchmarks.report import Figures, describe, record_subject, run_command, show_progress
 from tests.meanwhile import meanwhile
 
 RESUME_TIMEOUT = 300.0
@@ -146,18 +143,25 @@ def change_world(subject: MissionUnderTest, seed: int, path: Path, past: InputLo
     random = np.random.default_rng(seed)
     config = subject.loaded.cell_config
     distance = 2 * max(kind.radius for kind in config.objects.values())
+    bounds = np.array([config.table.x, config.table.y]).T
     done: list[str] = []
 
     def act(world: WorldAccess) -> None:
         held = world.held_object
-        unheld_objects = [thing for thing in world.objects if held is None or thing.body != held.body]
-        on_table = [thing for thing in unheld_objects if is_on_table(thing.position[:2], config.table)]
+        others = [thing for thing in world.objects if held is None or thing.body != held.body]
+        on_table = [thing for thing in others if is_within(thing.position[:2], bounds)]
         if change == "dropped" and held is not None:
             world.break_seal()
             done.append(f"dropped {held.label}")
         elif on_table:
             thing = on_table[int(random.integers(len(on_table)))]
-            shifts = find_free_shifts(thing, unheld_objects, distance, config.table)
+            places = [other.position[:2] for other in others if other.body != thing.body]
+            shifts = [
+                shift
+                for shift in SHIFTS
+                if is_within(place := thing.position[:2] + shift, bounds)
+                and all(np.linalg.norm(other - place) > distance for other in places)
+            ]
             if change == "removed" or not shifts:
                 world.remove(thing)
                 done.append(f"removed {thing.label}")
@@ -171,21 +175,9 @@ def change_world(subject: MissionUnderTest, seed: int, path: Path, past: InputLo
     return "".join(done)
 
 
-def find_free_shifts(
-    moved_object: TrueObject, unheld_objects: Sequence[TrueObject], distance: float, table: TableConfig
-) -> Sequence[Array]:
-    """Return the shifts `(2,)` [m] of an object to positions with no object within `distance` [m]."""
-    others = [other.position[:2] for other in unheld_objects if other.body != moved_object.body]
-
-    def is_free(place: Array) -> bool:
-        return is_on_table(place, table) and all(np.linalg.norm(one - place) > distance for one in others)
-
-    return [shift for shift in SHIFTS if is_free(moved_object.position[:2] + shift)]
-
-
-def is_on_table(position: Array, table: TableConfig) -> bool:
-    """Return True if a position `(2,)` [m] is within the bounds of the table."""
-    return all(low <= x <= high for x, (low, high) in zip(position, (table.x, table.y), strict=True))
+def is_within(position: Array, bounds: Array) -> bool:
+    """Return True if a position `(2,)` [m] is within the lowest and the highest corner in `bounds`."""
+    return bool(np.all((position >= bounds[0]) & (position <= bounds[1])))
 
 
 def check_result(result: Result, *, change_made: str) -> list[str]:
@@ -213,16 +205,4 @@ def find_handled_twice(events: Sequence[TimedEvent]) -> list[str]:
 
 
 if __name__ == "__main__":
-    run_mission_command(
-        measure,
-        click.option(
-            "--kills", type=click.IntRange(min=1), default=20, show_default=True, help="Number of kills."
-        ),
-        click.option(
-            "--changed", type=click.IntRange(min=0), help="Kills with a changed world.  [default: a quarter]"
-        ),
-        click.option(
-            "--halted", type=click.IntRange(min=0), default=0, help="Kills that are replaced by Ctrl-C."
-        ),
-        runs_option,
-    )
+    run_command(measure)

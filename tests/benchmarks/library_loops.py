@@ -6,9 +6,7 @@ false detections; the ledger assumes high error rates, or believes the rates of 
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -30,6 +28,7 @@ from executive.testing.faults import (
     tool_does_not_release,
 )
 from executive.testing.run_mission import MissionResult, run_mission
+from tests.benchmarks.report import Figures, run_command
 
 ATTEMPTS = {
     "sort_overhead": 6, "sort_wrist": 6, "sort_stacked": 6, "weigh_and_sort": 6, "sort_with_second_chance": 4,
@@ -153,19 +152,13 @@ def explain_problem(seed: int, kind: str) -> str:
     return f"seed {seed}, {mission}: {'; '.join(problems)}" if problems else ""
 
 
-def main() -> int:
-    """Run all seeds, print each problem, and return 1 if there is one."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seed", type=int, default=0, help="first seed")
-    parser.add_argument("--runs", type=int, default=500)
-    parser.add_argument("--kind", default="fake", choices=["fake", "sim"])
-    options = parser.parse_args()
-    seeds = range(options.seed, options.seed + options.runs)
+def measure(runs: int = 500, seed: int = 0, kind: str = "fake") -> Figures:
+    """Run shipped missions with random faults on a cell of `--kind` fake or sim."""
+    seeds = range(seed, seed + runs)
     with ProcessPoolExecutor(2) as pool:
-        problems = [text for text in pool.map(explain_problem, seeds, [options.kind] * len(seeds)) if text]
-    print(*problems, f"{len(seeds) - len(problems)} of {len(seeds)} runs without a problem", sep="\n")
-    return 1 if problems else 0
+        problems = [text for text in pool.map(explain_problem, seeds, [kind] * runs) if text]
+    return {"runs": runs, "without_problem": runs - len(problems), "problems": problems}
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_command(measure)

@@ -7,22 +7,20 @@ contain the syncs of the journal and the delays by other processes; CPU times of
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import click
+import numpy as np
 from py_trees.trees import BehaviourTree
 
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
-from executive.cli.options import runs_option
-from executive.events import TimedEvent
+from executive.geometry import Array
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
 from executive.run.run import Run
-from tests.benchmarks.report import Figures, describe, run_mission_command, show_progress
+from tests.benchmarks.report import Figures, SilentView, describe, run_command, show_progress
 
 MAX_STEP_TIME = 0.005
 """Limit of the wall time of a control step [s]."""
@@ -32,55 +30,44 @@ EXCLUDED_ACCESSES = ("arm.plan", "camera.", "detector.", "request.", "plan.")
 """Beginnings of the names of the accesses whose times do not count."""
 
 
-@dataclass
-class StepTimer:
+class StepTimer(SilentView):
     """View of a run that measures its control steps.
 
     Attributes:
-        steps: For each step: wall time and CPU time [s], without the excluded accesses.
+        steps: For each step: wall time and CPU time of the thread [s], without the excluded accesses.
     """
 
-    steps: list[tuple[float, float]] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self._excluded = 0.0, 0.0
-        self._start: tuple[float, float] | None = None
+    def __init__(self) -> None:
+        self.steps: list[Array] = []
+        self._excluded = np.zeros(2)
+        self._start: Array | None = None
 
     def open(self, run: Run) -> None:
         """Measure the time between the starts of all ticks."""
         run.behaviour_tree.add_pre_tick_handler(self._begin_step)
 
-    def __call__(self, timed: TimedEvent) -> None:
-        """Ignore an event."""
-
-    def close(self) -> None:
-        """Do nothing."""
-
-    def show_message(self, message: str) -> None:
-        """Ignore a message."""
-
     def intercept(self, access: Access) -> Any:
         """Execute an access to the cell, and exclude its time if it plans, captures or detects."""
-        if not access.name.startswith(EXCLUDED_ACCESSES):
-            return access.proceed()
         start = _read_clocks()
         try:
             return access.proceed()
         finally:
-            self._excluded = _add(self._excluded, _subtract(_read_clocks(), start))
+            if access.name.startswith(EXCLUDED_ACCESSES):
+                self._excluded += _read_clocks() - start
 
     def _begin_step(self, tree: BehaviourTree) -> None:
         del tree
         now = _read_clocks()
         if self._start is not None:
-            self.steps.append(_subtract(_subtract(now, self._start), self._excluded))
-        self._start, self._excluded = now, (0.0, 0.0)
+            self.steps.append(now - self._start - self._excluded)
+        self._start = now
+        self._excluded = np.zeros(2)
 
 
-def measure(subject: MissionUnderTest, runs_folder: Path, run_count: int) -> Figures:
+def measure(subject: MissionUnderTest, runs_folder: Path, count: int = 20) -> Figures:
     """Measure the control steps of `--count` runs of MISSION, which are recorded below `--runs`."""
     rows = []
-    for seed in show_progress(range(subject.seed, subject.seed + run_count), "runs"):
+    for seed in show_progress(range(subject.seed, subject.seed + count), "runs"):
         timer = StepTimer()
 
         def make_cell(*arguments: Any, timer: StepTimer = timer, **options: Any) -> Workcell:
@@ -90,14 +77,10 @@ def measure(subject: MissionUnderTest, runs_folder: Path, run_count: int) -> Fig
 
         options = RunOptions(seed, subject.requests, make_cell=make_cell)
         record_run(subject.loaded, options, runs_folder, RecordOptions([timer]))
-        walls, cpus = zip(*timer.steps, strict=True)
-        row = {
-            "seed": seed,
-            "steps": len(walls),
-            "longest_ms": 1e3 * max(walls),
-            "longest_cpu_ms": 1e3 * max(cpus),
-        }
-        rows.append({**row, "tick": walls.index(max(walls)), "cpu_tick": cpus.index(max(cpus))})
+        wall_time, cpu_time = 1e3 * np.max(timer.steps, axis=0)
+        rows.append(
+            {"seed": seed, "steps": len(timer.steps), "longest_ms": wall_time, "longest_cpu_ms": cpu_time}
+        )
     longest = max(row["longest_ms"] for row in rows)
     limit = 1e3 * MAX_STEP_TIME
     return {
@@ -109,26 +92,10 @@ def measure(subject: MissionUnderTest, runs_folder: Path, run_count: int) -> Fig
     }
 
 
-def _read_clocks() -> tuple[float, float]:
+def _read_clocks() -> Array:
     """Return wall time and CPU time of this thread [s]."""
-    return time.perf_counter(), time.thread_time()
-
-
-def _add(times: tuple[float, float], others: tuple[float, float]) -> tuple[float, float]:
-    return times[0] + others[0], times[1] + others[1]
-
-
-def _subtract(times: tuple[float, float], others: tuple[float, float]) -> tuple[float, float]:
-    return times[0] - others[0], times[1] - others[1]
+    return np.array([time.perf_counter(), time.thread_time()])
 
 
 if __name__ == "__main__":
-    count_option = click.option(
-        "--count",
-        "run_count",
-        type=click.IntRange(min=1),
-        default=20,
-        show_default=True,
-        help="Number of runs.",
-    )
-    run_mission_command(measure, runs_option, count_option)
+    run_command(measure)

@@ -3,7 +3,11 @@
 A pair consists of a motion from a bin to an object and a motion from there into a bin; each pair starts where
 the last one ended. Every method begins a pair in the posture in which the planner's own motion left the arm.
 There are no physics: the positions of the objects are known exactly, and the arm is taken to move as planned.
-With `--execute` the simulated arm makes the planner's motions instead (`motion_execution.py`).
+With `--execute` the simulated arm makes the planner's motions instead (`motion_scenes.py`).
+
+Two methods follow the path of textbooks: up to the cell's travel height, across, and straight down. One stops
+at every waypoint; the other follows a spline through the waypoints, timed by TOPP-RA. The lower bound ignores
+all obstacles, so that no motion without collisions is faster.
 """
 
 from __future__ import annotations
@@ -11,27 +15,130 @@ from __future__ import annotations
 import time
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from itertools import pairwise
+from typing import Any, NamedTuple, TypeVar
 
-import click
 import numpy as np
+from toppra import SplineInterpolator
+from toppra.algorithm import TOPPRA
+from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
+from executive.cell.arm import Goal
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height
-from executive.cells.sim.world import World
-from executive.errors import Blocked, InputError, Unreachable
+from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
+from executive.motion.arm_model import Kinematics
 from executive.motion.braking import plan_braking
-from executive.motion.joints import JointState
+from executive.motion.configurations import find_configuration_pairs, find_vertical_waypoints
+from executive.motion.joints import JointLimits, JointState, compute_min_time
 from executive.motion.planner import Planner
+from executive.motion.point_to_point import Connector
 from executive.motion.trajectory import Trajectory, compute_peak_fractions
-from tests.benchmarks import motion_baselines as baselines
-from tests.benchmarks.motion_execution import execute_pairs
-from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world
-from tests.benchmarks.report import CELL_OPTIONS, Figures, run_command, show_progress
+from tests.benchmarks.motion_scenes import Scene, SceneGenerator, execute_pairs, open_world
+from tests.benchmarks.report import Figures, run_command, show_progress
+from tests.motion.joint_states import reach
 
 T = TypeVar("T")
+
+
+class PairMotion(NamedTuple):
+    """Duration of the motions of a pair [s], their joint states every 1/240 s, and planning times [ms]."""
+
+    duration: float
+    states: list[JointState]
+    planning_times: list[float]
+
+
+WaypointPair = tuple[Array, Array]
+"""Waypoints of the textbook path, joint positions `(4, 7)` [rad]: at the start, above the start, above the
+object and at the object; then at the object, above the object, above the bin slot and at the bin slot."""
+
+
+def find_waypoints(
+    kinematics: Kinematics, limits: JointLimits, start: Array, touch: Goal, drop: Goal, height: float
+) -> WaypointPair:
+    """Return the waypoints at travel height `height` [m] that can be passed, with stops, in the least time.
+
+    Args:
+        kinematics: Kinematics of the arm.
+        limits: Joint limits of the arm.
+        start: Joint positions of the arm at the start `(7,)` [rad].
+        touch: Goal at which the tool touches the object.
+        drop: Goal at which the tool releases the object.
+        height: Travel height of the tool in the world frame [m].
+
+    Raises:
+        Unreachable: A waypoint is out of reach.
+    """
+    x, y, z = kinematics.compute_tool_pose(start).position.tolist()
+    line = find_vertical_waypoints(kinematics, start, max(0.0, height - z))
+    up = reach(kinematics, (x, y, height), start) if line is None else line[-1]
+    fetch = find_configuration_pairs(kinematics, touch, height - touch.position[2], start)
+    carry = find_configuration_pairs(kinematics, drop, height - drop.position[2], start)
+    fetching = compute_min_time(fetch.upper_qs - up, limits) + 2 * compute_min_time(
+        fetch.upper_qs - fetch.lower_qs, limits
+    )
+    carrying = compute_min_time(carry.upper_qs - fetch.upper_qs[:, None], limits)
+    carrying += compute_min_time(carry.lower_qs - carry.upper_qs, limits)
+    i, j = np.unravel_index(np.argmin(fetching[:, None] + carrying), carrying.shape)
+    return (
+        np.array([start, up, fetch.upper_qs[i], fetch.lower_qs[i]]),
+        np.array([fetch.lower_qs[i], fetch.upper_qs[i], carry.upper_qs[j], carry.lower_qs[j]]),
+    )
+
+
+def plan_with_stops(waypoints: Array, limits: JointLimits) -> tuple[float, JointState]:
+    """Return the time [s] and the states of the motion that rests at every waypoint (ruckig)."""
+    connector = Connector(limits)
+    motion = Trajectory(
+        [connector.connect(JointState.at_rest(a), JointState.at_rest(b)) for a, b in pairwise(waypoints)]
+    )
+    return motion.duration, motion.samples
+
+
+def plan_with_toppra(waypoints: Array, limits: JointLimits) -> tuple[float, JointState]:
+    """Return the least time [s] along a spline through waypoints, and the states.
+
+    The natural cubic spline is parametrized by chord length in joint space; of the usual parametrizations, it
+    takes the least time. TOPP-RA (Pham & Pham, IEEE T-RO 34 (2018), 645-659) follows it at the limits of
+    velocity and acceleration; without a limit of jerk, no arm can follow it exactly.
+    """
+    lengths = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
+    # The parameter must increase strictly, even between two equal waypoints.
+    path = SplineInterpolator(
+        np.concatenate([[0.0], np.cumsum(np.maximum(lengths, 1e-6))]), waypoints, bc_type="natural"
+    )
+    bounds = [
+        JointVelocityConstraint(np.stack([-limits.velocity, limits.velocity], axis=1)),
+        JointAccelerationConstraint(np.stack([-limits.acceleration, limits.acceleration], axis=1)),
+    ]
+    motion: Any = TOPPRA(bounds, path, solver_wrapper="seidel").compute_trajectory(0, 0)
+    times = np.append(np.arange(0.0, motion.duration, STEP), motion.duration)
+    return float(motion.duration), JointState(motion(times), motion(times, 1), motion(times, 2))
+
+
+def find_lower_bound(
+    kinematics: Kinematics, limits: JointLimits, start: Array, touch: Goal, drop: Goal
+) -> PairMotion:
+    """Return the fastest motions if all obstacles are ignored.
+
+    Each of the two motions is from rest to rest, without a waypoint. Joint 7 is free at both ends; IK branch
+    and swivel are those with the least total time.
+    """
+    touching, dropping = (
+        find_configuration_pairs(kinematics, goal, 0.0, start).lower_qs for goal in (touch, drop)
+    )
+    there = compute_min_time(touching - start, limits)
+    back = compute_min_time(touching[:, None] - dropping, limits)
+    i, j = np.unravel_index(np.argmin(there[:, None] + back), back.shape)
+    motions = [
+        plan_with_stops(np.array(ends), limits) for ends in pairwise((start, touching[i], dropping[j]))
+    ]
+    return PairMotion(sum(duration for duration, _ in motions), [states for _, states in motions], [])
+
+
 PEAKS = ("velocity", "acceleration", "jerk")
 """Names of the peaks: largest velocity, acceleration and jerk of a joint, each relative to its limit."""
 PEAK_TOLERANCE = 1e-6
@@ -40,126 +147,86 @@ PEAK_TOLERANCE = 1e-6
 
 def measure(cell: CellConfig, seed: int = 0, pairs: int = 200, execute: bool = False) -> Figures:
     """Measure the motions of the arm of CELL from bin to object to bin, and other ways to move."""
+    figures: Figures = {"cell": cell.cell, "pairs": pairs, "seed": seed}
     if execute:
-        return {"cell": cell.cell, "pairs": pairs, "seed": seed, **execute_pairs(cell, pairs, seed)}
+        return {**figures, **execute_pairs(cell, pairs, seed)}
+    rows: dict[str, list[PairMotion]] = defaultdict(list)
+    problems = []
+    height = compute_travel_height(cell)
+    home = np.radians(cell.arm.poses_deg["home"])
     with open_world(cell) as (world, planner):
-        comparison = _MethodComparison(cell, world, planner, seed)
+        scenes = SceneGenerator(cell, planner, world, seed)
+        start = planner.plan(home, scenes.draw().drop).end
         for _ in show_progress(range(pairs), "planned"):
-            comparison.plan_pair()
-        return {"cell": cell.cell, "pairs": pairs, "seed": seed, **comparison.collect_figures()}
+            world.set_joint_positions(home)
+            scene = scenes.draw()
+            try:
+                motion, end = plan_pair(planner, start, scene)
+            except (Blocked, Unreachable) as error:
+                problems.append(f"not planned: {error}")
+                continue
+            if not rows:
+                compare_methods(planner, start, scene, height)  # The first call compiles; do not time it.
+            rows["ours"].append(motion)
+            for method, other_motion in compare_methods(planner, start, scene, height).items():
+                rows[method].append(other_motion)
+            start = end
+        methods = [summarize(method, motions, planner.limits) for method, motions in rows.items()]
+    for row in methods:
+        row["ratio_to_lower_bound"] = row["time_s"] / methods[-1]["time_s"]
+    problems += [f"{name} over its limit" for name in PEAKS if methods[0][name] > 1 + PEAK_TOLERANCE]
+    return {**figures, "planned_pairs": len(rows["ours"]), "methods": methods, "problems": problems}
 
 
-class _MethodComparison:
-    """Durations, planning times and peaks of every method over the pairs so far."""
+def plan_pair(planner: Planner, start: Array, scene: Scene) -> tuple[PairMotion, Array]:
+    """Return both motions of a pair, and the posture in which they leave the arm.
 
-    def __init__(self, cell: CellConfig, world: World, planner: Planner, seed: int) -> None:
-        self._cell = cell
-        self._world = world
-        self._planner = planner
-        self._scenes = SceneGenerator(cell, planner, world, seed)
-        self._home = np.radians(cell.arm.poses_deg["home"])
-        self._q = planner.plan(self._home, self._scenes.draw().drop).end
-        self._durations: dict[str, list[float]] = defaultdict(list)
-        self._planning_times_ms: dict[str, list[float]] = defaultdict(list)
-        self._peaks: dict[str, Array] = defaultdict(lambda: np.zeros(3))
-        self._failures: list[str] = []
+    On contact the arm brakes along the approach; the transit begins where the arm comes to rest.
+    """
+    approach, approach_ms = _call_timed(planner.plan, start, scene.approach, scene.fetch_task)
+    tips, _ = planner.kinematics.compute_tcps_and_axes(approach.samples.q)
+    above = int(np.flatnonzero(tips[:, 2] > scene.contact_height)[-1])
+    touched = min((above + 1) * STEP, approach.duration)
+    stop = plan_braking(approach, touched, planner.limits)
+    grasp = approach.state_at(float(stop[-1])).q
+    task = scene.make_carry_task(scene.breakaway_force)
+    transit, transit_ms = _call_timed(planner.plan, grasp, scene.drop, task)
+    duration = touched + len(stop) * STEP + transit.duration
+    states = [approach.samples, transit.samples]
+    return PairMotion(duration, states, [approach_ms, transit_ms]), transit.end
 
-    def plan_pair(self) -> None:
-        """Draw one more pair and compute its motions by every method."""
-        self._world.set_joint_positions(self._home)
-        scene, start = self._scenes.draw(), self._q
-        try:
-            duration, motions = self._plan(start, scene)
-        except (Blocked, Unreachable) as error:
-            self._failures.append(str(error))
-            return
-        self._add("ours", duration, [motion.samples for motion in motions])
-        self._compare(start, scene)
 
-    def _add(self, method: str, duration: float, states: Sequence[JointState]) -> None:
-        """Add the time [s] and the states of a pair."""
-        shares = [compute_peak_fractions(one, self._planner.limits).max(axis=1) for one in states]
-        self._durations[method].append(duration)
-        self._peaks[method] = np.max([self._peaks[method], *shares], axis=0)
+def compare_methods(planner: Planner, start: Array, scene: Scene, height: float) -> dict[str, PairMotion]:
+    """Return the motions of the other methods between the same positions; the last one is the lower bound."""
+    limits = planner.limits
+    waypoints = find_waypoints(planner.kinematics, limits, start, scene.touch, scene.drop, height)
+    motions = {}
+    for method, follow in (("stops at waypoints", plan_with_stops), ("TOPP-RA", plan_with_toppra)):
+        followed, times = zip(*[_call_timed(follow, path, limits) for path in waypoints], strict=True)
+        duration = sum(duration for duration, _ in followed)
+        motions[method] = PairMotion(duration, [states for _, states in followed], list(times))
+    lower_bound = find_lower_bound(planner.kinematics, limits, start, scene.touch, scene.drop)
+    return {**motions, "lower bound": lower_bound}
 
-    def collect_figures(self) -> Figures:
-        """Return the table of all methods, and the problems.
 
-        Raises:
-            InputError: No pair could be planned.
-        """
-        if "ours" not in self._durations:
-            raise InputError(f"no motion was found in cell {self._cell.cell}: {self._failures[0]}")
-        rows = {name: self._make_row(name) for name in self._durations}
-        lower_bound = rows["lower bound"]["time_s"]
-        over_limit = [name for name in PEAKS if rows["ours"][name] > 1 + PEAK_TOLERANCE]
-        return {
-            "planned_pairs": len(self._durations["ours"]),
-            "methods": [
-                {"method": name, **row, "ratio_to_lower_bound": row["time_s"] / lower_bound}
-                for name, row in rows.items()
-            ],
-            "problems": [
-                *(f"{name} over its limit" for name in over_limit),
-                *(f"not planned: {failure}" for failure in self._failures),
-            ],
-        }
+def _call_timed(plan: Callable[..., T], *args: Any) -> tuple[T, float]:
+    """Return the result of `plan`, and its planning time [ms]."""
+    began = time.perf_counter()
+    result = plan(*args)
+    return result, (time.perf_counter() - began) * 1e3
 
-    def _make_row(self, method: str) -> Figures:
-        """Return mean duration [s], peaks relative to the limits, and planning times [ms] of a method."""
-        peaks = zip(PEAKS, self._peaks[method].tolist(), strict=True)
-        planning = self._planning_times_ms[method]
-        median, p99 = np.percentile(planning, (50, 99)).tolist() if planning else (None, None)
-        row = {"time_s": float(np.mean(self._durations[method])), **dict(peaks)}
-        return {**row, "planning_median_ms": median, "planning_p99_ms": p99}
 
-    def _plan(self, start: Array, scene: Scene) -> tuple[float, tuple[Trajectory, Trajectory]]:
-        """Plan both motions of a pair, keep the end posture as the next start, and return their duration [s].
-
-        On contact the arm brakes along the approach; the transit begins where the arm comes to rest.
-        """
-        planner = self._planner
-        approach = self._call_timed("ours", planner.plan, start, scene.approach, scene.fetch_task)
-        tips, _ = planner.kinematics.compute_tcps_and_axes(approach.samples.q)
-        above = int(np.flatnonzero(tips[:, 2] > scene.contact_height)[-1])
-        touched = min((above + 1) * STEP, approach.duration)
-        stop = plan_braking(approach, touched, planner.limits)
-        grasp = approach.state_at(float(stop[-1])).q
-        transit = self._call_timed(
-            "ours", planner.plan, grasp, scene.drop, scene.make_carry_task(scene.breakaway_force)
-        )
-        self._q = transit.end
-        return touched + len(stop) * STEP + transit.duration, (approach, transit)
-
-    def _call_timed(self, method: str, plan: Callable[..., T], *args: Any) -> T:
-        """Return the result of `plan`, and record its planning time."""
-        began = time.perf_counter()
-        try:
-            return plan(*args)
-        finally:
-            self._planning_times_ms[method].append((time.perf_counter() - began) * 1e3)
-
-    def _compare(self, start: Array, scene: Scene) -> None:
-        """Compute the motions of the other methods between the same positions."""
-        kinematics, limits = self._planner.kinematics, self._planner.limits
-        height = compute_travel_height(self._cell)
-        waypoints = baselines.find_waypoints(kinematics, limits, start, scene.touch, scene.drop, height)
-        if "lower bound" not in self._durations:
-            baselines.plan_with_toppra(waypoints[0], limits)  # The first call compiles; do not time it.
-        followers = {"stops at waypoints": baselines.plan_with_stops, "TOPP-RA": baselines.plan_with_toppra}
-        for name, follow in followers.items():
-            motions = [self._call_timed(name, follow, path, limits) for path in waypoints]
-            self._add(name, sum(duration for duration, _ in motions), [states for _, states in motions])
-        motion = baselines.find_lower_bound(kinematics, limits, start, scene.touch, scene.drop)
-        self._add("lower bound", *motion)
+def summarize(method: str, motions: Sequence[PairMotion], limits: JointLimits) -> Figures:
+    """Return mean duration [s], peaks relative to the limits, and planning times [ms] of a method."""
+    states = [one for motion in motions for one in motion.states]
+    peaks = np.max([compute_peak_fractions(one, limits).max(axis=1) for one in states], axis=0)
+    planning_times = [planning_time for motion in motions for planning_time in motion.planning_times]
+    row = {"method": method, "time_s": float(np.mean([motion.duration for motion in motions]))}
+    row |= dict(zip(PEAKS, peaks.tolist(), strict=True))
+    for name, percent in (("planning_median_ms", 50), ("planning_p99_ms", 99)):
+        row[name] = float(np.percentile(planning_times, percent)) if planning_times else None
+    return row
 
 
 if __name__ == "__main__":
-    run_command(
-        measure,
-        *CELL_OPTIONS,
-        click.option(
-            "--pairs", type=click.IntRange(min=1), default=200, show_default=True, help="Random pairs."
-        ),
-        click.option("--execute", is_flag=True, help="Have the simulated arm make the motions instead."),
-    )
+    run_command(measure)

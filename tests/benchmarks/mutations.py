@@ -2,6 +2,8 @@
 
 `python -m tests.benchmarks.mutations --seed 2` draws 60 mutations and runs, for each one, those tests of the
 default tier that execute the changed line. A mutation that no test detects survives and is listed.
+`--json` prints all mutations. `--from FILE` reads such an output and makes the same mutations again, also in
+statements that have moved to another file; a mutation whose statement does not exist any more is `gone`.
 """
 
 from __future__ import annotations
@@ -15,9 +17,11 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from itertools import accumulate
 from pathlib import Path
 from queue import Queue
 
@@ -64,6 +68,8 @@ class Mutation:
         kind: `operator`, `constant`, `deleted line` or `swapped arguments`.
         path: File, relative to the repository.
         line: First line of the place, from 1.
+        function: Name of the innermost function around the place, after the name of its class; "" for none.
+        text: The first line of the place in the file, without indentation.
         span: First and last offset of the replaced text in the file [byte].
         old: The replaced text.
         new: Its replacement.
@@ -72,6 +78,8 @@ class Mutation:
     kind: str
     path: str
     line: int
+    function: str
+    text: str
     span: tuple[int, int]
     old: str
     new: str
@@ -79,18 +87,21 @@ class Mutation:
 
 def find_mutations(path: Path, source: str) -> Iterator[Mutation]:
     """Yield every mutation of the four kinds in one module; text, messages and imports are left unchanged."""
-    data = source.encode()
-    starts = [0]
-    for line in data.splitlines(keepends=True):
-        starts.append(starts[-1] + len(line))
+    lines = source.encode().splitlines(keepends=True)
+    starts = [0, *accumulate(map(len, lines))]
+    tree = ast.parse(source)
+    functions = _name_functions(tree)
 
     def mutation_of(kind: str, node: ast.expr | ast.stmt, new: str) -> Mutation:
         assert node.end_lineno is not None and node.end_col_offset is not None
         first = starts[node.lineno - 1] + node.col_offset
         last = starts[node.end_lineno - 1] + node.end_col_offset
-        return Mutation(kind, str(path), node.lineno, (first, last), data[first:last].decode(), new)
+        text = lines[node.lineno - 1].decode().strip()
+        old = source.encode()[first:last].decode()
+        return Mutation(
+            kind, str(path), node.lineno, functions.get(id(node), ""), text, (first, last), old, new
+        )
 
-    tree = ast.parse(source)
     skipped = {id(child) for node in ast.walk(tree) if _is_skipped(node) for child in ast.walk(node)}
     for node in ast.walk(tree):
         if id(node) in skipped:
@@ -117,6 +128,18 @@ def find_mutations(path: Path, source: str) -> Iterator[Mutation]:
                 yield mutation_of("swapped arguments", node, f"{ast.unparse(node.func)}({arguments})")
 
 
+def _name_functions(tree: ast.Module) -> dict[int, str]:
+    """Return the name of the innermost function around each node, by the identity of the node."""
+    names: dict[int, str] = {}
+    classes: dict[int, str] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef):
+            classes.update({id(child): f"{node.name}." for child in ast.walk(node)})
+        elif isinstance(node, ast.FunctionDef):
+            names.update({id(child): classes.get(id(node), "") + node.name for child in ast.walk(node)})
+    return names
+
+
 def _is_skipped(node: ast.AST) -> bool:
     """Return True for text, annotations, imports and raised errors: they hold messages or nothing to run."""
     return isinstance(node, ast.JoinedStr | ast.Raise | ast.Import | ast.ImportFrom | ast.arg)
@@ -137,31 +160,56 @@ def _deletable_statements(function: ast.FunctionDef) -> Iterator[ast.stmt]:
             yield node
 
 
-def draw_mutations(root: Path, seed: int, count: int) -> list[Mutation]:
-    """Return `count` random mutations of `executive/` and `skills/`, the four kinds in equal numbers."""
-    by_kind: dict[str, list[Mutation]] = {}
-    for folder in ("executive", "skills"):
-        for path in sorted((root / folder).rglob("*.py")):
-            relative = path.relative_to(root)
-            if not str(relative).startswith(EXCLUDED_FOLDERS):
-                for mutation in find_mutations(relative, path.read_text()):
-                    by_kind.setdefault(mutation.kind, []).append(mutation)
+def list_mutations(root: Path) -> list[Mutation]:
+    """Return every mutation of `executive/` and `skills/`."""
+    return [
+        mutation
+        for folder in ("executive", "skills")
+        for path in sorted((root / folder).rglob("*.py"))
+        if not str(path.relative_to(root)).startswith(EXCLUDED_FOLDERS)
+        for mutation in find_mutations(path.relative_to(root), path.read_text())
+    ]
+
+
+def draw_mutations(mutations: Sequence[Mutation], seed: int, count: int) -> list[Mutation]:
+    """Return `count` random mutations, the four kinds in equal numbers."""
     chance = random.Random(seed)
-    kinds = sorted(by_kind)
-    return [chance.choice(by_kind[kinds[index % len(kinds)]]) for index in range(count)]
+    kinds = sorted({one.kind for one in mutations})
+    by_kind = [[one for one in mutations if one.kind == kind] for kind in kinds]
+    return [chance.choice(by_kind[index % len(kinds)]) for index in range(count)]
 
 
-def measure_coverage(root: Path) -> CoverageData:
-    """Run the default tests once and return which test executes which line."""
+def find_again(former: Mutation, mutations: Sequence[Mutation]) -> Mutation | None:
+    """Return the mutation of the present code that equals a former one; None if there is none, or several.
+
+    The file may have another name, then the class, then the line breaks of the statement.
+    """
+    equal = [one for one in mutations if _get_change(one) == _get_change(former)]
+    for names in (("text", "function", "path"), ("text", "function"), ("text",), ()):
+        found = [one for one in equal if all(getattr(one, name) == getattr(former, name) for name in names)]
+        if found and len({(one.path, one.function) for one in found}) == 1:
+            return min(found, key=lambda one: abs(one.line - former.line))
+    return None
+
+
+def _get_change(mutation: Mutation) -> tuple[str, ...]:
+    """Return what equal mutations have in common, whatever their file, class and line breaks are."""
+    function = mutation.function.rpartition(".")[2]
+    return mutation.kind, function, "".join(mutation.old.split()), "".join(mutation.new.split())
+
+
+def read_mutations(file: Path) -> list[Mutation]:
+    """Return the mutations in the output of an earlier call with `--json`, or in a list of mutations."""
+    content = json.loads(file.read_text())
+    names = Mutation.__dataclass_fields__
+    entries = content["mutations"] if isinstance(content, dict) else content
+    return [Mutation(**{name: entry[name] for name in names}) for entry in entries]
+
+
+def measure_coverage(root: Path) -> None:
+    """Run the default tests once, and write which test executes which line."""
     options = ["-n", "2", "--cov=executive", "--cov=skills", "--cov-context=test", "--cov-report="]
     subprocess.run([*PYTEST, *options], cwd=root, check=True)
-    return _read_coverage(root)
-
-
-def _read_coverage(root: Path) -> CoverageData:
-    data = CoverageData(str(root / ".coverage"))
-    data.read()
-    return data
 
 
 def select_tests(data: CoverageData, root: Path, mutation: Mutation) -> list[str]:
@@ -200,16 +248,26 @@ def run_tests_on_mutant(working_copy: Path, mutation: Mutation, tests: Sequence[
 
 
 def main() -> None:
-    """Draw mutations, test each one, and print those that survive."""
+    """Make mutations, test each one, and print those that survive."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=60)
+    parser.add_argument("--from", dest="file", type=Path, help="make the mutations of an earlier call again")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--keep-coverage", action="store_true", help="use the coverage of the last run")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    data = _read_coverage(ROOT) if options.keep_coverage else measure_coverage(ROOT)
-    mutations = draw_mutations(ROOT, options.seed, options.count)
+    possible = list_mutations(ROOT)
+    if options.file:
+        drawn = read_mutations(options.file)
+        mutations = [find_again(one, possible) for one in drawn]
+    else:
+        drawn = draw_mutations(possible, options.seed, options.count)
+        mutations = [*drawn]
+    if not options.keep_coverage:
+        measure_coverage(ROOT)
+    data = CoverageData(str(ROOT / ".coverage"))
+    data.read()
     with tempfile.TemporaryDirectory() as folder:
         working_copies: Queue[Path] = Queue()
         for number in range(options.workers):
@@ -218,22 +276,27 @@ def main() -> None:
             shutil.copytree(ROOT, working_copy, ignore=ignored)
             working_copies.put(working_copy)
 
-        def is_detected(mutation: Mutation) -> bool:
+        def find_result(mutation: Mutation | None) -> str:
+            if mutation is None:
+                return "gone"
             working_copy = working_copies.get()
             try:
-                return run_tests_on_mutant(working_copy, mutation, select_tests(data, ROOT, mutation))
+                tests = select_tests(data, ROOT, mutation)
+                return "detected" if run_tests_on_mutant(working_copy, mutation, tests) else "survived"
             finally:
                 working_copies.put(working_copy)
 
         with ThreadPoolExecutor(options.workers) as pool:
-            detected = list(pool.map(is_detected, mutations))
-    survivors = [mutation for mutation, found in zip(mutations, detected, strict=True) if not found]
+            results = list(pool.map(find_result, mutations))
+    found = [present or former for present, former in zip(mutations, drawn, strict=True)]
     if options.json:
-        print(json.dumps({"drawn": len(mutations), "survivors": [asdict(one) for one in survivors]}))
+        rows = [{**asdict(one), "result": result} for one, result in zip(found, results, strict=True)]
+        print(json.dumps({"seed": options.seed, "mutations": rows}, indent=1))
         return
-    print(f"{sum(detected)} of {len(mutations)} mutations detected (seed {options.seed})")
-    for one in survivors:
-        print(f"{one.path}:{one.line}: {one.kind}: {one.old!r} -> {one.new!r}")
+    print(f"{len(drawn)} mutations: {dict(Counter(results))}")
+    for one, result in zip(found, results, strict=True):
+        if result != "detected":
+            print(f"{result}: {one.path}:{one.line}: {one.kind}: {one.old!r} -> {one.new!r}")
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ as tables, and lists of sentences with their counts. The exit code is 1 if the l
 
 from __future__ import annotations
 
+import inspect
 import json
 import sys
 from collections import Counter
@@ -22,11 +23,21 @@ from rich.table import Table
 from executive.campaign.mission_under_test import MissionUnderTest, load_mission_under_test
 from executive.cell.json_values import to_json
 from executive.cli.cells import load_cells
-from executive.cli.options import json_option, mission_argument, oracle_option, overrides_option, seed_option
+from executive.cli.options import (
+    json_option,
+    mission_argument,
+    oracle_option,
+    overrides_option,
+    runs_option,
+    seed_option,
+    workers_option,
+)
 from executive.cli.streams import keep_stdout_clean, print_json
-from executive.errors import ExecutiveError, InputError
+from executive.errors import ExecutiveError
+from executive.events import TimedEvent
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
+from executive.run.run import Run
 
 Figures = dict[str, Any]
 """Figures of a benchmark by name; a name ends with the unit."""
@@ -36,22 +47,50 @@ TABLE_WIDTH = 160
 """Width of the widest table [characters]."""
 T = TypeVar("T")
 
-CELL_OPTIONS = (click.argument("cell", default="overhead"), seed_option)
-"""Options of a benchmark that measures a cell."""
-WALL_TIME_LIMIT = 180.0
-"""Wall time after which a run counts as hung and is killed, unless an option says otherwise [s]."""
-limit_option = click.option(
-    "--wall-time-limit", type=click.FloatRange(min=0, min_open=True), default=WALL_TIME_LIMIT,
-    show_default=True, help="Wall time in seconds after which a run is killed and counts as HUNG.",
-)  # fmt: skip
+SHARED_OPTIONS: dict[str, tuple[Option, ...]] = {
+    "subject": (mission_argument, oracle_option, seed_option, overrides_option),
+    "cell": (click.argument("cell", default="overhead"),),
+    "seed": (seed_option,),
+    "runs_folder": (runs_option,),
+    "workers": (workers_option,),
+}
+"""Arguments and options that several benchmarks have, by the parameter that receives their values."""
+OPTION_TYPES: dict[str, Any] = {
+    "int": click.IntRange(min=0),
+    "float": click.FloatRange(min=0),
+    "Path": click.Path(path_type=Path, dir_okay=False),
+}
+"""Types of the options that only one benchmark has, by the annotation of the parameter."""
 
 
-def run_command(measure: Callable[..., Figures], *options: Option) -> None:
-    """Parse the command line, print the figures that `measure` returns for it, and exit."""
+class SilentView:
+    """View of a run that shows nothing; subclasses observe the events."""
+
+    def open(self, run: Run) -> None:
+        """Do nothing."""
+
+    def __call__(self, timed: TimedEvent) -> None:
+        """Ignore an event."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+    def show_message(self, message: str) -> None:
+        """Ignore a message."""
+
+
+def run_command(measure: Callable[..., Figures]) -> None:
+    """Parse the command line, print the figures that `measure` returns for it, and exit.
+
+    Each parameter of `measure` is an option; its docstring is the help.
+    """
 
     def command(as_json: bool, **values: Any) -> None:
         if "cell" in values:
             (values["cell"],) = load_cells((values["cell"],)).values()
+        if "mission" in values:
+            names = ("mission", "overrides", "oracle", "seed")
+            values["subject"] = load_mission_under_test(*[values.pop(name) for name in names])
         with keep_stdout_clean():
             figures = measure(**values)
         if as_json:
@@ -60,9 +99,10 @@ def run_command(measure: Callable[..., Figures], *options: Option) -> None:
             print_figures(figures)
         sys.exit(int(bool(figures.get("problems"))))
 
-    configured: Any = command
-    for option in reversed((*options, json_option)):
-        configured = option(configured)
+    configured: Any = json_option(command)
+    for name, parameter in reversed(inspect.signature(measure).parameters.items()):
+        for option in reversed(SHARED_OPTIONS.get(name) or (_make_option(parameter),)):
+            configured = option(configured)
     try:
         click.command(help=measure.__doc__)(configured)()
     except ExecutiveError as error:
@@ -70,19 +110,13 @@ def run_command(measure: Callable[..., Figures], *options: Option) -> None:
         sys.exit(error.exit_code)
 
 
-def run_mission_command(measure: Callable[..., Figures], *options: Option) -> None:
-    """Parse the command line of a benchmark of a mission, print its figures, and exit.
-
-    `measure` gets the mission as a `MissionUnderTest`, then the other options.
-    """
-
-    def measure_mission(
-        mission: str, overrides: dict[str, str], oracle: bool, seed: int, **values: Any
-    ) -> Figures:
-        return measure(load_mission_under_test(mission, overrides, oracle, seed), **values)
-
-    measure_mission.__doc__ = measure.__doc__
-    run_command(measure_mission, mission_argument, *options, oracle_option, seed_option, overrides_option)
+def _make_option(parameter: inspect.Parameter) -> Option:
+    """Return the option for a parameter, whose annotation is a text."""
+    name = "--" + parameter.name.replace("_", "-")
+    kind = parameter.annotation.removesuffix(" | None")
+    if kind == "bool":
+        return click.option(name, is_flag=True)
+    return click.option(name, type=OPTION_TYPES.get(kind), default=parameter.default, show_default=True)
 
 
 def record_subject(subject: MissionUnderTest, seed: int, runs: Path) -> tuple[Figures, str]:
@@ -111,16 +145,9 @@ def show_progress(items: Iterable[T], description: str) -> Iterable[T]:
 
 
 def write_json(path: Path, figures: Figures) -> None:
-    """Write figures to a JSON file.
-
-    Raises:
-        InputError: The file cannot be written.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(figures, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f'cannot write the figures "{path}": {error.strerror}; name another file') from error
+    """Write figures to a JSON file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(figures, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def print_figures(figures: Figures) -> None:

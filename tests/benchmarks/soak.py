@@ -10,11 +10,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import click
-
 from executive.campaign.mission_under_test import MissionUnderTest
-from executive.errors import InputError
-from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command, show_progress
+from tests.benchmarks.report import Figures, describe, record_subject, run_command, show_progress
 
 PROCESS = Path("/proc/self")
 """Folder in which Linux lists the resources of this process."""
@@ -28,8 +25,6 @@ MAX_OBJECTS_PER_RUN = 2.0
 
 def measure(subject: MissionUnderTest, runs: int = 100) -> Figures:
     """Record many runs of MISSION with consecutive seeds in one process, and compare its resources."""
-    if not PROCESS.is_dir():
-        raise InputError(f"resources of a process are read from {PROCESS}, which only Linux has; use Linux")
     samples: list[Figures] = []
     failed: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -55,37 +50,31 @@ def take_sample() -> Figures:
 
 def compare_samples(samples: Sequence[Figures], failed: Sequence[str] = ()) -> Figures:
     """Return how much the resources grew over the samples, and every limit that was exceeded."""
-    warm, last = samples[min(WARM_UP_RUNS, len(samples)) - 1], samples[-1]
-    figures = {
-        "growth_mb": len(samples) * _slope(samples, "memory_mb"),
-        "objects_per_run": _slope(samples, "objects"),
-    }
-    problems = [
-        f"{name} is {figures[name]:.4g}; {limit:.3g} is allowed"
-        for name, limit in (("growth_mb", MAX_GROWTH), ("objects_per_run", MAX_OBJECTS_PER_RUN))
-        if figures[name] > limit
-    ] + [
-        f"{last[name]} {name} after the last run; {warm[name]} when warm"
-        for name in ("threads", "open_files")
-        if last[name] > warm[name]
-    ]
+    warm = samples[min(WARM_UP_RUNS, len(samples)) - 1]
+    last = samples[-1]
+    growth = len(samples) * _compute_slope(samples, "memory_mb")
+    objects = _compute_slope(samples, "objects")
+    problems = [*failed]
+    if growth > MAX_GROWTH:
+        problems.append(f"growth_mb is {growth:.4g}; {MAX_GROWTH:g} is allowed")
+    if objects > MAX_OBJECTS_PER_RUN:
+        problems.append(f"objects_per_run is {objects:.4g}; {MAX_OBJECTS_PER_RUN:g} is allowed")
+    for name in ("threads", "open_files"):
+        if last[name] > warm[name]:
+            problems.append(f"{last[name]} {name} after the last run; {warm[name]} when warm")
     return {
-        **figures,
+        "growth_mb": growth,
+        "objects_per_run": objects,
         "samples": [{"after": "warm-up", **warm}, {"after": "last run", **last}],
-        "problems": [*problems, *failed],
+        "problems": problems,
     }
 
 
-def _slope(samples: Sequence[Figures], name: str) -> float:
+def _compute_slope(samples: Sequence[Figures], name: str) -> float:
     """Return the growth of a resource per run: least squares over the last three quarters of the runs."""
     values = [sample[name] for sample in samples[len(samples) // 4 :]]
     return statistics.linear_regression(range(len(values)), values).slope if len(values) > 1 else 0.0
 
 
 if __name__ == "__main__":
-    run_mission_command(
-        measure,
-        click.option(
-            "--runs", type=click.IntRange(min=1), default=100, show_default=True, help="Number of runs."
-        ),
-    )
+    run_command(measure)

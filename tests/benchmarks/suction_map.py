@@ -9,18 +9,17 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 
-import click
 import numpy as np
 
 from executive.cell.config import CellConfig, ToolConfig
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.suction import compute_breakaway_force
-from executive.cells.sim.suction import measure_contact as measure_seal
+from executive.cells.sim.suction import compute_breakaway_force, measure_contact
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
-from tests.benchmarks.report import CELL_OPTIONS, Figures, run_command
+from tests.benchmarks.report import Figures, run_command
 
 SHIPPED_MAP = Path(__file__).with_name("suction_map.csv")
 """File with the map of the cell `overhead`."""
@@ -36,11 +35,14 @@ SETTLE_STEPS = 120
 """Physics steps in which an object comes to rest."""
 
 
-def measure_contact(cell: CellConfig, out: Path | None = None) -> Figures:
+def measure(cell: CellConfig, out: Path | None = None) -> Figures:
     """Measure the suction of cups on the objects of CELL, and write all rows to `--out` as CSV."""
     rows = measure_map(cell)
     if out is not None:
-        write_map(rows, out)
+        with out.open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
     # JSON has no word for infinity.
     plain = [{key: None if value == math.inf else value for key, value in row.items()} for row in rows]
     return {"cell": cell.cell, "map": plain}
@@ -54,8 +56,7 @@ def measure_map(
     Cups of all sizes have the vacuum (force per lip area) and the tolerances of the cell's tool.
     """
     rows = []
-    world = World(cell)
-    try:
+    with closing(World(cell)) as world:
         for label in cell.objects:
             places = {offset: list(_find_places(cell, label, offset)) for offset in offsets}
             body = world.add_object(label, _pose_on_table(cell, label), (1.0, 1.0, 1.0))
@@ -68,26 +69,14 @@ def measure_map(
                     key = {"label": label, "cup_radius": radius, "offset": offset}
                     rows.append({**key, **_measure_places(world, body, tool, places[offset])})
             world.remove_object(body)
-    finally:
-        world.close()
     return rows
 
 
-def write_map(rows: Sequence[Figures], path: Path) -> None:
-    """Write the rows as CSV with a header, in SI units."""
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-
-
 def read_map(path: Path = SHIPPED_MAP) -> list[Figures]:
-    """Return the rows of a file that `write_map` wrote."""
+    """Return the rows of a written map."""
     with path.open(newline="") as file:
-        return [
-            {key: text if key == "label" else float(text) for key, text in line.items()}
-            for line in csv.DictReader(file)
-        ]
+        lines = list(csv.DictReader(file))
+    return [{key: text if key == "label" else float(text) for key, text in line.items()} for line in lines]
 
 
 def _pose_on_table(cell: CellConfig, label: str) -> Pose:
@@ -122,35 +111,23 @@ def _measure_places(world: World, body: int, tool: ToolConfig, places: Iterable[
     for place in places:
         x, y, _ = X_WO.apply([*place, 0.0])
         # Twice: Bullet's ray against a sphere errs by up to 0.8 mm over 0.2 m, by 0.02 mm over 5 mm.
-        seal = measure_seal(world.client, make_tool_down_pose([x, y, top]), {body}, tool.cup_radius, top)
+        seal = measure_contact(world.client, make_tool_down_pose([x, y, top]), {body}, tool.cup_radius, top)
         if seal is not None:
             landed = make_tool_down_pose([x, y, top - seal.distance])
-            seal = measure_seal(world.client, landed, {body}, tool.cup_radius, tool.reach)
+            seal = measure_contact(world.client, landed, {body}, tool.cup_radius, tool.reach)
         gaps.append(math.inf if seal is None else seal.gap)
         tilts.append(math.pi / 2 if seal is None else seal.tilt)
         forces.append(compute_breakaway_force(seal, tool))
-    return {
-        "placements": len(gaps),
-        **_quantiles("gap", gaps, 6),
-        **_quantiles("tilt", tilts, 4),
-        "sealed": round(float(np.mean(np.array(forces) >= tool.min_force)), 4),
-        **_quantiles("force", forces, 3),
-    }
+    sealed = round(float(np.mean(np.array(forces) >= tool.min_force)), 4)
+    row = {"placements": len(gaps), **_quantiles("gap", gaps, 6), **_quantiles("tilt", tilts, 4)}
+    return {**row, "sealed": sealed, **_quantiles("force", forces, 3)}
 
 
 def _quantiles(name: str, values: Sequence[float], digits: int) -> Figures:
     """Return quantiles without interpolation, which fails next to infinite values."""
-    low, median, high = np.quantile(values, [0.1, 0.5, 0.9], method="lower").tolist()
-    return {
-        f"{name}_p10": round(low, digits),
-        f"{name}_median": round(median, digits),
-        f"{name}_p90": round(high, digits),
-    }
+    quantiles = np.quantile(values, [0.1, 0.5, 0.9], method="lower").round(digits).tolist()
+    return dict(zip((f"{name}_p10", f"{name}_median", f"{name}_p90"), quantiles, strict=True))
 
 
 if __name__ == "__main__":
-    run_command(
-        measure_contact,
-        *CELL_OPTIONS[:1],
-        click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="CSV file to write."),
-    )
+    run_command(measure)

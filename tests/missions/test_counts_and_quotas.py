@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-import pytest
-
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_mission import MissionResult, run_mission
 
@@ -38,12 +36,6 @@ def test_two_cubes_fill_each_bin_with_a_quota_and_the_rest_goes_elsewhere() -> N
         "blue_bin": {"cube": 2},
         "yellow_bin": {"cube": 2, "sphere": 1, "duck": 1},
     }
-
-
-@pytest.mark.parametrize("most", [1, 3])
-def test_set_changes_a_quota(most: int) -> None:
-    counts = count_by_bin(run_with("fill_by_quota", *["cube"] * 6, most=str(most)))
-    assert [counts[name]["cube"] for name in ("red_bin", "blue_bin")] == [most, most]
 
 
 def test_sorting_ends_after_four_objects_and_the_others_are_skipped() -> None:

@@ -26,21 +26,6 @@ def config(path: Path) -> CellConfig:
     return load_cell(path)
 
 
-def test_there_are_cells() -> None:
-    expected = {
-        "overhead",
-        "overhead_large",
-        "wrist",
-        "two_detectors",
-        "hosted",
-        "kitting",
-        "recycling",
-        "fruit",
-        "instruments",
-    }
-    assert {path.stem for path in CELLS} >= expected
-
-
 def test_it_has_the_name_of_its_file_and_says_what_it_stands_for(path: Path, config: CellConfig) -> None:
     assert config.cell == path.stem
     assert config.description

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import pytest
-
 from executive.cell.detection import Detection
 from executive.cells.fake.cell import FakeCell
 from executive.events import FrameSearched
@@ -57,20 +55,17 @@ def test_a_choice_rests_on_a_look_of_each_detector() -> None:
     assert len(looks) == 2 * (result.items["placed"] + 1)
 
 
-@pytest.mark.parametrize("name", ["embedded", "second"])
-def test_a_wrong_class_of_one_detector_is_outvoted(name: str) -> None:
-    result = sort(**{name: wrong_at_first})
+def test_a_wrong_class_of_one_detector_is_outvoted() -> None:
+    result = sort(embedded=wrong_at_first)
     assert_all_right(result)
-    assert result.list_failure_reasons("*/SelectTarget")[0] == "doubtful", (
-        "two looks that disagree leave doubt"
-    )
+    # Two looks that disagree leave doubt.
+    assert result.list_failure_reasons("*/SelectTarget")[0] == "doubtful"
 
 
-@pytest.mark.parametrize(("name", "other"), [("embedded", "second"), ("second", "embedded")])
-def test_where_one_detector_is_silent_the_other_is_asked(name: str, other: str) -> None:
-    result = sort(**{name: silent})
+def test_where_one_detector_is_silent_the_other_is_asked() -> None:
+    result = sort(embedded=silent)
     assert_all_right(result)
-    assert set(asked(result)) == {other}
+    assert set(asked(result)) == {"second"}
     assert "unavailable" in result.list_failure_reasons("*/Detect")
 
 

@@ -17,7 +17,7 @@ def put_objects(fake: FakeCell) -> None:
         fake.world.put(label, 0.5, y)
 
 
-@pytest.mark.parametrize("skill", ["Weigh", "Transit"])
+@pytest.mark.parametrize("skill", ["Weigh", pytest.param("Transit", marks=pytest.mark.slow)])
 def test_a_dropped_object_does_not_end_the_sort_by_weight(skill: str) -> None:
     faults = [during(f"*/{skill}", seal_breaks(), activations=1)]
     result = run_mission("weigh_and_sort", faults=faults, arrange=put_objects)

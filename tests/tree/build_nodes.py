@@ -12,20 +12,16 @@ from py_trees.behaviour import Behaviour
 
 from executive.events import Emit, discard_event
 from executive.tree.blackboard import Blackboard
+from executive.tree.decorators import Invert, Succeed, Timeout
 from executive.tree.failure import Reason
-from executive.tree.fallback import Fallback
-from executive.tree.for_each import ForEach
-from executive.tree.invert import Invert
 from executive.tree.keys import VariableName
+from executive.tree.loops import CounterLimits, ForEach, Repeat, While
 from executive.tree.parallel import Parallel
-from executive.tree.repeat import CounterLimits, Repeat
 from executive.tree.retry import Backoff, Retry
-from executive.tree.sequence import Sequence as SequenceNode
-from executive.tree.succeed import Succeed
-from executive.tree.timeout import Timeout
+from executive.tree.sequences import Fallback
+from executive.tree.sequences import Sequence as SequenceNode
 from executive.tree.tree_node import NodeContext
 from executive.tree.try_catch import Catch, TryCatch
-from executive.tree.while_loop import While
 
 Names = Iterable[tuple[str, str]]
 

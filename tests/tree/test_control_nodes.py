@@ -9,7 +9,6 @@ import pytest
 from build_nodes import names_of, sequence, timeout, try_catch
 from py_trees.common import Status
 
-from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.tree.halting import halt
 
@@ -37,7 +36,6 @@ def test_a_timeout_halts_its_body_and_says_timeout(leaf: Any, site: Any, clock: 
 @pytest.mark.parametrize(
     ("script", "times", "status"),
     [("R S", (0.0, 5.0), Status.SUCCESS), ("R R S", (1.0, 1.2), Status.RUNNING)],
-    ids=["done in the last moment", "the time counts from the start"],
 )
 def test_a_body_has_its_time(
     leaf: Any, site: Any, clock: Any, script: str, times: tuple[float, ...], status: Status
@@ -46,17 +44,6 @@ def test_a_body_has_its_time(
     for clock.now in times:
         node.tick_once()
     assert node.status is status
-
-
-def test_a_body_that_cannot_be_halted_is_a_fault(leaf: Any, site: Any, clock: Any) -> None:
-    body = leaf("A", "R R")
-    body.breaks = True
-    node = timeout(site("here"), body, 0.1, clock)
-    node.tick_once()
-    clock.now = 1.0
-    with pytest.raises(Fault, match="A: cannot stop") as caught:
-        node.tick_once()
-    assert caught.value.node == "here"
 
 
 def test_labels_gather_on_the_way_up(leaf: Any, site: Any, ticks: Any) -> None:

@@ -6,13 +6,12 @@ from typing import Any
 
 import pytest
 from build_nodes import sequence
-from py_trees.common import Status
 
 from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.testing.run_mission import run_mission
 from executive.testing.substitutes import make_substitute
-from executive.tree.guard import Guard
+from executive.tree.sequences import Guard
 from skills.has_elapsed import HasElapsed
 
 
@@ -28,7 +27,6 @@ def make_guard(site: Any, holds: Any, do: Any) -> Guard:
         (("off",), ("R S",), "F", "guard.broken"),
         (("S", "S", "off"), ("R R R S",), "RRF", "guard.broken"),
     ],
-    ids=["ends as its body", "passes on the failure of its body", "never starts its body", "is broken"],
 )
 def test_a_guard(
     leaf: Any, site: Any, ticks: Any, condition: Any, body: Any, statuses: str, reason: str | None
@@ -47,21 +45,9 @@ def test_a_broken_guard_halts_its_body_and_names_the_cause(
     assert log == ["C starts", "B starts", "C starts", "B halted"]
 
 
-def test_a_broken_guard_never_starts_its_body(leaf: Any, site: Any, ticks: Any, log: Any) -> None:
-    ticks(make_guard(site, leaf("C", "off"), leaf("B", "S")))
-    assert log == ["C starts"]
-
-
 def test_a_condition_that_takes_time_is_a_fault(leaf: Any, site: Any) -> None:
     with pytest.raises(Fault, match="C is a condition, but returned RUNNING"):
         make_guard(site, leaf("C", "R S"), leaf("B", "R S")).tick_once()
-
-
-def test_a_halted_guard_halts_its_body(leaf: Any, site: Any, log: Any) -> None:
-    node = make_guard(site, leaf("C"), leaf("B", "R R"))
-    node.tick_once()
-    node.stop(Status.INVALID)
-    assert log[-1] == "B halted"
 
 
 def test_only_the_first_check_and_a_changed_check_are_events(
@@ -75,13 +61,6 @@ def test_only_the_first_check_and_a_changed_check_are_events(
         NodeStarted("guard/holds"),
         NodeEnded("guard/holds", "FAILURE", reason="C.off", message="off happened", origin="C"),
     ]  # fmt: skip
-
-
-def test_every_activation_of_a_guard_reports_its_first_check(leaf: Any, site: Any, events: Any) -> None:
-    node = make_guard(site, sequence(site("guard/holds"), [leaf("C")]), leaf("B"))
-    node.tick_once()
-    node.tick_once()
-    assert events.count(NodeStarted("guard/holds")) == 2
 
 
 def test_a_fault_of_a_condition_is_reported(leaf: Any, site: Any, events: Any) -> None:
@@ -114,13 +93,6 @@ tree:
     catch: [{on: guard.broken, do: [ConfirmGrasp, PutDown]}]
 params: {limit: 30.0}
 """
-
-
-def test_a_mission_is_guarded_by_a_condition_of_conditions(tmp_path: Any) -> None:
-    (tmp_path / "m.yaml").write_text(MISSION)
-    result = run_mission(tmp_path / "m.yaml")
-    assert (result.status, result.items["placed"], result.agrees) == ("SUCCESS", 1, True)
-    assert len(result.list_activated_nodes("*/IsFresh")) == 1
 
 
 def test_a_broken_guard_stops_the_arm(tmp_path: Any) -> None:

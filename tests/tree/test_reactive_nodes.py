@@ -7,13 +7,11 @@ from typing import Any
 
 import pytest
 from build_nodes import sequence
-from py_trees.common import Status
 
 from executive.events import BranchChosen, NodeStarted
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
-from executive.tree.fallback import Fallback
-from executive.tree.sequence import Sequence
+from executive.tree.sequences import Fallback, Sequence
 
 
 def reactive(kind: Any, site: Any, children: Any) -> Any:
@@ -34,12 +32,6 @@ def reactive(kind: Any, site: Any, children: Any) -> Any:
          ["A starts", "B starts", "A starts", "B halted", "B starts"]),
         (Fallback, ("lost",), ("R off",), "RF", ["A starts", "B starts", "A starts"]),
     ],
-    ids=[
-        "sequence: an earlier child is checked again", "sequence: a failed check halts the running child",
-        "sequence: an earlier child that runs halts a later one", "sequence: fails with its failing child",
-        "fallback: an earlier child is tried again", "fallback: an earlier success halts the running child",
-        "fallback: an earlier child that runs halts a later one", "fallback: fails with its last child",
-    ],
 )  # fmt: skip
 def test_a_node_without_memory_begins_every_tick_with_its_first_child(
     leaf: Any, site: Any, ticks: Any, kind: Any, first: Any, second: Any, statuses: str, log: Any,
@@ -48,14 +40,6 @@ def test_a_node_without_memory_begins_every_tick_with_its_first_child(
     node = reactive(kind, site, [leaf("A", *first), leaf("B", *second)])
     assert ticks(node) == statuses
     assert request.getfixturevalue("log") == log
-
-
-@pytest.mark.parametrize("kind", [Sequence, Fallback])
-def test_a_halt_halts_the_running_child(leaf: Any, site: Any, log: Any, kind: Any) -> None:
-    node = reactive(kind, site, [leaf("A", "R R"), leaf("B")])
-    node.tick_once()
-    node.stop(Status.INVALID)
-    assert log == ["A starts", "A halted"]
 
 
 def test_a_repeated_check_with_an_equal_result_is_no_event(
@@ -76,11 +60,6 @@ def test_a_fallback_reports_its_choice_only_when_the_choice_changes(
     assert [event.choice for event in events if isinstance(event, BranchChosen)] == ["choice 2 of 2"]
 
 
-def test_a_node_with_memory_runs_a_child_once(leaf: Any, site: Any, ticks: Any, log: Any) -> None:
-    ticks(sequence(site(), [leaf("A"), leaf("B", "R R S")]))
-    assert log == ["A starts", "B starts"]
-
-
 MISSION = """
 mission: fresh_approach
 cell: cells/overhead.yaml
@@ -98,7 +77,6 @@ tree:
     "node",
     [
         "sequence: {memory: false, do: [{fallback: [IsFresh, [{use: look}, SelectTarget]]}, Approach]}",
-        "sequence: {memory: false, do: [{succeed: {all: [IsFresh, IsReachable]}}, Approach]}",
         "fallback: {memory: false, do: [[IsFresh, Approach], [{use: look}, SelectTarget, Approach]]}",
     ],
 )

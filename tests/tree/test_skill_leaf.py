@@ -67,10 +67,9 @@ def scope() -> Blackboard:
 def make(site: Any, scope: Blackboard, monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(Worker, "cleaned", [])
 
-    def make(way: str = "ok", skill: type[Skill] = Worker) -> SkillLeaf:
-        inputs, outputs = {"given": "input", "extra": "extra"}, {"made": "result"}
-        wiring = Wiring({"way": way}, inputs, outputs) if skill is Worker else Wiring({}, {}, {})
-        return SkillLeaf(site("tree/Worker"), skill.__name__, skill, wiring, None)  # type: ignore[arg-type]
+    def make(way: str = "ok") -> SkillLeaf:
+        wiring = Wiring({"way": way}, {"given": "input", "extra": "extra"}, {"made": "result"})
+        return SkillLeaf(site("tree/Worker"), "Worker", Worker, wiring, None)  # type: ignore[arg-type]
 
     return make
 
@@ -85,6 +84,10 @@ def test_inputs_are_those_of_the_start_and_outputs_are_committed_on_success_only
     node.tick_once()
     assert node.status is Status.SUCCESS
     assert dict(scope) == {"input": "brick", "result": "stone None"}
+    scope["extra"] = "new"
+    node.tick_once()
+    node.tick_once()
+    assert scope["result"] == "brick new"
 
 
 def test_a_failure_writes_nothing_and_says_why(make: Any, scope: Blackboard, ticks: Any) -> None:
@@ -95,42 +98,29 @@ def test_a_failure_writes_nothing_and_says_why(make: Any, scope: Blackboard, tic
     assert "result" not in scope
 
 
-def test_every_start_gets_a_fresh_instance_and_fresh_inputs(make: Any, scope: Blackboard, ticks: Any) -> None:
-    node = make()
-    ticks(node)
-    scope.update({"input": "brick", "extra": "new"})
-    assert (ticks(node), scope["result"]) == ("RS", "brick new")
-
-
 @pytest.mark.parametrize(
     ("way", "sentence"),
     [
-        ("break", "Worker: ValueError: a bug"),
-        ("undeclared", 'Worker: Worker raised the undeclared reason "worse"; it declares: bad'),
-        ("forget", "Worker: it succeeded without setting its output made"),
-        (
-            "yield",
-            'Worker: it yielded a tuple_iterator; to run the steps of another generator, write "yield from"',
-        ),
+        ("break", "ValueError: a bug"),
+        ("undeclared", 'undeclared reason "worse"; it declares: bad'),
+        ("forget", "without setting its output made"),
+        ("yield", "it yielded a tuple_iterator"),
     ],
 )
 def test_a_bug_in_a_skill_is_a_fault(make: Any, way: str, sentence: str, events: Any) -> None:
     node = make(way)
     node.tick_once()
-    with pytest.raises(Fault) as caught:
+    with pytest.raises(Fault, match=f"Worker: .*{sentence}") as caught:
         node.tick_once()
-    assert (str(caught.value), caught.value.node) == (sentence, "tree/Worker")
+    assert caught.value.node == "tree/Worker"
     assert (node.status, isinstance(caught.value.__cause__, ValueError)) == (Status.INVALID, way == "break")
     assert (events[-1].status, events[-1].reason) == ("INVALID", "fault")
 
 
 def test_a_missing_input_is_a_fault_that_names_it(make: Any, scope: Blackboard) -> None:
     del scope["input"]
-    with pytest.raises(Fault) as caught:
+    with pytest.raises(Fault, match=r'"given" reads \$input, .*; written so far: nothing'):
         make().tick_once()
-    assert str(caught.value) == (
-        'Worker: the input "given" reads $input, which no node has written yet; written so far: nothing'
-    )
 
 
 def test_halting_runs_the_finally_of_the_skill_unless_it_ended(make: Any, ticks: Any, events: Any) -> None:
@@ -147,49 +137,16 @@ def test_halting_runs_the_finally_of_the_skill_unless_it_ended(make: Any, ticks:
 @pytest.mark.parametrize(
     ("way", "problem"),
     [
-        ("linger", 'tree/Worker: Worker: it yielded while it was halted; "finally" must not contain a yield'),
-        ("break late", "tree/Worker: Worker: ValueError while it was halted: a late bug"),
+        ("linger", "it yielded while it was halted"),
+        ("break late", "ValueError while it was halted: a late bug"),
     ],
 )
 def test_a_skill_that_does_not_stop_cleanly_is_reported(make: Any, way: str, problem: str) -> None:
     node = make(way)
     node.tick_once()
-    assert halt(node) == [problem]
+    (message,) = halt(node)
+    assert message.startswith("tree/Worker: Worker: ") and problem in message
     assert node.status is Status.INVALID
-
-
-def test_a_skill_without_a_yield_is_done_at_once(make: Any, ticks: Any) -> None:
-    class AtOnce(Skill):
-        """Nothing to wait for."""
-
-        def run(self, cell: Any) -> Iterator[None]:
-            Worker.cleaned.append("done")
-            return None  # type: ignore[return-value]
-
-    assert (ticks(make(skill=AtOnce)), Worker.cleaned) == ("S", ["done"])
-
-
-def test_events_say_what_happened_to_which_item(site: Any, events: Any) -> None:
-    class Take(Skill):
-        """Take the target."""
-
-        target: In[Target]
-        held: Out[str]
-
-        def run(self, cell: Any) -> Iterator[None]:
-            yield
-            self.held = self.target.item
-
-    scope = site().blackboard
-    scope.update({"target": Target("cube-2", "cube", np.zeros(3), 0.9, 1, 0, 0.0)})
-    wiring = Wiring({}, {"target": "target"}, {"held": "held"})
-    node = SkillLeaf(site("tree/Take"), "Take", Take, wiring, None)  # type: ignore[arg-type]
-    node.tick_once()
-    node.tick_once()
-    assert events == [
-        NodeStarted("tree/Take", "Take", "cube-2"),
-        NodeEnded("tree/Take", "SUCCESS", "Take", "cube-2", outputs={"held": "cube-2"}),
-    ]
 
 
 class Sort(Skill):
@@ -213,13 +170,17 @@ def test_the_item_is_what_a_port_names_that_the_skill_always_has(
     scope.update({"box": "box-1", "unlike": "cube-2", "colour": colour})
     inputs = {name: name for name in ("unlike", "colour", "box")}
     wiring = Wiring({}, inputs, {"found": "found"})
-    assert ticks(SkillLeaf(site(), "Sort", Sort, wiring, None)) == "RS"  # type: ignore[arg-type]
-    assert [event.item for event in events] == items
+    assert ticks(SkillLeaf(site("tree/Sort"), "Sort", Sort, wiring, None)) == "RS"  # type: ignore[arg-type]
+    outputs = {"found": "cube-9" if colour == "red" else ""}
+    assert events == [
+        NodeStarted("tree/Sort", "Sort", items[0]),
+        NodeEnded("tree/Sort", "SUCCESS", "Sort", items[1], outputs=outputs),
+    ]
 
 
-def test_a_forgotten_variable_is_gone_and_need_not_have_been_there() -> None:
-    scope, other = Blackboard(), Blackboard()
-    scope.update({"a": 1, "b": 2})
-    for _ in range(2):
-        scope.pop("a", None)
-    assert (dict(scope), dict(other)) == ({"b": 2}, {})
+def test_the_item_of_a_target_is_the_item_of_the_skill(site: Any, events: Any) -> None:
+    scope = site().blackboard
+    scope["input"] = Target("cube-2", "cube", np.zeros(3), 0.9, 1, 0, 0.0)
+    wiring = Wiring({}, {"given": "input"}, {"made": "made"})
+    SkillLeaf(site(), "Worker", Worker, wiring, None).tick_once()  # type: ignore[arg-type]
+    assert events[0].item == "cube-2"

@@ -11,7 +11,7 @@ from executive.mission.outline import Connection, OutlineNode, list_child_indice
 from executive.skill import In, Metres, Out, Skill, param, port
 from executive.tree.failure import Reason
 from executive.tree.retry import Retry
-from executive.tree.sequence import Sequence
+from executive.tree.sequences import Sequence
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 from executive.tree.tree_node import NodeContext, make_inspection_context
 from executive.tree.try_catch import Catch, TryCatch

@@ -1,4 +1,4 @@
-"""Control node that limits the time of its body."""
+"""Control nodes that change the result or limit the time of one body: invert, not, succeed and timeout."""
 
 from __future__ import annotations
 
@@ -7,10 +7,86 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.skill import Seconds
-from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure
+from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.inspection import Advice, Counterpart, PropagatedFailure
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
+
+
+class Invert(ControlNode):
+    """Succeed if the body fails; fail with `inverted` if the body succeeds.
+
+    * BehaviorTree.CPP: `Inverter`.
+    * py_trees: `decorators.Inverter`.
+    """
+
+    keyword = "invert"
+    reasons = ("inverted",)
+    symbol = "¬"
+    counterpart = Counterpart("Inverter")
+
+    do: Child = key(shorthand=True, doc="Body.")
+
+    def step(self) -> Status:
+        """Tick the body."""
+        status = self.tick_child(self.do)
+        if status is Status.SUCCESS:
+            return self.fail_with_reason("inverted", f"{self.do.name} succeeded")
+        return Status.SUCCESS if status is Status.FAILURE else status
+
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible outcomes of the body, with success and failure exchanged."""
+        flow = get_flow(self.do, state)
+        inverted = PossibleFailure(self.keyword, "inverted", self.path)
+        failures = {} if flow.success is None else {inverted: flow.success}
+        return Flow(join_states(flow.failures.values()), failures, flow.halted)
+
+
+class NotCondition(Invert):
+    """Succeed if the condition fails; fail with `inverted` if the condition succeeds.
+
+    * BehaviorTree.CPP: `Inverter`.
+    * py_trees: `decorators.Inverter`.
+    """
+
+    keyword = "not"
+    is_condition = True
+
+    do: Child = key(shorthand=True, in_path=False, requires_conditions=True, doc="Condition.")
+
+
+class Succeed(ControlNode):
+    """Succeed after success and failure of the body; without a body, succeed at once.
+
+    * BehaviorTree.CPP: `ForceSuccess`; without a body, `AlwaysSuccess`.
+    * py_trees: `decorators.FailureIsSuccess`; without a body, `behaviours.Success`.
+    """
+
+    keyword = "succeed"
+    symbol = "✓"
+
+    do: Child | None = key(shorthand=True, default=None, doc="Body.")
+
+    def step(self) -> Status:
+        """Tick the body, if any."""
+        if self.do is None:
+            return Status.SUCCESS
+        status = self.tick_child(self.do)
+        if status is Status.FAILURE:
+            self.report_choice("succeed despite the failure", self.get_failure(self.do))
+        return Status.RUNNING if status is Status.RUNNING else Status.SUCCESS
+
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible outcomes: success after success and failure of the body, or a halt."""
+        if self.do is None:
+            return Flow(state, {}, None)
+        flow = get_flow(self.do, state)
+        return Flow(join_states((flow.success, *flow.failures.values())), {}, flow.halted)
+
+    @property
+    def counterpart(self) -> Counterpart | None:
+        """`ForceSuccess` of BehaviorTree.CPP; without a body, `AlwaysSuccess`."""
+        return Counterpart("ForceSuccess" if self.do else "AlwaysSuccess")
 
 
 class Timeout(ControlNode):

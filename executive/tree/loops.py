@@ -1,0 +1,367 @@
+"""Loops, and the base class of control nodes whose decisions are written as a generator."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from typing import ClassVar, TypeAlias, cast
+
+from py_trees.common import Status
+
+from executive.cell.objects import Target
+from executive.errors import Fault
+from executive.skill import ANY, EMPTY, HOLDING
+from executive.tree.failure import Failure, Reason, format_reasons
+from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
+from executive.tree.inspection import Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
+from executive.tree.keys import Child, Elements, KeySection, VariableName, key
+from executive.tree.node import ControlNode
+
+NodeRun: TypeAlias = Generator[None, Status | None, Failure | None]
+"""Generator that returns a failure, or None for success. A `yield` ends the tick. If a child is running, the
+generator continues after the end of the child, and the value of the `yield` is the status of the child."""
+
+
+class GeneratorNode(ControlNode):
+    """Base class of control nodes that run one child after the other, in the order of a generator `run`.
+
+    A subclass implements `run` in place of `start` and `step`.
+    """
+
+    def start(self) -> None:
+        """Begin a new generator."""
+        self._run = self.run()
+        self._running_child: Child | None = None
+
+    def step(self) -> Status:
+        """Tick the running child, if any; unless it is still running, continue the generator."""
+        child = self._running_child
+        child_status = None
+        if child is not None:
+            child_status = self.tick_child(child)
+            if child_status is Status.RUNNING:
+                return child_status
+            self._running_child = None
+        try:
+            self._run.send(child_status)
+        except StopIteration as end:
+            failure = cast("Failure | None", end.value)
+            return Status.SUCCESS if failure is None else self.fail(failure)
+        return Status.RUNNING
+
+    def clean_up(self) -> None:
+        """Close the generator, so that its `finally` blocks are executed after a halt, too."""
+        self._run.close()
+
+    def run(self) -> NodeRun:
+        """Run the node from its start to its end."""
+        raise NotImplementedError
+
+    def run_child(self, child: Child) -> NodeRun:
+        """Tick a child once per tick until its end, and return its failure; None after success."""
+        status: Status | None = self.tick_child(child)
+        if status is Status.RUNNING:
+            self._running_child = child
+            status = yield
+        return self.get_failure(child) if status is Status.FAILURE else None
+
+
+class Loop(GeneratorNode):
+    """Base class of loops, which determines when the next iteration begins.
+
+    After an iteration that took only one tick, the next iteration begins in the next tick, so that a loop
+    never blocks a tick. After a longer iteration, the next iteration begins in the same tick.
+    """
+
+    symbol = "↻"
+
+    def start(self) -> None:
+        """Begin the first iteration."""
+        super().start()
+        self._has_tick_passed = False
+
+    def step(self) -> Status:
+        """Continue by one tick."""
+        status = super().step()
+        self._has_tick_passed = True
+        return status
+
+    def end_iteration(self) -> NodeRun:
+        """End an iteration; wait for the next tick if the iteration took only one tick."""
+        if not self._has_tick_passed:
+            yield
+        self._has_tick_passed = False
+        return None
+
+
+class While(Loop):
+    """Run the body as long as a condition succeeds; the condition runs before every iteration.
+
+    The loop succeeds when the condition fails; a failure of the body is passed on.
+
+    * BehaviorTree.CPP: custom node `while`. `WhileDoElse` runs its body once, and checks the condition again
+      at every tick.
+    * py_trees: no counterpart.
+    """
+
+    keyword = "while"
+    symbol = "↺"
+    unreachable_reason = "the condition never succeeds"
+
+    condition: Child = key(doc="Condition; its failure ends the loop with success.")
+    do: Child = key(doc="Body of the loop.")
+
+    def run(self) -> NodeRun:
+        """Run condition and body in turn until the condition or the body fails."""
+        while not (failure := (yield from self.run_child(self.condition))):
+            if body_failure := (yield from self.run_child(self.do)):
+                return body_failure
+            yield from self.end_iteration()
+        self.report_choice("done", failure)
+        return None
+
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible outcomes, by fixed-point iteration over condition and body."""
+
+        def compute_body_flow(condition: Flow) -> Flow:
+            return get_flow(self.do, condition.success) if condition.success else Flow(None, {}, None)
+
+        condition, entry = find_fixed_point(
+            get_flow, self.condition, state, lambda condition: compute_body_flow(condition).success
+        )
+        body = compute_body_flow(condition)
+        halted = join_states((condition.halted, entry, body.halted))
+        return Flow(join_states(condition.failures.values()), body.failures, halted)
+
+    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+        """Yield an error if the loop never ends because its condition cannot fail."""
+        condition = analysis.get_flow(self.condition)
+        if condition is not None and not condition.failures and not analysis.is_halted_by_sibling:
+            message = f"this loop never ends: its condition, {analysis.get_name(self.condition)}, cannot fail"
+            yield NodeFinding("", "endless", message, "Use `repeat` with `times` or `until`.")
+
+    def explain(self, failure: PropagatedFailure) -> str:
+        """Return the cause of a failure: the body, not the condition, failed."""
+        return "a failure of the body ends the loop"
+
+
+class CounterLimits(KeySection):
+    """Limits of counters of the run; the loop ends as soon as one counter reaches its limit."""
+
+    any_of = ("placed", "rejected", "elapsed")
+
+    placed: int | None = key(default=None, ge=0, doc="Number of items that the run has placed.")
+    rejected: int | None = key(default=None, ge=0, doc="Number of items that the run has rejected.")
+    elapsed: float | None = key(default=None, gt=0, doc="Time since the start of the run [s].")
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name}: {limit:g}" for name, limit in self.list_limits())
+
+    def list_limits(self) -> list[tuple[str, float]]:
+        """Return the counters that have a limit, with their limits."""
+        return [(name, limit) for name in self.keys if (limit := getattr(self, name)) is not None]
+
+
+class Repeat(Loop):
+    """Run the body until a number of iterations, an expected failure, or the limit of a counter is reached.
+
+    Each of these three conditions ends the loop with success. The loop reads the counters before each
+    iteration, and does not interrupt an iteration. Any other failure of the body ends the loop and is passed
+    on.
+
+    * BehaviorTree.CPP: `Repeat`; with `until`, a custom node `repeat`, as failures have no reasons there.
+    * py_trees: `decorators.Repeat`. Each iteration begins in a new tick, and there is no `until`.
+    """
+
+    keyword = "repeat"
+    keyword_hints: ClassVar = {"loop": "Write repeat; for a loop with a condition, write while."}
+    any_of = ("times", "until")
+    unreachable_reason = "the body runs 0 times"
+
+    times: int | None = key(default=None, ge=0, doc="Maximum number of iterations.")
+    until: tuple[Reason | CounterLimits, ...] = key(
+        default=(), doc="Failures and limits of counters that end the loop with success."
+    )
+    do: Child = key(doc="Body of the loop.")
+
+    @property
+    def detail(self) -> str:
+        """The conditions that end the loop, as a text."""
+        conditions = [] if self.times is None else [f"{self.times} times"]
+        if self.until:
+            conditions.append(f"until {format_reasons(self.until)}")
+        return " or ".join(conditions)
+
+    def run(self) -> NodeRun:
+        """Run the body until the loop is complete, or the body fails."""
+        iteration_count = 0
+        while not self._is_complete(iteration_count):
+            if failure := (yield from self.run_child(self.do)):
+                if not failure.matches(self._expected_reasons):
+                    return failure
+                self.report_choice("done", failure)
+                return None
+            iteration_count += 1
+            if not self._is_complete(iteration_count):
+                yield from self.end_iteration()
+        if reached_limit := self._find_reached_limit():
+            self.report_choice(f"done, {reached_limit}")
+        return None
+
+    @property
+    def _expected_reasons(self) -> list[Reason]:
+        """Failures that end the loop with success."""
+        return [end for end in self.until if isinstance(end, Reason)]
+
+    @property
+    def _limits(self) -> list[tuple[str, float]]:
+        """Counters that have a limit, with their limits."""
+        return [limit for end in self.until if isinstance(end, CounterLimits) for limit in end.list_limits()]
+
+    @property
+    def _is_empty(self) -> bool:
+        """True if the body never runs."""
+        return self.times == 0 or any(limit == 0 for _, limit in self._limits)
+
+    def _is_complete(self, iteration_count: int) -> bool:
+        """Return True if no further iteration may begin."""
+        return iteration_count == self.times or bool(self._find_reached_limit())
+
+    def _find_reached_limit(self) -> str:
+        """Return the first limit that a counter has reached, as a text: `placed: 4`; "" if none."""
+        limits = (f"{name}: {limit:g}" for name, limit in self._limits if self._read_counter(name) >= limit)
+        return next(limits, "")
+
+    def _read_counter(self, name: str) -> float:
+        return self.clock.now if name == "elapsed" else self.ledger.count_items(name)
+
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible outcomes; the next iteration starts in the state after success of the body."""
+        if self._is_empty:
+            return Flow(state, {}, None)
+        body, entry = find_fixed_point(
+            get_flow, self.do, state, lambda body: None if self.times == 1 else body.success
+        )
+        reasons = self._expected_reasons
+        expected_ends = [end for failure, end in body.failures.items() if failure.may_match(reasons)]
+        # A counter may have reached its limit before the first iteration.
+        last_ends = (None if self.times is None else body.success, entry if self._limits else None)
+        success = join_states((*expected_ends, *last_ends))
+        failures = {cause: end for cause, end in body.failures.items() if not cause.must_match(reasons)}
+        return Flow(success, failures, join_states((body.halted, entry)))
+
+    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+        """Yield an error if only a limit of `placed` can end the loop, and the body places no item."""
+        has_only_placed = {name for name, _ in self._limits} == {"placed"} and not self._expected_reasons
+        if not has_only_placed or self._is_empty or self.times or analysis.is_concurrent:
+            return
+        skills = analysis.list_skills().values()
+        if not any(skill is None or skill.tool_state in ((HOLDING, EMPTY), (ANY, EMPTY)) for skill in skills):
+            message = "this loop never succeeds: its body releases no object, so `placed` does not increase"
+            hint = "Add a failure reason or `elapsed` to `until`, or add `times`."
+            yield NodeFinding("", "endless", message, hint)
+
+    def explain(self, failure: PropagatedFailure) -> str:
+        """Return why the loop passed on a failure of its body."""
+        if self.until:
+            return f"this failure is not in until ({format_reasons(self.until)})"
+        return f"a failure ends the loop before its {self.times} iterations are complete"
+
+    @property
+    def counterpart(self) -> Counterpart | None:
+        """`Repeat` of BehaviorTree.CPP; None with `until`."""
+        return None if self.until else Counterpart("Repeat", {"num_cycles": "times"})
+
+
+class ForEach(Loop):
+    """Run the body once for every element of a list, in order.
+
+    The node reads the list at its start; with an empty list, the node succeeds at once. A failure of the body
+    ends the loop and is passed on. At its end, the node removes the variable `each`.
+
+    * BehaviorTree.CPP: custom node `for_each`. Its loops over queues (`LoopString`, `LoopDouble`, ...) start
+      the iteration of each element in a new tick, need one more tick at the end, and keep the variable.
+    * py_trees: `decorators.ForEach`. It runs the body once for an empty list, and stops at the first element
+      that is None.
+    """
+
+    keyword = "for_each"
+    keyword_hints: ClassVar = {"for": "Write for_each."}
+    symbol = "∀"
+    unreachable_reason = "the body runs 0 times"
+
+    each: VariableName = key(list_key="in", doc="Variable that holds the current element.")
+    in_: Elements = key(doc="A list, a variable that holds a list, or `poses`, `bins`, `classes` or `items`.")
+    do: Child = key(doc="Body of the loop.")
+
+    @property
+    def detail(self) -> str:
+        """The variable of the current element and the list, as a text."""
+        if isinstance(self.in_, VariableName):
+            field = f".{self.in_.field}" if self.in_.field else ""
+            return f"${self.each} in ${self.in_}{field}"
+        elements = self.in_ if self.in_ == "items" else f"[{', '.join(map(str, self.in_))}]"
+        return f"${self.each} in {elements}"
+
+    def run(self) -> NodeRun:
+        """Write each element of the list to the variable `each` and run the body; then remove the variable.
+
+        Raises:
+            Fault: The variable with the list was never written, or its value is not a list.
+        """
+        elements = self._read_list()
+        try:
+            for number, element in enumerate(elements, 1):
+                self.blackboard[self.each] = element
+                self.report_choice(f"element {number} of {len(elements)}: {_describe_element(element)}")
+                if number > 1:
+                    yield from self.end_iteration()
+                if failure := (yield from self.run_child(self.do)):
+                    return failure
+            return None
+        finally:
+            self.blackboard.pop(self.each, None)
+
+    def _read_list(self) -> tuple[object, ...]:
+        variable = self.in_
+        if not isinstance(variable, VariableName):
+            if variable != "items":
+                return variable
+            return tuple(known.item for known in self.ledger.list_known_items() if known.is_open)
+        value = self.blackboard.get(variable)
+        if variable.field and value is not None:
+            value = getattr(value, variable.field)
+        if isinstance(value, list | tuple):
+            return tuple(value)
+        problem = f"it reads {self.blackboard.describe_missing(variable)}"
+        if variable in self.blackboard:
+            advice = "name a variable that holds a list, or write the elements in the mission"
+            problem = f"${variable} holds a {type(value).__name__}, not a list; {advice}"
+        raise Fault(f"{self.name}: {problem}", self.path)
+
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible outcomes; the next iteration starts in the state after success of the body."""
+        if self.in_ == ():
+            return Flow(state, {}, None)
+        entry = state.with_variables([self.each])
+        body, entry = find_fixed_point(get_flow, self.do, entry, lambda body: body.success)
+        # A list that is unknown before the run may be empty.
+        success = join_states((body.success, None if isinstance(self.in_, tuple) else state))
+        # A halt is also possible between two iterations.
+        halted = join_states((body.halted, entry))
+        return Flow(
+            success and success.without_variable(self.each),
+            {failure: end.without_variable(self.each) for failure, end in body.failures.items()},
+            halted and halted.without_variable(self.each),
+        )
+
+    def explain(self, failure: PropagatedFailure) -> str:
+        """Return the element at which the body failed."""
+        return f"failed at {failure.last_choice}"
+
+
+def _describe_element(element: object) -> str:
+    """Return a short text for an element: the item of a target, a plain value, or the name of the type."""
+    if isinstance(element, Target):
+        return element.item
+    is_plain = element is None or isinstance(element, str | int | float)
+    return str(element) if is_plain else type(element).__name__
