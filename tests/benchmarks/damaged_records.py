@@ -1,4 +1,4 @@
-"""Damaged records of a run: each is read, replayed, resumed and filmed, or refused with a message.
+"""Damaged records of a run: each is read, replayed, resumed and shown in a video, or refused with a message.
 
 One run of a mission is recorded; all damaged records are copies of it. A copy is damaged at random; or its
 journal is cut off, while the world went on; or the run is killed, and the last blocks of its logs are
@@ -30,10 +30,8 @@ from executive.record.resume import resume_run
 from executive.record.run_directory import LATEST_LINK, RunDirectory, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
-from executive.view.film.film import write_film
-from executive.view.film.formats import choose_format
-from executive.view.film.run_state import FilmSource
 from executive.view.report.page import write_report
+from executive.view.video import write_video
 from tests.benchmarks.damage import BLOCK, copy_run, damage_run
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.hostile_input import CommandResult, find_problems, run_in_child
@@ -101,11 +99,11 @@ def measure(
     runs_folder: Path,
     reports: int,
     others: int,
-    films: int,
+    videos: int,
     truncations: int,
     kills: int,
 ) -> Figures:
-    """Damage records of a run of MISSION, and read, replay, resume and film them."""
+    """Damage records of a run of MISSION, and read, replay, resume and show them in videos."""
     runs_folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix=".damaged-", dir=runs_folder) as folder:
         base = Path(folder).resolve()  # The children have another working directory.
@@ -117,7 +115,7 @@ def measure(
             "report": (reports, _report),
             "replay": (others, lambda path: _replay(subject, path)),
             "resume": (others, lambda path: _resume_to_first_tick(subject, path)),
-            "film": (films, _film_first_picture),
+            "video": (videos, _write_video),
         }
         rows, problems = [], []
         for name, (number, command) in commands.items():
@@ -199,18 +197,8 @@ def _resume_to_first_tick(subject: MissionUnderTest, path: Path) -> None:
     resume_run(path, subject.loaded.skills, options, RecordOptions([StopAtFirstTick()], saves_pictures=False))
 
 
-def _film_first_picture(path: Path) -> None:
-    def stop(done: int, number: int) -> None:
-        raise Reached
-
-    write_film(
-        FilmSource(RunDirectory(path)),
-        path / "film.mp4",
-        choose_format(None, False),
-        speed=1.0,
-        workers=1,
-        progress=stop,
-    )
+def _write_video(path: Path) -> None:
+    write_video(path, path / "run.gif")
 
 
 def _resume_truncated(
@@ -321,7 +309,9 @@ if __name__ == "__main__":
         click.option(
             "--others", type=number, default=200, show_default=True, help="Those for `replay` and `--resume`."
         ),
-        click.option("--films", type=number, default=200, show_default=True, help="Those for `film`."),
+        click.option(
+            "--videos", type=number, default=50, show_default=True, help="Those for `replay --video`."
+        ),
         click.option(
             "--truncations", type=number, default=300, show_default=True, help="Truncated journals."
         ),

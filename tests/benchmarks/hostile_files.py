@@ -169,7 +169,8 @@ def write_odd_paths(seed: int, folder: Path) -> Arguments:
     return rng.choice(
         [
             ["check", path], ["run", path], ["tree", path], ["run", "--resume", path], ["replay", path],
-            ["report", path], ["film", path], ["skills", path], ["schema", path], [path],
+            ["report", path], ["skills", path], ["schema", path], [path],
+            ["replay", path, "--video", "a.gif"],
             ["run", *fake, "--seed", path], ["run", *fake, "--runs", path], ["sweep", *fake, "--seeds", path],
             ["run", *fake, "--set", path], ["run", *fake, "--request", path], ["run", *fake, "--scene", path],
             ["check", "sort_overhead", "--set", f"cell.objects.cube.urdf={path}"],

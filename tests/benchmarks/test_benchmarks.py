@@ -209,7 +209,7 @@ class TestDamagedRecords:
             load_mission_under_test("sort_overhead", {}, has_oracle=True, seed=7) if simulated else load()
         )
         figures = damaged_records.measure(
-            subject, tmp_path, reports=12, others=6, films=2 * simulated, truncations=6, kills=2
+            subject, tmp_path, reports=12, others=6, videos=2 * simulated, truncations=6, kills=2
         )
         assert figures["problems"] == []
         assert [row["records"] for row in figures["damaged"]] == [12, 6, 6, 2 * simulated]

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from executive.cli.main import main
 from executive.events import TargetSelected
 from executive.record.journal import read_journal
-from executive.record.pictures.drawing_thread import PictureDrawer
+from executive.record.picture_recorder import PictureRecorder
 from executive.record.recorder import Recorder
 
 RECORD = ("write", "fsync", "replace", "rename")
@@ -47,7 +47,7 @@ class Disk:
 @pytest.fixture
 def run(bring_one, tmp_path, monkeypatch, cells):
     """Run the command once, without pictures; the result, and the directory that it left, if any."""
-    monkeypatch.setattr(PictureDrawer, "queue", lambda self, name, scene: True)
+    monkeypatch.setattr(PictureRecorder, "__call__", lambda self, timed: None)
 
     def once() -> tuple[Result, Path | None]:
         before = set(tmp_path.glob("runs/[0-9]*/*"))

@@ -38,8 +38,12 @@ def test_a_picture_that_cannot_be_drawn_is_reported_and_the_run_continues(direct
 
 def test_the_pictures_are_waited_for_whatever_became_of_the_journal(directory, monkeypatch):
     closed = []
-    monkeypatch.setattr(PictureRecorder, "close", lambda self, wait: closed.append(wait))
-    monkeypatch.setattr(PictureRecorder, "problem", "no pictures were drawn: file exists")
+
+    def close(pictures, wait):
+        closed.append(wait)
+        pictures.problem = "no pictures were drawn: file exists"
+
+    monkeypatch.setattr(PictureRecorder, "close", close)
     monkeypatch.setattr(os, "fsync", full)
     recorder = Recorder(directory)
     recorder(STATUS)
