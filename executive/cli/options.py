@@ -190,12 +190,12 @@ def check_video(file: Path, cell_kind: str, *, force: bool) -> None:
 
     An existing file is an error unless `force` is true.
     """
-    if cell_kind != "sim":
-        advice = "omit --video, or use a cell of `kind: sim`"
-        raise InputError(f"a video needs a simulated world, but this cell has `kind: {cell_kind}`; {advice}")
     if file.suffix.lower() not in (".mp4", ".gif"):
         raise InputError(f'"{file}" cannot be a video; give a file name that ends in .mp4 or .gif')
     if file.exists() and not force:
         raise InputError(f'"{file}" exists; name another file with --video, or overwrite it with --force')
     if not file.parent.is_dir():
         raise InputError(f'cannot write the video "{file}": its folder does not exist')
+    if cell_kind != "sim":
+        advice = "omit --video, or use a cell of `kind: sim`"
+        raise InputError(f"a video needs a simulated world, but this cell has `kind: {cell_kind}`; {advice}")
