@@ -37,7 +37,7 @@ HOST = "127.0.0.1:8123"
     [
         (f"/{TOKEN}/", {}, ""),
         (f"/{TOKEN}/", {"Origin": f"http://{HOST}", "Upgrade": "websocket"}, ""),
-        *((path, {}, "lacks the token") for path in ("/", "", "/a-toke/", "/a-token2/", "//a-token/", "/%ff/")),
+        *((path, {}, "lacks the token") for path in ("/", "", "/a-toke/", "/a-token2/", "//a-token/")),
         *((f"/{TOKEN}/", {"Origin": origin}, "another page")
           for origin in ("http://evil.example", "null", "", f"https://{HOST}", f"http://{HOST}.evil")),
         (f"/{TOKEN}/", {"Upgrade": "WebSocket"}, "must contain the origin"),
@@ -147,7 +147,7 @@ def test_a_watcher_receives_the_state_then_changes_and_may_send_commands() -> No
     ("text", "wish"),
     [
         ("", None), ("[]", None), ('"pause"', None), ('{"name": null}', None), ('{"name": "fly"}', None),
-        ('{"name": ["pause"]}', None), ('{"name": "request"}', None), ('{"name": "request", "text": 3}', None),
+        ('{"name": ["pause"]}', None), ('{"name": "request", "text": 3}', None),
         ('{"name": "stop", "text": "x"}', PageCommand("stop")),
     ],
 )  # fmt: skip
