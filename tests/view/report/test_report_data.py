@@ -11,14 +11,9 @@ import pytest
 from events import at, run_ended
 
 from executive.cell.json_values import to_json
-from executive.cells.fake.cell import FakeCell
 from executive.events import Event, FaultInjected, RequestGiven, RunResumed
 from executive.mission.text.file_search import get_shipped_folder
-from executive.plugins import load_skills
 from executive.record.journal_format import encode_event
-from executive.record.recorded_run import RecordOptions
-from executive.record.resume import resume_run
-from executive.run.assembly import RunOptions
 from executive.view.report import page
 from executive.view.report.page import INTERRUPTED, ReportData, collect_pictures, try_write_report
 
@@ -40,21 +35,6 @@ def test_a_run_that_ended_is_described_by_its_result(failed):
     assert facts.resume_command == ""
     assert {each.item for each in facts.pictures if not each.reason} == {"sphere-1"}
     assert {one.node for one in facts.timeline.activations} <= {node.path for node in facts.nodes}
-
-
-@pytest.mark.slow
-def test_an_interrupted_and_resumed_run_is_described_as_one(killed, copy):
-    run = copy(killed)
-    assert ReportData(run).status == INTERRUPTED
-    resume_run(run, load_skills(), RunOptions(3, make_cell=FakeCell), RecordOptions(saves_pictures=False))
-    facts = ReportData(run)
-    assert (facts.status, facts.resume_command) == ("SUCCESS", "")
-    transits = [one for one in facts.timeline.activations if one.node.endswith("/Transit")]
-    assert [one.status for one in transits] == ["INVALID", "SUCCESS"]
-    assert transits[0].end <= transits[1].start
-    assert sum(sum(row.values()) for row in facts.activity_times.times_by_item.values()) == pytest.approx(
-        facts.timeline.clock
-    )
 
 
 def test_a_result_from_before_the_run_was_taken_up_again_is_not_its_end(failed, copy):
