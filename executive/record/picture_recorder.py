@@ -40,7 +40,7 @@ _JPEG_QUALITY = 80
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class PictureContent:
     """Content of a picture.
 
     Attributes:
@@ -147,10 +147,10 @@ class PictureRecorder:
         selected_index = _find_selected_index(selection, look_event.confident, position)
         caption = _make_caption(timed.clock, frame, selection, failure)
         classes = tuple(self._timeline.items.classes)
-        picture = Picture(frame.image, look_event.confident, selected_index, item, classes, caption)
+        picture = PictureContent(frame.image, look_event.confident, selected_index, item, classes, caption)
         self._thread.submit(self._save, self._folder / f"{name}.jpg", picture)
 
-    def _save(self, path: Path, picture: Picture) -> None:
+    def _save(self, path: Path, picture: PictureContent) -> None:
         try:
             image_bgr = draw_picture(picture)[:, :, ::-1]
             _, data = cv2.imencode(".jpg", image_bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
@@ -172,7 +172,7 @@ def find_picture(folder: Path, item: str, reason: str) -> Path | None:
     return max(pictures, key=lambda file: int(file.stem.partition("_")[0]), default=None)
 
 
-def draw_picture(picture: Picture) -> NDArray[np.uint8]:
+def draw_picture(picture: PictureContent) -> NDArray[np.uint8]:
     """Return the scaled image with its boxes and labels, above the caption: `(H, PICTURE_WIDTH, 3)`, RGB."""
     scale = PICTURE_WIDTH / picture.image.shape[1]
     scaled_height = round(scale * picture.image.shape[0])

@@ -1,4 +1,4 @@
-"""Pictures of README and guides, made anew in `.github/media`: `python -m tests.benchmarks.readme_pictures`.
+"""Pictures of README and guides, made in `.github/media`: `python -m tests.benchmarks.readme_pictures`.
 
 `run.gif` is the video of a run, `decision.jpg` a picture of a decision in this run, `tree.svg` the tree of
 the mission, and `live.jpg` the live page of the run in Chromium, if it is installed.

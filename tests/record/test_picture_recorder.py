@@ -20,7 +20,7 @@ from executive.record.picture_recorder import (
     CAPTION_HEIGHT,
     MAX_STORED_LOOKS,
     PALETTE,
-    Picture,
+    PictureContent,
     PictureRecorder,
     draw_picture,
     find_picture,
@@ -64,15 +64,15 @@ def record(folder: Path, *events: list[TimedEvent]) -> PictureRecorder:
 
 
 @pytest.fixture
-def draw(tmp_path, monkeypatch) -> Callable[..., dict[str, Picture]]:
+def draw(tmp_path, monkeypatch) -> Callable[..., dict[str, PictureContent]]:
     """Record events, and return the pictures by file name."""
-    pictures: list[Picture] = []
+    pictures: list[PictureContent] = []
 
-    def store(picture: Picture) -> np.ndarray:
+    def store(picture: PictureContent) -> np.ndarray:
         pictures.append(picture)
         return np.zeros((8, 8, 3), np.uint8)
 
-    def record_events(*events: list[TimedEvent]) -> dict[str, Picture]:
+    def record_events(*events: list[TimedEvent]) -> dict[str, PictureContent]:
         assert record(tmp_path, *events).problem == ""
         names = sorted(file.name for file in tmp_path.iterdir())
         return dict(zip(names, pictures, strict=True))
@@ -84,7 +84,9 @@ def draw(tmp_path, monkeypatch) -> Callable[..., dict[str, Picture]]:
 def test_boxes_labels_and_caption_are_drawn_on_the_scaled_image():
     image = np.full((160, 160, 3), 150, np.uint8)
     thing = detected("thing", box=[100, 100, 140, 140], position=[0.7, 0.1, 0.02])
-    picture = Picture(image, [CUBE, DUCK, thing], 1, "duck-1", ("cube", "duck"), "2.50 s   duck-1 to red_bin")
+    picture = PictureContent(
+        image, [CUBE, DUCK, thing], 1, "duck-1", ("cube", "duck"), "2.50 s   duck-1 to red_bin"
+    )
     drawn = draw_picture(picture)
     assert drawn.shape == (640 + CAPTION_HEIGHT, 640, 3)
     colours = [tuple(bytes.fromhex(colour[1:])) for colour in PALETTE[:2]]
@@ -95,7 +97,7 @@ def test_boxes_labels_and_caption_are_drawn_on_the_scaled_image():
     assert tuple(drawn[420, 81]) == colours[1]
     assert (drawn[140:158, 80:150] == colours[0]).all(axis=2).mean() > 0.3  # the label above the first box
     assert drawn[640:].max() > 200
-    unnamed = draw_picture(Picture(image, [CUBE, DUCK, thing], None, "", ("cube", "duck"), ""))
+    unnamed = draw_picture(PictureContent(image, [CUBE, DUCK, thing], None, "", ("cube", "duck"), ""))
     assert (unnamed[640:] == 0).all()
     assert (unnamed[340:358] != drawn[340:358]).any()
 
@@ -187,7 +189,7 @@ def test_pictures_that_cannot_be_written_are_reported_and_the_run_continues(tmp_
 def test_without_waiting_queued_pictures_are_not_drawn(tmp_path, monkeypatch):
     started, may_finish = threading.Event(), threading.Event()
 
-    def wait(picture: Picture) -> np.ndarray:
+    def wait(picture: PictureContent) -> np.ndarray:
         started.set()
         may_finish.wait()
         return np.zeros((8, 8, 3), np.uint8)
