@@ -110,7 +110,7 @@ PARALLEL_PACKAGES = (
         "executive/cells/sim",
         "executive/cells/fake",
     },
-    {"executive/view/film", "executive/view/live", "executive/view/report"},
+    {"executive/view/live", "executive/view/report"},
 )
 """Packages with the same structure; `executive/cli` mirrors the packages whose commands it contains."""
 

@@ -30,7 +30,7 @@ PATH_ERROR_NUMBERS = (
 
 COMMANDS = (
     "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "sweep",
-    "compare", "faults", "replay", "report", "film", "doctor", "init",
+    "compare", "faults", "replay", "report", "doctor", "init",
 )  # fmt: skip
 """Names of all commands in the order of `--help`; the module of a command has the name of the command."""
 

@@ -12,6 +12,8 @@ from typing import Any, TypeVar
 import click
 from click.core import ParameterSource
 
+from executive.errors import InputError
+
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 """Type of a command function."""
 
@@ -118,6 +120,10 @@ scene_option = click.option(
     "--scene", type=FILE,
     help="Scene file: differences of the simulated world from the cell file (light, table, objects, camera).",
 )  # fmt: skip
+video_option = click.option(
+    "--video", type=FILE, help="File (.mp4 or .gif) for a video of the run; only for simulated cells."
+)
+force_option = click.option("--force", is_flag=True, help="Overwrite an existing video.")
 workers_option = click.option("--workers", type=COUNT, default=2, help="Number of parallel processes.")
 oracle_option = click.option(
     "--oracle", is_flag=True,
@@ -177,3 +183,19 @@ def check_resume(
         (not is_resume and not has_missions_and_seeds, f"give {required_arguments}"),
         (is_resume and has_settings, f"--resume takes {resumed_settings_text}; omit them"),
     )
+
+
+def check_video(file: Path, cell_kind: str, *, force: bool) -> None:
+    """Raise an InputError if the video of a run in a cell of `cell_kind` cannot be written to a file.
+
+    An existing file is an error unless `force` is true.
+    """
+    if file.suffix.lower() not in (".mp4", ".gif"):
+        raise InputError(f'"{file}" cannot be a video; give a file name that ends in .mp4 or .gif')
+    if file.exists() and not force:
+        raise InputError(f'"{file}" exists; name another file with --video, or overwrite it with --force')
+    if not file.parent.is_dir():
+        raise InputError(f'cannot write the video "{file}": its folder does not exist')
+    if cell_kind != "sim":
+        advice = "omit --video, or use a cell of `kind: sim`"
+        raise InputError(f"a video needs a simulated world, but this cell has `kind: {cell_kind}`; {advice}")

@@ -16,6 +16,7 @@ from executive.cli.streams import keep_stdout_clean, open_unescaped_stderr, prin
 if TYPE_CHECKING:
     from executive.events import RunStarted
     from executive.exit_codes import ExitCode
+    from executive.mission.load import LoadedMission
     from executive.record.recorded_run import RecordOptions
     from executive.record.result import Result
     from executive.run.assembly import RunOptions
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 @options.seed_option
 @options.overrides_option
 @options.scene_option
+@options.video_option
+@options.force_option
 @options.runs_option
 @options.json_option
 @click.option("--quiet", is_flag=True, help="Print only the cause if the run does not succeed.")
@@ -43,8 +46,8 @@ if TYPE_CHECKING:
 @click.pass_context
 def command(
     ctx: click.Context, mission: str | None, resume: str | None, seed: int, overrides: dict[str, str],
-    scene: Path | None, runs_folder: Path, as_json: bool, quiet: bool, has_page: bool, paused: bool,
-    gui: bool, realtime: bool, requests: tuple[str, ...],
+    scene: Path | None, video: Path | None, force: bool, runs_folder: Path, as_json: bool, quiet: bool,
+    has_page: bool, paused: bool, gui: bool, realtime: bool, requests: tuple[str, ...],
 ) -> ExitCode:  # fmt: skip
     """Run a mission and record the run.
 
@@ -65,9 +68,10 @@ def command(
     with keep_stdout_clean():
         from executive.cell.json_values import to_json
         from executive.record.diagnosis.diagnosis import format_diagnosis
-        from executive.record.recorded_run import GuardedView, RecordOptions
+        from executive.record.recorded_mission import read_cell
+        from executive.record.recorded_run import GuardedView, RecordOptions, record_run
         from executive.record.result import find_exit_code
-        from executive.record.run_directory import RunDirectory
+        from executive.record.run_directory import RunDirectory, find_run
         from executive.run.assembly import RunOptions
         from executive.view.live.page import LivePage
         from executive.view.report.page import try_write_report
@@ -87,10 +91,16 @@ def command(
             )  # fmt: skip
             if mission is None:
                 assert resume is not None
-                result, start_event = _resume(resume, run_options, runs_folder, record)
+                path = find_run(resume, runs_folder)
+                if video is not None:
+                    options.check_video(video, read_cell(path).kind, force=force)
+                result, start_event = _resume(path, run_options, record)
                 repeat_arguments = start_event.file, start_event.seed, start_event.overrides
             else:
-                result = _run_mission(mission, overrides, run_options, runs_folder, record)
+                loaded_mission = _load_mission(mission, overrides, run_options, record)
+                if video is not None:
+                    options.check_video(video, loaded_mission.cell_config.kind, force=force)
+                result = record_run(loaded_mission, run_options, runs_folder, record)
                 repeat_arguments = mission, seed, overrides
             # The command that repeats the run also contains requests that the operator made during the run.
             all_requests, used_scene = requests or result.requests, RunDirectory(Path(result.run)).scene
@@ -113,16 +123,22 @@ def command(
             click.echo("\n".join(filter(None, (result.disagreement, end_description))), err=True)
     if as_json:
         print_json(to_json(result))
+    if video is not None:
+        with keep_stdout_clean():
+            # The import takes 0.1 s, and only a video needs it.
+            from executive.view.video import write_video
+
+            write_video(Path(result.run), video)
+            click.echo(f"video: {video}", err=True)
     return find_exit_code(result)
 
 
-def _run_mission(
-    mission: str, overrides: dict[str, str], run_options: RunOptions, runs_folder: Path, record: RecordOptions
-) -> Result:
-    """Run a mission, record the run and return its result."""
+def _load_mission(
+    mission: str, overrides: dict[str, str], run_options: RunOptions, record: RecordOptions
+) -> LoadedMission:
+    """Return a mission; check the scene file, and print the warnings of the mission if there are views."""
     from executive.mission.load import load_mission
     from executive.plugins import load_cell_kind, load_skills
-    from executive.record.recorded_run import record_run
 
     loaded_mission = load_mission(mission, load_skills(), overrides, load_cell_kind)
     for warning in loaded_mission.warnings if record.views else ():
@@ -132,19 +148,15 @@ def _run_mission(
 
         # Only simulated cells read the scene file, but its errors are reported for every cell.
         load_scene(run_options.scene, loaded_mission.cell_config)
-    return record_run(loaded_mission, run_options, runs_folder, record)
+    return loaded_mission
 
 
-def _resume(
-    name: str, run_options: RunOptions, runs_folder: Path, record: RecordOptions
-) -> tuple[Result, RunStarted]:
+def _resume(path: Path, run_options: RunOptions, record: RecordOptions) -> tuple[Result, RunStarted]:
     """Resume an interrupted run; return the result and the start event of the run."""
     from executive.plugins import load_skills
     from executive.record.journal import find_run_start, read_journal
     from executive.record.resume import resume_run
-    from executive.record.run_directory import find_run
 
-    path = find_run(name, runs_folder)
     result = resume_run(path, load_skills(), run_options, record)
     return result, find_run_start(read_journal(path / "journal.jsonl"), path, "run the mission again")
 

@@ -1,31 +1,63 @@
-"""Recorder of the pictures of a run: one file for each selected target and each failed attempt."""
+"""Pictures of a run: camera image and detections, for each selected target and each failed attempt."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter, defaultdict
 from collections.abc import Sequence
-from dataclasses import replace
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
 
 from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, FrameSearched, NodeEnded, RunEnded, TargetSelected, TimedEvent
-from executive.record.pictures.drawing_thread import PictureDrawer
-from executive.record.pictures.picture_content import PictureContent
+from executive.record.atomic_file import replace_atomically
 from executive.record.timeline.activation import get_skill_name
 from executive.record.timeline.timeline import Timeline
 
 MAX_STORED_LOOKS = 24
 """Maximum number of stored looks; a look is an image (1.2 MB at 640 x 480 pixels) with its detections."""
-
 MAX_PICTURES = 200
-"""Maximum number of pictures of a run, so that a long run does not fill the disk."""
+"""Maximum number of pictures of a run, so that a long run fills neither the disk nor the memory."""
+PICTURE_WIDTH = 640
+"""Width of a picture [pixel]; labels of boxes are legible at this width."""
+CAPTION_HEIGHT = 24
+"""Height of the line of text below the camera image [pixel]."""
+PALETTE = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D55E00")
+"""Colours of classes; colour-blind people can distinguish these colours, and black text on them is legible.
 
-StoredLook = tuple[Frame, FrameSearched]
-"""Frame without its depth image, and the event with the detections in the frame."""
+Source: Okabe and Ito, "Color Universal Design", 2008, without black.
+"""
+LINE_WIDTH = 1
+SELECTED_LINE_WIDTH = 3
+"""Line widths of a box and of the selected box [pixel]."""
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+_TEXT_SCALE = 0.4
+_JPEG_QUALITY = 80
 
-_LISTED_STATES = ("held", "dropped", "rejected", "skipped", "lost")
-"""States of items, except `placed`, that a picture lists."""
+
+@dataclass(frozen=True, eq=False)
+class PictureContent:
+    """Content of a picture.
+
+    Attributes:
+        image: Camera image `(H, W, 3)`, RGB.
+        detections: All detections in the image.
+        selected_index: Index in `detections` of the detection of `item`, or None.
+        item: Name of the selected item, or "".
+        classes: Detected classes; the index of a class determines its colour.
+        caption: Line of text below the image.
+    """
+
+    image: NDArray[np.uint8]
+    detections: Sequence[DetectedObject]
+    selected_index: int | None
+    item: str
+    classes: Sequence[str]
+    caption: str
 
 
 class PictureRecorder:
@@ -41,17 +73,22 @@ class PictureRecorder:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._drawer = PictureDrawer(folder)
+        self._folder = folder
+        # A picture takes 8 ms, longer than a control step. Any first task starts the thread; otherwise, the
+        # first picture would start it during a control step.
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="pictures")
+        self._thread.submit(int)
         self._timeline = Timeline(has_history=False)
         self._last_frame: Frame | None = None
-        self._look_by_frame_id: dict[int, StoredLook] = {}
+        self._look_by_frame_id: dict[int, tuple[Frame, FrameSearched]] = {}
         self._unknown_labels: set[str] = set()
         """Labels that are no class of the cell, in all looks."""
         self._selected_frame_id: int | None = None
         self._undrawn_frame_id: int | None = None
         """Number of the frame of the last look; None if a picture shows this frame."""
         self._picture_count = 0
-        self._missing_picture_counts: Counter[str] = Counter()
+        self.problem = ""
+        """Message about the first missing picture, or ""."""
 
     def __call__(self, timed: TimedEvent) -> None:
         """Store a look, or draw a picture after a selection or a failure."""
@@ -71,18 +108,11 @@ class PictureRecorder:
                 label = item.last_change.label
                 if item.last_change.state == "rejected" and item.sighting and label in self._unknown_labels:
                     self._queue(timed, TargetSelected(name, label, item.sighting.frame, ""), None)
-        # The timeline gets the event last, so that the picture shows a failed skill as running.
         self._timeline(timed)
 
     def close(self, *, wait: bool = True) -> None:
         """Draw all queued pictures; if `wait` is False, only finish the current picture."""
-        self._drawer.close(wait=wait)
-
-    @property
-    def problem(self) -> str:
-        """Message about missing pictures, or ""."""
-        missing = ", ".join(f"{count} {reason}" for reason, count in self._missing_picture_counts.items())
-        return self._drawer.problem or (f"missing pictures: {missing}" if missing else "")
+        self._thread.shutdown(wait=wait, cancel_futures=not wait)
 
     def _add_look(self, look: FrameSearched) -> None:
         """Store a look with its frame, and remove the oldest look if the store is full."""
@@ -104,58 +134,32 @@ class PictureRecorder:
         if frame_id == self._undrawn_frame_id:
             self._undrawn_frame_id = None
         look = self._look_by_frame_id.get(frame_id)
-        if look is None:
-            self._missing_picture_counts[f"because only the last {MAX_STORED_LOOKS} images are kept"] += 1
-        elif self._picture_count == MAX_PICTURES:
-            self._missing_picture_counts[f"after the first {MAX_PICTURES}"] += 1
-        elif not self._drawer.queue(
-            _make_file_name(timed, selection, failure), self._make_content(timed, look, selection, failure)
-        ):
-            self._missing_picture_counts["because of a full queue"] += 1
-        else:
-            self._picture_count += 1
-
-    def _make_content(
-        self, timed: TimedEvent, look: StoredLook, selection: TargetSelected | None, failure: NodeEnded | None
-    ) -> PictureContent:
-        """Return the content of the picture of `look` in the current state of the run."""
-        frame, look_event = look
-        timeline, running = self._timeline, self._timeline.find_running_activations()
+        if look is None or self._picture_count == MAX_PICTURES:
+            limits = f"the last {MAX_STORED_LOOKS} images are kept and {MAX_PICTURES} pictures are drawn"
+            self.problem = self.problem or f"missing pictures: only {limits}"
+            return
+        self._picture_count += 1
         item = selection.item if selection else ""
-        history = timeline.items.by_name.get(item)
+        name = "_".join(filter(None, (f"{timed.tick:06d}", item, failure.reason if failure else "")))
+        frame, look_event = look
+        history = self._timeline.items.by_name.get(item)
         position = history.last_change.position if history else None
-        return PictureContent(
-            image=frame.image,
-            visible=frame.visible,
-            detections=look_event.confident,
-            selected_index=_find_selected_index(selection, look_event.confident, position),
-            mission=timeline.started.mission if timeline.started else "",
-            clock=timed.clock,
-            camera=frame.camera,
-            detector=look_event.detector,
-            age=timed.clock - frame.stamp,
-            running_skills=[get_skill_name(each.node) for each in running if each.skill],
-            item=item,
-            bin=selection.bin if selection else "",
-            failed_attempts=history.last_change.attempts if history else 0,
-            failure=f"{get_skill_name(failure.node)}.{failure.reason}" if failure else "",
-            message=failure.message if failure else "",
-            outcomes=_group_items(timeline),
-            classes=tuple(timeline.items.classes),
-        )
+        selected_index = _find_selected_index(selection, look_event.confident, position)
+        caption = _make_caption(timed.clock, frame, selection, failure)
+        classes = tuple(self._timeline.items.classes)
+        picture = PictureContent(frame.image, look_event.confident, selected_index, item, classes, caption)
+        self._thread.submit(self._save, self._folder / f"{name}.jpg", picture)
 
-
-def _group_items(timeline: Timeline) -> dict[str, list[str]]:
-    """Return the names of placed items by bin, then of other items by state, in the order of changes."""
-    placed: dict[str, list[str]] = defaultdict(list)
-    unplaced: dict[str, list[str]] = defaultdict(list)
-    for item in sorted(timeline.items.by_name.values(), key=lambda item: item.last_change_number):
-        state = item.last_change.state
-        if state == "placed":
-            placed[item.last_change.bin].append(item.last_change.item)
-        elif state in _LISTED_STATES:
-            unplaced["in the tool" if state == "held" else state].append(item.last_change.item)
-    return placed | unplaced
+    def _save(self, path: Path, picture: PictureContent) -> None:
+        try:
+            image_bgr = draw_picture(picture)[:, :, ::-1]
+            _, data = cv2.imencode(".jpg", image_bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with replace_atomically(path) as temporary_file:
+                temporary_file.write_bytes(data.tobytes())
+        except Exception as error:
+            # Only the text of the first error is stored: an exception would keep all images in memory.
+            self.problem = self.problem or f"not every picture was drawn: {error}"
 
 
 def find_picture(folder: Path, item: str, reason: str) -> Path | None:
@@ -168,10 +172,46 @@ def find_picture(folder: Path, item: str, reason: str) -> Path | None:
     return max(pictures, key=lambda file: int(file.stem.partition("_")[0]), default=None)
 
 
-def _make_file_name(timed: TimedEvent, selection: TargetSelected | None, failure: NodeEnded | None) -> str:
-    """Return the file name of the picture of a selection or a failure."""
-    parts = (f"{timed.tick:06d}", selection.item if selection else "", failure.reason if failure else "")
-    return "_".join(filter(None, parts)) + ".jpg"
+def draw_picture(picture: PictureContent) -> NDArray[np.uint8]:
+    """Return the scaled image with its boxes and labels, above the caption: `(H, PICTURE_WIDTH, 3)`, RGB."""
+    scale = PICTURE_WIDTH / picture.image.shape[1]
+    scaled_height = round(scale * picture.image.shape[0])
+    canvas = np.zeros((scaled_height + CAPTION_HEIGHT, PICTURE_WIDTH, 3), np.uint8)
+    canvas[:scaled_height] = cv2.resize(picture.image, (PICTURE_WIDTH, scaled_height))
+    for index, detection in enumerate(picture.detections):
+        is_selected = index == picture.selected_index
+        name = picture.item if is_selected else detection.label
+        left, top, right, bottom = (round(side * scale) for side in detection.box)
+        colour = _choose_colour(detection.label, picture.classes)
+        line_width = SELECTED_LINE_WIDTH if is_selected else LINE_WIDTH
+        cv2.rectangle(canvas, (left, top), (right, bottom), colour, line_width)
+        label = f"{name} {detection.confidence:.2f}"
+        (label_width, label_height), _ = cv2.getTextSize(label, _FONT, _TEXT_SCALE, 1)
+        baseline = max(top - 3, label_height + 2)
+        label_region = (left, baseline - label_height - 2, label_width, label_height + 5)
+        cv2.rectangle(canvas, label_region, colour, cv2.FILLED)
+        cv2.putText(canvas, label, (left, baseline), _FONT, _TEXT_SCALE, (0, 0, 0), 1, cv2.LINE_AA)
+    baseline = scaled_height + CAPTION_HEIGHT - 8
+    cv2.putText(canvas, picture.caption, (6, baseline), _FONT, _TEXT_SCALE, (255, 255, 255), 1, cv2.LINE_AA)
+    return canvas
+
+
+def _choose_colour(label: str, classes: Sequence[str]) -> tuple[int, ...]:
+    """Return the colour of a class from its index in `classes`; white for an unknown class."""
+    colour = PALETTE[classes.index(label) % len(PALETTE)] if label in classes else "#FFFFFF"
+    return tuple(bytes.fromhex(colour.removeprefix("#")))
+
+
+def _make_caption(
+    clock: float, frame: Frame, selection: TargetSelected | None, failure: NodeEnded | None
+) -> str:
+    """Return time, failure or destination of the item, and camera with the age of its image."""
+    text = ""
+    if failure is not None:
+        text = f"{get_skill_name(failure.node)}.{failure.reason}: {failure.message}"
+    elif selection is not None:
+        text = f"{selection.item} to {selection.bin}" if selection.bin else selection.item
+    return f"{clock:.2f} s   {frame.camera}, {clock - frame.stamp:.2f} s old   {text}"
 
 
 def _find_selected_index(

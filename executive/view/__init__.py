@@ -1,1 +1,1 @@
-"""Views of a run: terminal, live page, report, film, and pictures of the tree."""
+"""Views of a run: terminal, live page, report, video, and pictures of the tree."""

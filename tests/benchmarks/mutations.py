@@ -31,11 +31,10 @@ ROOT = Path(__file__).parents[2]
 
 EXCLUDED_FOLDERS = (
     "executive/cli/init",
-    "executive/view/film",
     "executive/view/live",
     "executive/training",
 )
-"""Code that slow tests cover: projects in processes of their own, whole films, browsers, training."""
+"""Code that slow tests cover: projects in processes of their own, browsers, training."""
 
 MAX_SELECTED_TESTS = 400
 """Greatest number of tests that pytest is given one by one; if there are more, it is given their files."""

@@ -20,7 +20,7 @@ from executive.perception.evidence import describe_unknown_labels
 from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis.diagnosis import list_labelled_sentences, make_resume_command
 from executive.record.journal import find_run_end, find_run_start, read_journal
-from executive.record.pictures.palette import PALETTE
+from executive.record.picture_recorder import PALETTE
 from executive.record.recorded_mission import read_tree
 from executive.record.result import is_resumable, list_requests, read_result
 from executive.record.run_directory import RunDirectory, convert_os_errors

@@ -30,7 +30,7 @@ from executive.view.live.page_state import PageState
     [
         (run_started(mission="sort", seed=7), {"run": {"mission": "sort", "seed": 7}}),
         (TargetSelected("cube-1", "cube", 3, "red_bin"),
-         {"decision": {"item": "cube-1", "label": "cube", "frame": 3, "bin": "red_bin"}}),
+         {"decision": vars(TargetSelected("cube-1", "cube", 3, "red_bin"))}),
         (item_changed("cube-1", "held"), {"items": {"cube-1": vars(item_changed("cube-1", "held"))}}),
         (OperatorAsked(["cube", "duck"]), {"choices": ["cube", "duck"]}),
         (RequestGiven("cube"), {"choices": None}),

@@ -7,7 +7,6 @@ import socket
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
 import aiohttp
 import pytest
@@ -31,39 +30,25 @@ from executive.view.live.server import (
 
 TOKEN = "a-token"
 HOST = "127.0.0.1:8123"
-NO_TOKEN = "the address lacks the token of this run; copy the address from the terminal of the run"
-OTHER_PAGE = "another page may neither read nor control this run"
-
-
-PATHS = ("/", "", "*", "/another/", "/a-toke/", "/a-token2/", "//a-token/", "/A-TOKEN/", "/live", "/%ff/")
-ORIGINS = (
-    "http://evil.example",
-    "null",
-    "",
-    f"https://{HOST}",
-    "http://127.0.0.1:8124",
-    f"http://{HOST}.evil",
-)
-NAMES = ("evil.example", "localhost:8123", "127.0.0.1", f"{HOST}.evil")
 
 
 @pytest.mark.parametrize(
-    ("path", "headers", "said"),
+    ("path", "headers", "problem"),
     [
         (f"/{TOKEN}/", {}, ""),
         (f"/{TOKEN}/", {"Origin": f"http://{HOST}", "Upgrade": "websocket"}, ""),
-        *((path, {}, NO_TOKEN) for path in PATHS),
-        *((f"/{TOKEN}/", {"Origin": origin}, OTHER_PAGE) for origin in ORIGINS),
-        (f"/{TOKEN}/", {"Upgrade": "WebSocket"}, "a WebSocket request must contain the origin of its page"),
-        *(
-            (f"/{TOKEN}/", {"Host": name}, "the page must be opened by the address of this machine")
-            for name in NAMES
-        ),
+        *((path, {}, "lacks the token") for path in ("/", "", "/a-toke/", "/a-token2/", "//a-token/")),
+        *((f"/{TOKEN}/", {"Origin": origin}, "another page")
+          for origin in ("http://evil.example", "null", "", f"https://{HOST}", f"http://{HOST}.evil")),
+        (f"/{TOKEN}/", {"Upgrade": "WebSocket"}, "must contain the origin"),
+        *((f"/{TOKEN}/", {"Host": name}, "by the address of this machine")
+          for name in ("evil.example", "localhost:8123", "127.0.0.1", f"{HOST}.evil")),
     ],
-)
-def test_only_the_page_itself_is_let_in_and_only_with_the_token(path: str, headers: dict, said: str) -> None:
+)  # fmt: skip
+def test_only_the_page_with_the_token_has_access(path: str, headers: dict[str, str], problem: str) -> None:
     request = make_mocked_request("GET", path, headers={"Host": HOST} | headers)
-    assert find_access_error(request, TOKEN, HOST) == said
+    found = find_access_error(request, TOKEN, HOST)
+    assert (problem in found, bool(found)) == (True, bool(problem))
 
 
 @dataclass
@@ -95,35 +80,33 @@ def serve(do: Callable[[Site], Awaitable[None]]) -> None:
     asyncio.run(work())
 
 
-def test_serves_the_page_to_the_page_and_nothing_else() -> None:
+def test_the_server_serves_the_page_and_nothing_else() -> None:
     async def get(site: Site, path: str) -> tuple[int, str, dict[str, str]]:
         async with site.session.get(f"{site.address}{path}") as answer:
             return answer.status, await answer.text(), dict(answer.headers)
 
-    async def look(site: Site) -> None:
+    async def visit(site: Site) -> None:
         for file, kind in (
-            ("", "text/html"), ("page.js", "text/javascript"), ("page.css", "text/css"),
-            ("colours.css", "text/css"),
-        ):  # fmt: skip
+            ("", "html"),
+            ("page.js", "javascript"),
+            ("page.css", "css"),
+            ("colours.css", "css"),
+        ):
             status, text, headers = await get(site, f"/{TOKEN}/{file}")
-            assert (status, headers["Content-Type"]) == (200, f"{kind}; charset=utf-8")
+            assert (status, headers["Content-Type"]) == (200, f"text/{kind}; charset=utf-8")
             assert text
             assert headers.items() >= (SECURITY_HEADERS | {"Content-Security-Policy": CONTENT_POLICY}).items()
-        for path in ("page.py", "../guard.py", "%2e%2e/guard.py", "live_scene.py"):
-            status, text, _ = await get(site, f"/{TOKEN}/{path}")
-            assert (status, text) in [(404, "there is no such file\n"), (403, text)]
-        for path in ("/", "/live", "/scene", "/wrong/", "/wrong/live", "/wrong/scene/"):
-            status, text, headers = await get(site, path)
-            assert (status, text) == (403, f"{NO_TOKEN}\n")
-            assert headers.items() >= SECURITY_HEADERS.items()
+        for path in ("page.py", "../text.py", "%2e%2e/text.py"):
+            assert (await get(site, f"/{TOKEN}/{path}"))[0] in (403, 404)
+        for path in ("/", "/wrong/live", "/wrong/scene/"):
+            status, _, headers = await get(site, path)
+            assert (status, headers.items() >= SECURITY_HEADERS.items()) == (403, True)
         for path in ("live", "scene"):
-            for origin in ({}, {"Origin": "http://evil.example"}, {"Origin": "null"}):
-                with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
-                    await site.session.ws_connect(f"{site.address}/{TOKEN}/{path}", headers=origin)
-                assert refused.value.status == 403
-        assert site.wishes == []
+            with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
+                await site.session.ws_connect(f"{site.address}/{TOKEN}/{path}")
+            assert refused.value.status == 403
 
-    serve(look)
+    serve(visit)
     assert CONTENT_POLICY.startswith("default-src 'none'; script-src 'self'; ")
     assert "frame-ancestors 'none'" in CONTENT_POLICY
     assert (SECURITY_HEADERS["Referrer-Policy"], SECURITY_HEADERS["Cache-Control"]) == (
@@ -143,14 +126,9 @@ def test_a_watcher_receives_the_state_then_changes_and_may_send_commands() -> No
             site.page_state.apply(PageChange(is_paused=True))
             await site.server.send_changes()
             assert await socket.receive_json() == {"is_paused": True}
-            wishes = (
-                '{"name": "render_on_cpu"}',
-                '{"name": "pause"}',
-                "rubbish",
-                '{"name": "request", "text": "cube"}',
-            )
-            for said in (*wishes, '{"name": "fly"}', '{"name": "stop"}'):
-                await socket.send_str(said)
+            for text in ('{"name": "render_on_cpu"}', "rubbish", '{"name": "request", "text": "cube"}',
+                         '{"name": "stop"}'):  # fmt: skip
+                await socket.send_str(text)
             while site.wishes[-1] != PageCommand("stop"):
                 await asyncio.sleep(0)
             site.page_state.apply(PageChange(note="over"))
@@ -160,11 +138,7 @@ def test_a_watcher_receives_the_state_then_changes_and_may_send_commands() -> No
         while site.wishes[-1] != PageCommand("browsers"):
             await asyncio.sleep(0)
         assert site.wishes[1] == PageCommand("browsers", browser_count=1, is_cpu_rendering=True)
-        assert site.wishes[2:-1] == [
-            PageCommand("pause"),
-            PageCommand("request", "cube"),
-            PageCommand("stop"),
-        ]
+        assert site.wishes[2:-1] == [PageCommand("request", "cube"), PageCommand("stop")]
 
     serve(look)
 
@@ -172,12 +146,12 @@ def test_a_watcher_receives_the_state_then_changes_and_may_send_commands() -> No
 @pytest.mark.parametrize(
     ("text", "wish"),
     [
-        ("", None), ("[]", None), ("null", None), ('"pause"', None), ("{", None), ('{"name": null}', None),
-        ('{"name": "watchers", "by": 7}', None), ('{"name": ["pause"]}', None), ('{"name": "request"}', None),
-        ('{"name": "request", "text": 3}', None), ('{"name": "stop", "text": "x"}', PageCommand("stop")),
+        ("", None), ("[]", None), ('"pause"', None), ('{"name": null}', None), ('{"name": "fly"}', None),
+        ('{"name": ["pause"]}', None), ('{"name": "request", "text": 3}', None),
+        ('{"name": "stop", "text": "x"}', PageCommand("stop")),
     ],
 )  # fmt: skip
-def test_wishes_that_nobody_can_have_are_dropped(text: str, wish: object) -> None:
+def test_invalid_commands_are_dropped(text: str, wish: object) -> None:
     assert parse_command(text) == wish
 
 
@@ -185,35 +159,29 @@ BOX = Shape("", "box", (0.1, 0.1, 0.1), Pose.identity(), (1.0, 0.0, 0.0))
 PLACE = (0.5, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0)
 
 
-class Built:
-    """Stand-in for a scene that records its calls."""
+def test_the_scene_is_built_once_with_the_shapes_when_a_browser_asks_for_it(monkeypatch) -> None:
+    built: list[list[object]] = []
 
-    made: ClassVar[list[Built]] = []
+    class Scene:
+        def __init__(self, path: Path, shapes: object) -> None:
+            self.received: list[object] = [path, shapes]
+            built.append(self.received)
 
-    def __init__(self, path: Path, shapes: object) -> None:
-        self.received: list[object] = [path, shapes]
-        self.made.append(self)
+        def set_body_poses(self, poses: object) -> None:
+            self.received.append(poses)
 
-    def set_body_poses(self, bodies: object) -> None:
-        self.received.append(bodies)
-
-
-@pytest.mark.parametrize("looked_at", [True, False])
-def test_the_scene_is_built_once_when_somebody_looks_and_there_is_one(monkeypatch, looked_at) -> None:
-    monkeypatch.setattr(Built, "made", [])
-    monkeypatch.setattr(live_scene, "LiveScene", Built)
+    monkeypatch.setattr(live_scene, "LiveScene", Scene)
 
     async def work() -> None:
         scene_proxy = SceneProxy(Path("socket"))
-        early = asyncio.create_task(scene_proxy.open_session()) if looked_at else None
+        early = asyncio.create_task(scene_proxy.open_session())
         await asyncio.sleep(0.02)
-        assert not Built.made
+        assert not built
         scene_proxy.set_shapes((BOX,))
         scene_proxy.set_body_poses({"tool": PLACE})
-        if early is not None:
-            for session in (await early, await scene_proxy.open_session()):
-                await session.close()
-            scene_proxy.set_body_poses({})
+        for session in (await early, await scene_proxy.open_session()):
+            await session.close()
+        scene_proxy.set_body_poses({})
 
     asyncio.run(work())
-    assert [one.received for one in Built.made] == [[Path("socket"), (BOX,), {"tool": PLACE}, {}]] * looked_at
+    assert built == [[Path("socket"), (BOX,), {"tool": PLACE}, {}]]

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from made_up_runs import TREE, ran, skill
 
 from executive.mission.outline import OutlineNode
@@ -20,8 +18,6 @@ from executive.view.report.activity_times import (
     ActivityTimes,
     compute_activity_times,
 )
-
-ITEMS = ("cube-1", "duck-1", "big_duck-2")
 
 
 def times_of(
@@ -58,32 +54,26 @@ def test_a_failed_attempt_a_look_ahead_and_a_wait_are_distinguished():
     assert times.activities == (LOOK, "approach", "grasp", "transit", "release", FAILED_ATTEMPTS, WAITING)
 
 
-def test_what_runs_at_the_same_time_is_the_time_of_what_began_first_and_is_about_an_object():
-    course = [
-        ran("Wait", 0.0, 4.0), ran("Transit", 1.0, 3.0, "cube-1"), ran("Approach", 2.0, 4.0, "duck-1"),
-    ]  # fmt: skip
-    times = times_of(course, TREE, [(1.0, "cube-1"), (2.0, "duck-1")], 4.0)
-    assert times.times_by_item["cube-1"] == near({WAITING: 1.0, "transit": 2.0})
-    assert times.times_by_item["duck-1"] == near({"approach": 1.0})
-
-
-def test_an_attempt_that_was_the_last_was_in_vain_up_to_its_end():
-    course = [
-        ran("Approach", 0.5, 1.0, "cube-1"), ran("Grasp", 1.0, 1.2, "cube-1", "FAILURE"),
-        ran("Detect", 1.2, 1.3),
-    ]  # fmt: skip
-    times = times_of(course, TREE, [(0.5, "cube-1")], 1.3)
-    assert times.times_by_item == {
-        "cube-1": near({WAITING: 0.5, FAILED_ATTEMPTS: 0.7}), NO_ITEM: near({LOOK: 0.1}),
-    }  # fmt: skip
-
-
-def test_the_time_before_the_first_skill_and_after_the_last_belongs_to_the_run():
-    times = times_of([ran("Transit", 1.0, 2.0, "cube-1", "INVALID")], TREE, [(1.0, "cube-1")], 2.4)
-    assert times.times_by_item == {
-        "cube-1": near({WAITING: 1.0, "transit": 1.0}),
-        NO_ITEM: near({WAITING: 0.4}),
-    }
+@pytest.mark.parametrize(
+    ("course", "decisions", "end", "expected"),
+    [
+        # The first started skill that works on an object determines the object.
+        ([ran("Wait", 0.0, 4.0), ran("Transit", 1.0, 3.0, "cube-1"), ran("Approach", 2.0, 4.0, "duck-1")],
+         [(1.0, "cube-1"), (2.0, "duck-1")], 4.0,
+         {"cube-1": {WAITING: 1.0, "transit": 2.0}, "duck-1": {"approach": 1.0}}),
+        # A failed attempt without a later attempt ends with the failure.
+        ([ran("Approach", 0.5, 1.0, "cube-1"), ran("Grasp", 1.0, 1.2, "cube-1", "FAILURE"),
+          ran("Detect", 1.2, 1.3)],
+         [(0.5, "cube-1")], 1.3,
+         {"cube-1": {WAITING: 0.5, FAILED_ATTEMPTS: 0.7}, NO_ITEM: {LOOK: 0.1}}),
+        # The time after the last skill belongs to the run.
+        ([ran("Transit", 1.0, 2.0, "cube-1", "INVALID")], [(1.0, "cube-1")], 2.4,
+         {"cube-1": {WAITING: 1.0, "transit": 1.0}, NO_ITEM: {WAITING: 0.4}}),
+    ],
+)  # fmt: skip
+def test_time_belongs_to_an_object_or_to_the_run(course, decisions, end, expected):
+    times = times_of(course, TREE, decisions, end)
+    assert times.times_by_item == {item: near(row) for item, row in expected.items()}
 
 
 def test_a_skill_that_is_called_like_another_activity_has_no_column_of_its_own():
@@ -91,36 +81,3 @@ def test_a_skill_that_is_called_like_another_activity_has_no_column_of_its_own()
     times = times_of([ran("Look", 0.0, 1.0, "cube-1"), ran("Detect", 1.0, 2.0)], tree, [], 2.0)
     assert times.activities == (LOOK,)
     assert times.times_by_item == {"cube-1": near({LOOK: 1.0}), NO_ITEM: near({LOOK: 1.0})}
-
-
-TIMES = st.integers(0, 240).map(lambda ticks: ticks / 24)
-
-
-@st.composite
-def spans(draw: st.DrawFn) -> Activation:
-    began, ended = sorted((draw(TIMES), draw(TIMES)))
-    name = draw(st.sampled_from([node.name for node in TREE[1:]]))
-    item = draw(st.sampled_from(["", *ITEMS]))
-    return ran(name, began, ended, item, draw(st.sampled_from(["SUCCESS", "FAILURE", "INVALID", "RUNNING"])))
-
-
-@given(
-    course=st.lists(spans(), max_size=14),
-    decisions=st.lists(st.tuples(TIMES, st.sampled_from(ITEMS)), max_size=6).map(sorted),
-    after=st.sampled_from([0.0, 0.5]),
-)
-def test_every_instant_belongs_to_one_object_and_one_activity(course, decisions, after):
-    course.sort(key=lambda span: span.start)
-    end = max((span.end for span in course), default=0.0) + after
-    times = times_of(course, TREE, decisions, end)
-    spent = [seconds for row in times.times_by_item.values() for seconds in row.values()]
-    assert sum(spent) == pytest.approx(end)
-    assert all(seconds > 0 for seconds in spent)
-    assert list(times.activities) == list(dict.fromkeys(times.activities))
-    assert {activity for row in times.times_by_item.values() for activity in row} == set(times.activities)
-    assert NO_ITEM not in list(times.times_by_item)[:-1]
-    for item, row in times.times_by_item.items():
-        # Nobody's time is spent on an object that was never decided for nor handled.
-        assert item == NO_ITEM or item in {span.item for span in course} | {name for _, name in decisions}
-        has_failure = any(span.item == item and span.status == "FAILURE" for span in course)
-        assert FAILED_ATTEMPTS not in row or has_failure

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -19,7 +18,6 @@ from executive.view.report.lanes import MAX_AXIS_LENGTH, MAX_BAR_COUNT, MIN_AXIS
 
 THINNEST = 1.5
 SVG = "{http://www.w3.org/2000/svg}"
-NASTY = """</title><script>alert("x")</script> & 'y' {{ 7 * 7 }} \x00 \ud800"""
 
 
 def drawn(course: list[Activation], end: float, nodes: Sequence[OutlineNode] = TREE) -> str:
@@ -43,9 +41,11 @@ def said(lane: Element) -> list[str]:
 
 def test_every_node_that_ran_has_a_lane_in_the_order_of_the_tree():
     found = lanes([ran("Wait", 0.0, 1.0), ran("Detect", 1.0, 2.0), activation("tree", 0.0, 2.0)], 2.0)
-    assert list(found) == ["tree", "tree/Detect", "tree/Wait"]
-    assert [lane.attrib["class"] for lane in found.values()] == ["lane control", "lane skill", "lane skill"]
-    assert [lane.findtext(f"{SVG}text") for lane in found.values()] == ["tree", "Detect", "Wait"]
+    shown = [(path, lane.attrib["class"], lane.findtext(f"{SVG}text")) for path, lane in found.items()]
+    assert shown == [
+        ("tree", "lane control", "tree"), ("tree/Detect", "lane skill", "Detect"),
+        ("tree/Wait", "lane skill", "Wait"),
+    ]  # fmt: skip
 
 
 def test_a_bar_is_as_long_as_it_took_and_says_what_happened():
@@ -78,7 +78,6 @@ def test_distinguishable_bars_stay_separate_and_short_activations_are_visible():
 def test_however_long_the_run_its_timeline_has_a_bound():
     text = drawn(picks(3_000), 15_000.0)
     assert MAX_BAR_COUNT / 3 < text.count("<rect") <= MAX_BAR_COUNT + len(TREE)
-    assert len(text) < 300 * MAX_BAR_COUNT
 
 
 @pytest.mark.parametrize(
@@ -95,16 +94,3 @@ def test_the_time_axis_is_neither_too_short_nor_too_long_and_its_times_stand_cle
     places = [float(text.attrib["x"]) for text in clocks]
     assert (clocks[0].text, places[-1] <= width) == ("0 s", True)
     assert all(after - before >= 55 - 0.2 for before, after in pairwise(places))
-
-
-def test_text_from_a_mission_cannot_leave_its_place():
-    node = replace(TREE[1], path=f"tree/{NASTY}", name=NASTY)
-    span = activation(node.path, 0.0, 1.0, NASTY, "FAILURE", NASTY, NASTY)
-    text = drawn([span], 1.0, [node])
-    picture = ElementTree.fromstring(text)
-    assert {element.tag.removeprefix(SVG) for element in picture.iter()} == {
-        "svg", "title", "path", "text", "g", "rect",
-    }  # fmt: skip
-    assert "{{ 7 * 7 }}" in said(picture.findall(f"{SVG}g")[0])[0]
-    text.encode()
-    assert not re.search(r"href|url\(|<script|http(?!://www\.w3\.org/2000/svg)", text)

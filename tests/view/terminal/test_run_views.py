@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import time
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -110,19 +109,6 @@ def test_the_live_view_shows_the_running_path_the_items_and_the_clock():
     view.close()
     for what in ("sort  seed 7  1.5 s", "▶ repeat", "✗ Grasp  missed", "cube-1", "placed", "red_bin"):
         assert what in shown
-
-
-def test_the_live_view_redraws_ten_times_a_second(monkeypatch):
-    renders = []
-    render = TerminalView.render
-    monkeypatch.setattr(TerminalView, "render", lambda self: renders.append(self) or render(self))
-    view = TerminalView(Console(file=io.StringIO(), force_terminal=True, width=100))
-    view.open(RUN)
-    for tick in range(300):
-        view(at(tick, skill_started("tree/sort/repeat/Detect")))
-    time.sleep(0.55)
-    view.close()
-    assert 3 < len(renders) <= 10
 
 
 RESULT = Result(

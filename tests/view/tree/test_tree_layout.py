@@ -10,7 +10,7 @@ import pytest
 from executive.view.tree.tree_layout import NodeSize, Rectangle, compute_layout
 
 
-def drawn_by_chance(seed: int) -> tuple[list[int], list[NodeSize]]:
+def draw_tree(seed: int) -> tuple[list[int], list[NodeSize]]:
     """Return the depths of the nodes of a tree, parents before children, and their sizes."""
     chance = random.Random(seed)
     depths = [0]
@@ -24,12 +24,7 @@ def drawn_by_chance(seed: int) -> tuple[list[int], list[NodeSize]]:
     return depths, [size() for _ in depths]
 
 
-@pytest.fixture(params=range(8))
-def tree(request: pytest.FixtureRequest) -> tuple[list[int], list[NodeSize]]:
-    return drawn_by_chance(request.param)
-
-
-def below(depths: list[int]) -> list[list[int]]:
+def list_children(depths: list[int]) -> list[list[int]]:
     children: list[list[int]] = [[] for _ in depths]
     for index, depth in enumerate(depths):
         if depth:
@@ -38,7 +33,7 @@ def below(depths: list[int]) -> list[list[int]]:
     return children
 
 
-def inside(index: int, depths: list[int]) -> set[int]:
+def list_branch(index: int, depths: list[int]) -> set[int]:
     """Return a node and all that hangs from it."""
     rest = itertools.takewhile(lambda other: depths[other] > depths[index], range(index + 1, len(depths)))
     return {index, *rest}
@@ -54,33 +49,18 @@ def contains(outer: Rectangle, inner: Rectangle) -> bool:
     return min(inner.x - outer.x, inner.y - outer.y, right, bottom) >= -1e-6
 
 
-def test_nodes_stand_clear_of_each_other_in_their_order_and_level_with_their_first_child(tree):
-    depths, nodes = tree
-    plan = compute_layout(depths, below(depths), nodes)
-    assert not any(overlap(one, other) for one, other in itertools.combinations(plan.boxes, 2))
-    for parent, among in enumerate(below(depths)):
-        middles = [plan.boxes[child].middle_y for child in among]
-        assert middles == sorted(middles)
-        for child in among:
-            trunk = plan.edge_xs[depths[child]]
-            assert plan.boxes[parent].right_x < trunk < plan.boxes[child].x - nodes[child].label_width
-        if among and not nodes[parent].subtree_name_width:
-            assert abs(plan.boxes[parent].middle_y - middles[0]) < 1e-6
-    whole = Rectangle(0, 0, plan.width, plan.height)
-    assert all(contains(whole, part) for part in (*plan.boxes, *plan.frames.values()))
-
-
-def test_a_frame_holds_its_subtree_and_nothing_else(tree):
-    depths, nodes = tree
-    plan = compute_layout(depths, below(depths), nodes)
-    assert set(plan.frames) == {index for index, size in enumerate(nodes) if size.subtree_name_width}
-    for index, frame in plan.frames.items():
-        within = inside(index, depths)
-        assert frame.width >= nodes[index].subtree_name_width
-        for other, box in enumerate(plan.boxes):
-            assert contains(frame, box) if other in within else not overlap(frame, box)
-        for other, another in plan.frames.items():
-            assert overlap(frame, another) == (other in within or index in inside(other, depths))
+@pytest.mark.parametrize("seed", range(8))
+def test_boxes_are_apart_and_a_frame_contains_only_its_subtree(seed):
+    depths, sizes = draw_tree(seed)
+    layout = compute_layout(depths, list_children(depths), sizes)
+    assert not any(overlap(one, other) for one, other in itertools.combinations(layout.boxes, 2))
+    whole = Rectangle(0, 0, layout.width, layout.height)
+    assert all(contains(whole, part) for part in (*layout.boxes, *layout.frames.values()))
+    for index, frame in layout.frames.items():
+        branch = list_branch(index, depths)
+        assert frame.width >= sizes[index].subtree_name_width
+        for other, box in enumerate(layout.boxes):
+            assert contains(frame, box) if other in branch else not overlap(frame, box)
 
 
 def test_a_small_tree_stands_exactly_there():

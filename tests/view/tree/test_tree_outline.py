@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from py_trees.behaviour import Behaviour
 
-from executive.mission.outline import Connection, OutlineNode, list_child_indices, make_outline
+from executive.mission.outline import Connection, list_child_indices, make_outline
 from executive.skill import In, Metres, Out, Skill, param, port
 from executive.tree.failure import Reason
 from executive.tree.retry import Retry
@@ -82,12 +82,6 @@ def test_every_node_knows_its_children_what_it_is_to_its_parent_and_which_subtre
     assert list_child_indices(nodes) == [[1, 5, 7], [2, 4], [3], [], [], [6], [], [8], []]
 
 
-def test_a_node_knows_after_which_failures_it_runs():
-    catch = [Catch(on=MISSED, do=look("tree/try/catch/1/look"))]
-    root = TryCatch(make_site("tree/try"), do=pick("tree/try/Pick"), catch=catch)
-    assert [node.trigger for node in make_outline(root)] == ["", "", "on Pick.missed", ""]
-
-
 def test_ports_and_reasons_stand_below_the_skill():
     nodes = make_outline(Sequence(make_site("tree"), do=[pick("tree/Pick"), pick("tree/other", "other")]))
     assert draw_text(nodes, shows_ports=True, shows_reasons=True).splitlines() == [
@@ -101,15 +95,10 @@ def test_ports_and_reasons_stand_below_the_skill():
     ]
 
 
-def test_a_catch_tells_what_it_is_for_with_the_reasons():
-    nodes = [
-        OutlineNode("tree/try", "try", 0, "", "try", "try"),
-        OutlineNode("tree/try/catch/1", "catch 1", 1, "", "sequence", "sequence", trigger="on Pick.missed"),
-        OutlineNode("tree/try/catch/1/Wait", "Wait", 2, "", "skill", "Wait"),
-    ]
-    assert draw_text(nodes, shows_reasons=True).splitlines() == [
-        "try", "└─ catch 1", "   │  on Pick.missed", "   └─ Wait",
-    ]  # fmt: skip
+def test_the_failures_that_start_a_catch_are_listed_with_the_reasons():
+    lines = draw_text(make_outline(tree()), shows_reasons=True).splitlines()
+    number = lines.index("├─ catch 1: look")
+    assert lines[number + 1].strip("│ ") == "on Pick.missed"
 
 
 def test_long_lines_are_wrapped_under_their_node():

@@ -1,1 +1,0 @@
-"""Pictures of selections and failures: content, drawing, and the thread that draws."""

@@ -1,1 +1,0 @@
-"""Films of recorded runs: the simulated world, and the decisions of the tree."""
