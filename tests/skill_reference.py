@@ -106,9 +106,8 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("effect = Effect(...)", "testing/faults/effect.py", "Effect"),
     ],
     "Test kit: conformance": [
-        ("Checks of the declarations", "testing/conformance/declaration_checks.py", ""),
-        ("Checks of the runs", "testing/conformance/behaviour_checks.py", ""),
-        ("scene", "testing/conformance/situations.py", "SkillScene"),
+        ("Checks", "testing/conformance.py", ""),
+        ("scene", "testing/conformance.py", "SkillScene"),
     ],
 }
 """For each section and table the expression of the object, the file, and the class; "": the functions."""

@@ -141,7 +141,10 @@ def make_behaviour_skill(name: str, behaviour_type: type[Behaviour]) -> type[Beh
         "is_condition": getattr(behaviour_type, "is_condition", False),
         "senses": getattr(behaviour_type, "senses", senses),
     }  # fmt: skip
-    return cast("type[BehaviourSkill]", type(name, (BehaviourSkill,), members))
+    try:
+        return cast("type[BehaviourSkill]", type(name, (BehaviourSkill,), members))
+    except TypeError as error:
+        raise InputError(f"cannot be a skill: {error}") from None
 
 
 def _make_params(arguments: Mapping[str, Param]) -> Iterator[tuple[str, Param]]:

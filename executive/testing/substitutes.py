@@ -126,7 +126,11 @@ def make_substitute(
         is_replaced = start_numbers is None or next(start_counter) in start_numbers
         return run(self, cell) if is_replaced else _run_original(skill, self, cell)
 
-    members = {"run": choose_run, "__doc__": skill.__doc__, "__module__": skill.__module__}
+    members = {
+        "run": choose_run,
+        "__doc__": f"Substitute of {skill.__name__}.",
+        "__module__": skill.__module__,
+    }
     return cast(type[Skill], type(f"{prefix}{skill.__name__}", (skill,), members))
 
 

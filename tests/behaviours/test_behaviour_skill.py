@@ -190,5 +190,5 @@ def test_a_behaviour_conforms_to_the_rules_of_skills(
     behaviour: type[Behaviour], values: dict[str, object]
 ) -> None:
     skill = make_behaviour_skill(behaviour.__name__, behaviour)
-    verdicts = [check.run() for check in list_conformance_checks(skill, lambda scene: values)]
-    assert [verdict for verdict in verdicts if verdict.status != "ok"] == []
+    for check in list_conformance_checks(skill, lambda scene: values):
+        check()

@@ -11,7 +11,7 @@ from executive.cell.arm import Goal
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
-from executive.skill import In, Out, Skill, param
+from executive.skill import In, Out, Skill, param, port
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 from skills.await_request import AwaitRequest
@@ -26,9 +26,9 @@ from skills.transit import Transit
 class Worker(Skill):
     """Does what `way` says."""
 
-    given: In[str]
-    made: Out[str]
-    way: str = param("ok")
+    given: In[str] = port(doc="a value")
+    made: Out[str] = port(doc="a value")
+    way: str = param("ok", doc="what happens")
     reasons: ClassVar = ("bad",)
 
     def run(self, cell: Any) -> Iterator[Any]:
@@ -46,7 +46,7 @@ class Worker(Skill):
 class Plain(Skill):
     """Does its work at once, without a yield."""
 
-    made: Out[str]
+    made: Out[str] = port(doc="a value")
 
     def run(self, cell: Any) -> Any:
         cell.tool.open()

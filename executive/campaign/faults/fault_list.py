@@ -13,7 +13,7 @@ from executive.cell.objects import Target
 from executive.mission.model.nodes import SkillNode
 from executive.skill import HOLDING, Skill
 from executive.testing import faults as effects
-from executive.testing.conformance.situations import list_input_ports
+from executive.testing.conformance import list_input_ports
 from executive.testing.faults.effect import Effect
 from executive.testing.faults.script import ScheduledFault, TimeSpan, after, between, during
 
