@@ -79,7 +79,6 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("executive.manipulation.motions", "manipulation/motions.py", ""),
         ("executive.manipulation.tool_goals", "manipulation/tool_goals.py", ""),
         ("executive.manipulation.obstacles", "manipulation/obstacles.py", ""),
-        ("executive.manipulation.drop_detection", "manipulation/drop_detection.py", ""),
         ("executive.perception.evidence", "perception/evidence.py", ""),
     ],
     "Test kit: fake cell": [

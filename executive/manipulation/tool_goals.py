@@ -1,4 +1,4 @@
-"""Goals of the tool: the surface of an object, a slot of a bin, a free position on the table."""
+"""Goals of the tool (surfaces of objects, slots of bins, free positions on the table); order of targets."""
 
 from __future__ import annotations
 
@@ -227,3 +227,36 @@ def _compute_offset(failed_attempts: int, contact_radius: float, spacing: float)
     angle = failed_attempts * GOLDEN_ANGLE
     distance = contact_radius or spacing * math.sqrt(failed_attempts)
     return distance * math.cos(angle), distance * math.sin(angle)
+
+
+def sort_by_tour(cell: Cell, targets: Sequence[Target]) -> list[Target]:
+    """Return pickable targets, sorted by the length of the tour that begins with each target, shortest first.
+
+    A tour leads from the destination of the arm to the first target, and from the bin of each target to the
+    nearest of the remaining targets. The transports from the targets to their bins are not counted, because
+    their total length is the same in all tours.
+    """
+    places = [cell.bins[choose_bin(cell, target.item)].position for target in targets]
+    distances = [
+        [math.dist(place[:2], target.position[:2]) for target in targets]
+        for place in (cell.arm.destination, *places)
+    ]
+    lengths = {target.item: _measure_tour(distances, first) for first, target in enumerate(targets)}
+    return sorted(targets, key=lambda target: (lengths[target.item], target.item))
+
+
+def _measure_tour(distances: Sequence[Sequence[float]], first: int) -> float:
+    """Return the length [m] of the tour that begins with a target.
+
+    Args:
+        distances: Horizontal distances of all targets [m]: row 0 from the start of the tour, row `i + 1` from
+            the bin of target `i`.
+        first: Index of the first target.
+    """
+    remaining, last, length = set(range(len(distances) - 1)) - {first}, first, distances[0][first]
+    while remaining:
+        row = distances[last + 1]
+        last = min(remaining, key=lambda index: (row[index], index))
+        length += row[last]
+        remaining.remove(last)
+    return length

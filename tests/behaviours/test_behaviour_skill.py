@@ -11,8 +11,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
-from executive.behaviours.behaviour_skill import make_behaviour_skill
-from executive.behaviours.run_blackboard import RunBlackboard
+from executive.behaviours.behaviour_skill import RunBlackboard, make_behaviour_skill
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
 from executive.skill import Direction

@@ -9,8 +9,8 @@ import pytest
 from py_trees.blackboard import Blackboard, Client
 from py_trees.common import Access
 
-from executive.behaviours import run_blackboard
-from executive.behaviours.run_blackboard import RunBlackboard
+from executive.behaviours import behaviour_skill as run_blackboard
+from executive.behaviours.behaviour_skill import RunBlackboard
 from executive.cell.clock import StepClock
 
 

@@ -28,7 +28,7 @@ from executive.skill import Skill
 from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_mission import run_mission
 from executive.testing.substitutes import make_substitute
-from skills.is_holding import IsHolding
+from skills.conditions import IsHolding
 from tests.benchmarks.halts import COMMANDS_BEFORE_STOP, WatchedCell, measure_braking
 from tests.benchmarks.report import Figures, run_command
 

@@ -8,7 +8,7 @@ from at_hand import look, pick
 
 from executive.cells.fake.cell import FakeCell
 from executive.geometry import GRAVITY
-from executive.manipulation.drop_detection import (
+from executive.manipulation.motions import (
     MAX_PREDICTABLE_SPEED,
     detect_and_record_drop,
     predict_landing,

@@ -7,8 +7,7 @@ from at_hand import look
 
 from executive.cell.arm import Goal
 from executive.cells.fake.cell import FakeCell
-from executive.manipulation.tool_goals import sort_pickable_targets
-from executive.manipulation.tours import sort_by_tour
+from executive.manipulation.tool_goals import sort_by_tour, sort_pickable_targets
 
 
 @pytest.mark.parametrize(("y", "first"), [(0.05, "duck-1"), (0.2, "cube-1")])

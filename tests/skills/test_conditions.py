@@ -9,11 +9,7 @@ import numpy as np
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
-from skills.has_elapsed import HasElapsed
-from skills.is_fresh import IsFresh
-from skills.is_holding import IsHolding
-from skills.is_placed import IsPlaced
-from skills.is_reachable import IsReachable
+from skills.conditions import HasElapsed, IsFresh, IsHolding, IsPlaced, IsReachable
 
 
 def test_an_item_in_the_tool_is_held(fake: FakeCell, held: str) -> None:

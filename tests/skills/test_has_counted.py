@@ -6,7 +6,7 @@ import pytest
 
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
-from skills.has_counted import HasCounted
+from skills.conditions import HasCounted
 
 
 @pytest.fixture

@@ -13,9 +13,9 @@ from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 from skills.grasp import Grasp
+from skills.items import MIN_DROPS_OF_HEAVY_OBJECT, RejectTarget
 from skills.move_to_scan import MoveToScan
 from skills.put_down import PutDown
-from skills.reject_target import MIN_DROPS_OF_HEAVY_OBJECT, RejectTarget
 from skills.release import Release
 from skills.transit import Transit
 

@@ -7,8 +7,7 @@ import pytest
 from executive.cell.arm import Goal
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import SkillResult, run_skill
-from skills.defer import Defer
-from skills.list_items import ListItems
+from skills.items import Defer, ListItems
 from skills.select_target import SelectTarget
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.drop_detection import detect_and_record_drop
+from executive.manipulation.motions import detect_and_record_drop
 from executive.record.timeline.activation import Activation
 from executive.skill import EMPTY, Skill
 from executive.testing.faults.script import ScheduledFault
