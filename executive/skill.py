@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_args, get_origin, get_type_hints
 
-from executive.errors import Fault, InputError
+from executive.errors import InputError
 
 if TYPE_CHECKING:
     from executive.cell.protocols import Cell
@@ -256,15 +256,7 @@ class Skill:
         return cls.is_condition or (not has_steps and annotation in ("None", None))
 
     def failure(self, reason: str, message: str) -> SkillFailed:
-        """Return the exception for a failure with a declared reason.
-
-        Raises:
-            Fault: The skill does not declare `reason`.
-        """
-        if reason not in self.reasons:
-            reasons = ", ".join(self.reasons) or "none"
-            problem = f'raised the undeclared reason "{reason}"; it declares: {reasons}'
-            raise Fault(f"{type(self).__name__} {problem}")
+        """Return the exception for a failure; the run ends with a fault unless `reasons` contains `reason`."""
         return SkillFailed(reason, message)
 
 
@@ -289,18 +281,12 @@ def list_condition_violations(skill: type[Skill]) -> list[str]:
 
 
 def _require_annotations(skill: type[Skill]) -> None:
-    """Check that every `param` and `port` in the class body has a type annotation.
-
-    Raises:
-        TypeError: A declaration has no annotation.
-    """
+    """Raise TypeError if a `param` or `port` in the class body has no type annotation."""
     for name, declaration in vars(skill).items():
         if isinstance(declaration, Param | Port) and name not in skill.__annotations__:
-            has_simple_type = isinstance(declaration.default, bool | int | float | str)
-            type_name = type(declaration.default).__name__ if has_simple_type else "int"
             raise TypeError(
                 f"{skill.__qualname__}.{name} has no type annotation; "
-                f'write, for instance, "{name}: {type_name} = param(...)" for a param, '
+                f'write, for instance, "{name}: int = param(...)" for a param, '
                 f'"{name}: In[...] = port(...)" for an input, "{name}: Out[...] = port(...)" for an output'
             )
 

@@ -78,7 +78,6 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
     "Functions that skills share": [
         ("executive.manipulation.motions", "manipulation/motions.py", ""),
         ("executive.manipulation.tool_goals", "manipulation/tool_goals.py", ""),
-        ("executive.manipulation.obstacles", "manipulation/obstacles.py", ""),
         ("executive.perception.evidence", "perception/evidence.py", ""),
     ],
     "Test kit: fake cell": [

@@ -12,7 +12,7 @@ from executive.cell.objects import Item, Load
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Unreachable
 from executive.geometry import GRAVITY, Array
-from executive.manipulation.obstacles import list_obstacles
+from executive.manipulation.tool_goals import list_obstacles
 from executive.skill import Skill, SkillFailed
 
 MAX_PLANNING_ATTEMPTS = 3

@@ -13,8 +13,7 @@ from executive.cell.frame import Frame
 from executive.cell.objects import Load
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Fault, NoDepth, Unavailable, Unreachable
-from executive.manipulation.obstacles import list_obstacles
-from executive.manipulation.tool_goals import DROP_HEIGHT, make_put_down_goal
+from executive.manipulation.tool_goals import DROP_HEIGHT, list_obstacles, make_put_down_goal
 
 LOOKS_PER_POSE = 3
 """Number of looks from each camera pose; a look is one image with its detections."""

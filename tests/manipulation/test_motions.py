@@ -8,7 +8,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.objects import Obstacle, Target
 from executive.cells.fake.cell import FakeCell
 from executive.manipulation.motions import plan
-from executive.manipulation.obstacles import list_obstacles
+from executive.manipulation.tool_goals import list_obstacles
 from executive.testing.run_skill import run_skill
 from skills.move_to_scan import MoveToScan
 

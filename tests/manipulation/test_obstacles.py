@@ -10,8 +10,12 @@ from executive.cell.bins import BIN_THICKNESS
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.manipulation.motions import make_task, make_transport_task
-from executive.manipulation.obstacles import list_obstacles, predict_object_count
-from executive.manipulation.tool_goals import make_approach, make_bin_goal
+from executive.manipulation.tool_goals import (
+    list_obstacles,
+    make_approach,
+    make_bin_goal,
+    predict_object_count,
+)
 from executive.testing.run_skill import run_skill
 from skills.release import Release
 from skills.transit import Transit

@@ -106,7 +106,7 @@ def test_every_start_gets_a_fresh_instance_and_fresh_inputs(make: Any, scope: Bl
     ("way", "sentence"),
     [
         ("break", "Worker: ValueError: a bug"),
-        ("undeclared", 'Worker: Worker raised the undeclared reason "worse"; it declares: bad'),
+        ("undeclared", 'Worker: it failed with the undeclared reason "worse"; it declares: bad'),
         ("forget", "Worker: it succeeded without setting its output made"),
         (
             "yield",
