@@ -256,7 +256,7 @@ class Skill:
         return cls.is_condition or (not has_steps and annotation in ("None", None))
 
     def failure(self, reason: str, message: str) -> SkillFailed:
-        """Return the exception for a failure; the run ends with a fault unless `reasons` contains `reason`."""
+        """Return the exception for a failure; an undeclared reason ends the run as a fault."""
         return SkillFailed(reason, message)
 
 
