@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -190,22 +189,12 @@ class Odd(Behaviour):
         return None  # type: ignore[return-value]
 
 
-class Draw(BehaviourWithPorts):
-    """Draw a number within random ticks; `/drawing` exists meanwhile, `count` counts the draws."""
-
-    INPUT_PORTS: ClassVar = {}
-    OUTPUT_PORTS: ClassVar = {"number": PortInformation(float)}
-    count: ClassVar = 0
-
-    def __init__(self, name: str, chance: float = 0.2) -> None:
-        super().__init__(name)
-        Draw.count += 1
-        self.chance = chance
+class Draw(Behaviour):
+    """Run for ever; `/drawing` exists meanwhile."""
 
     def update(self) -> Status:
         Blackboard.set("/drawing", True)
-        self._set_output("number", random.random())
-        return Status.SUCCESS if random.random() < self.chance else Status.RUNNING
+        return Status.RUNNING
 
     def terminate(self, new_status: Status) -> None:
         Blackboard.unset("/drawing")

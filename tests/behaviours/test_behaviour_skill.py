@@ -15,7 +15,6 @@ from executive.behaviours.behaviour_skill import RunBlackboard, make_behaviour_s
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
 from executive.skill import Direction
-from executive.testing.conformance import list_conformance_checks
 from executive.testing.run_skill import SkillResult, run_skill
 
 
@@ -86,6 +85,11 @@ def test_the_arguments_become_params_without_the_name() -> None:
     assert make_behaviour_skill("Logged", foreign.Logged) is logged
 
 
+def test_only_known_behaviours_get_no_new_information() -> None:
+    types = (behaviours.TickCounter, behaviours.ProbabilisticBehaviour, timers.Timer)
+    assert [make_behaviour_skill("A", each).senses for each in types] == [False, True, True]
+
+
 def test_data_on_the_blackboard_stay_in_their_run() -> None:
     skill = make_behaviour_skill("Waiting", behaviours.WaitForBlackboardVariable)
     cells = [FakeCell(), FakeCell()]
@@ -142,17 +146,3 @@ def test_ports_become_inputs_and_outputs(fake: FakeCell) -> None:
 def test_a_behaviour_that_no_mission_can_use_is_refused(behaviour: type[Behaviour], problem: str) -> None:
     with pytest.raises(InputError, match=problem):
         make_behaviour_skill(behaviour.__name__, behaviour)
-
-
-@pytest.mark.parametrize(
-    ("behaviour", "senses"),
-    [(behaviours.TickCounter, False), (behaviours.ProbabilisticBehaviour, True), (timers.Timer, True)],
-)
-def test_only_known_behaviours_get_no_new_information(behaviour: type[Behaviour], senses: bool) -> None:
-    assert make_behaviour_skill(behaviour.__name__, behaviour).senses == senses
-
-
-def test_a_behaviour_conforms_to_the_rules_of_skills() -> None:
-    skill = make_behaviour_skill("Double", foreign.Double)
-    for check in list_conformance_checks(skill, lambda scene: {"number": 2.0}):
-        check()

@@ -82,18 +82,6 @@ COUNT = """\
 """
 
 
-DRAW = """\
-  for_each:
-    each: turn
-    in: [1, 2, 3]
-    do:
-      - retry: {attempts: 99, do: {PyTree: {class: py_trees.behaviours:ProbabilisticBehaviour}}}
-      - parallel: {do: [{Draw: {number: $drawn}}, {Draw: {chance: 0.1}, as: other}]}
-      - try: {timeout: {seconds: 0.1, do: {Draw: {chance: 0.0}, as: long}}}
-        catch: [{on: timeout.timeout, do: succeed}]
-"""
-
-
 def test_five_behaviours_of_py_trees_run_as_leaves(write: Write) -> None:
     before = dict(Blackboard.storage), dict(Blackboard.clients)
     result = run_mission(write(FIVE))
@@ -190,12 +178,12 @@ def resume(run: Path) -> Result:
     return resume_run(run, load_skills(), OPTIONS, RecordOptions(saves_pictures=False))
 
 
-def test_a_replay_executes_no_behaviour(write: Write) -> None:
-    run = record(write(DRAW))
-    foreign.Draw.count = 0
+def test_a_replay_executes_no_behaviour(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = record(write(COUNT))
+    monkeypatch.setattr(foreign.Counter, "update", lambda self: 1 / 0)
     result = replay_run(run, read_journal(run / "journal.jsonl"), load_skills())
-    assert (result.is_equal, result.difference, foreign.Draw.count) == (True, "", 0)
-    assert result.decisions > 40
+    assert (result.is_equal, result.difference) == (True, "")
+    assert result.decisions > 10
 
 
 def test_an_interrupted_run_continues_with_its_blackboard(write: Write) -> None:
@@ -213,7 +201,7 @@ def test_a_value_that_json_cannot_restore_prevents_a_resumption(write: Write) ->
 
 def test_what_a_halted_behaviour_wrote_is_restored(write: Write) -> None:
     tree = """\
-  - try: {timeout: {seconds: 0.1, do: {Draw: {chance: 0.0}}}}
+  - try: {timeout: {seconds: 0.1, do: Draw}}
     catch: [{on: timeout.timeout, do: succeed}]
   - Wait: {seconds: 1}
   - PyTree: {class: py_trees.behaviours:CheckBlackboardVariableExists, variable_name: drawing}

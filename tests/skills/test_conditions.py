@@ -89,18 +89,7 @@ def counted(fake: FakeCell, look: Any) -> FakeCell:
 def test_it_succeeds_up_to_the_number_of_counted_items(counted: FakeCell, values: Any, count: int) -> None:
     results = [run_skill(HasCounted(at_least=number, **values), counted) for number in range(1, 5)]
     assert [result.reason for result in results] == [""] * count + ["too_few"] * (4 - count)
-
-
-def test_the_failure_states_what_was_counted(counted: FakeCell) -> None:
-    result = run_skill(HasCounted(at_least=2, of_class="cube", inside="red_bin"), counted)
-    assert result.message == "1 of 2 required items of class cube are placed in red_bin"
-
-
-def test_a_rejected_item_that_left_its_place_counts_as_rejected(counted: FakeCell) -> None:
-    counted.ledger.record_grasp("sphere-1")
-    counted.ledger.record_drop("sphere-1")
-    assert counted.ledger.describe("sphere-1").state == "rejected"
-    assert run_skill(HasCounted(at_least=1, counter="rejected"), counted).reason == ""
+    assert results[-1].message.startswith(f"{count} of 4 required items")
 
 
 def test_it_names_what_the_tool_holds(fake: FakeCell, held: str) -> None:

@@ -3,7 +3,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import at_hand
 import pytest
 
 from executive.cell.detection import Detections
@@ -66,12 +65,6 @@ def test_a_doubtful_detection_beside_the_slot_is_no_answer(fake: FakeCell, place
     assert result.message.startswith("3 images are not enough")
 
 
-def test_the_evidence_of_an_earlier_look_counts(fake: FakeCell, placed: str) -> None:
-    fake.world.objects[0].position[:2] = 0.6, 0.1
-    assert look_at(fake, item=placed, looks=1).reason == "hidden"
-    assert look_at(fake, item=placed, looks=1).reason == "gone"
-
-
 def test_a_look_without_depth_is_no_answer(
     fake: FakeCell, placed: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -80,19 +73,3 @@ def test_a_look_without_depth_is_no_answer(
 
     monkeypatch.setattr(type(fake.cell.localizer), "localize", staticmethod(localize))
     assert look_at(fake, item=placed, looks=2).reason == "hidden"
-
-
-def test_the_tool_keeps_off_the_slots_beside_an_item_that_is_gone(fake: FakeCell) -> None:
-    for number, x in enumerate((0.45, 0.6)):
-        fake.world.put("cube", x, 0.0)
-        target = next(target for target in at_hand.look(fake) if target.item == f"cube-{number + 1}")
-        held = at_hand.pick(fake, target)
-        run_skill(Transit(held=held, bin="red_bin"), fake)
-        run_skill(Release(held=held, bin="red_bin"), fake)
-    fake.world.remove(fake.world.objects[0])
-    assert look_at(fake, bin="red_bin").message == "not at its place any more: cube-1"
-    fake.world.put("cube", 0.45, 0.1)
-    (target,) = at_hand.look(fake)
-    run_skill(Transit(held=at_hand.pick(fake, target), bin="red_bin"), fake)
-    third_slot = fake.cell.bins["red_bin"].slots[2]
-    assert fake.arm.tool_pose.position[:2] == pytest.approx(third_slot, abs=0.01)

@@ -125,20 +125,6 @@ def test_items_hang_over_one_slot_after_the_other_and_are_placed(
     assert np.allclose(fake.arm.tool_pose.position[:2], slots[1])
 
 
-def test_a_seal_that_breaks_on_the_way_is_dropped_and_the_arm_stops(fake: FakeCell, held: str) -> None:
-    steps = Transit(held=held, bin="red_bin").run(fake.cell)
-    for _ in range(60):
-        next(steps)
-        fake.advance()
-    fake.tool.open()
-    with pytest.raises(Exception, match="the seal on cube-1 broke on the way to red_bin, near"):
-        for _ in range(600):
-            next(steps)
-            fake.advance()
-    assert fake.arm.at_rest
-    assert fake.ledger.describe("cube-1").state == "lost", "a dropped item is looked for again"
-
-
 @pytest.mark.parametrize(
     ("attribute", "value"),
     [("open", lambda tool: None), ("touching", True)],

@@ -54,13 +54,6 @@ def test_what_falls_while_the_way_is_planned_is_dropped_though_there_is_none(
     assert fake.ledger.find_held_item() is None
 
 
-def test_what_does_not_come_off_is_stuck(fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fake.tool, "open", lambda: None)
-    result = run_skill(PutDown(held=held), fake)
-    assert (result.reason, result.message) == ("stuck", "cube-1 hangs on the tool 0.10 s after release")
-    assert fake.ledger.find_held_item() == held
-
-
 def make_failed(error: Exception) -> Future[FakeMotion]:
     future = Future[FakeMotion]()
     future.set_exception(error)

@@ -73,19 +73,6 @@ def test_without_a_free_quota_no_candidate_is_left_at_once() -> None:
     assert "and surplus objects; the quota of red_bin is reached" in result.message
 
 
-def test_a_surplus_item_that_is_requested_again_is_skipped() -> None:
-    fake = make_cell({("red_bin", "sphere"): 1}, "sphere", "sphere")
-    place_all(fake, look(fake))
-    placed, surplus = sorted(("sphere-1", "sphere-2"), key=lambda item: fake.ledger.describe(item).state)
-    expected = {
-        placed: f"{placed} is placed",
-        surplus: f"{surplus} is skipped: the quota of red_bin is reached",
-    }
-    for item, message in expected.items():
-        result = select(fake, look(fake), same=item)
-        assert (result.reason, result.message) == ("no_candidate", message)
-
-
 def test_surplus_items_are_skipped_at_the_end_also_if_the_mission_failed() -> None:
     fake = make_cell({("red_bin", "sphere"): 1}, "sphere", "sphere")
     place_all(fake, look(fake))

@@ -27,14 +27,6 @@ def test_without_a_preference_the_shortest_tour_decides(fake: FakeCell, look) ->
     assert select(fake, look()).outputs["item"] == "duck-1"
 
 
-def test_while_the_arm_moves_the_nearest_is_the_one_nearest_to_where_it_will_be(fake: FakeCell, look) -> None:
-    put(fake, cube=(0.45, 0.0), duck=(0.6, -0.2))
-    targets = look()
-    assert select(fake, targets).outputs["item"] == "cube-1"
-    fake.arm.start(fake.arm.plan(Goal((0.6, -0.3, 0.1))).result())
-    assert select(fake, targets).outputs["item"] == "duck-1"
-
-
 def test_of_several_bins_the_one_with_the_fewest_objects_is_next_the_first_among_equals(
     fake: FakeCell, look
 ) -> None:

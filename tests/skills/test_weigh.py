@@ -110,21 +110,6 @@ def test_a_class_without_a_route_has_no_bin() -> None:
     assert (result.reason, result.message[:27]) == ("no_bin", "bottle-1 is a full_bottle: ")
 
 
-def test_no_full_bottle_is_left_only_if_no_bottle_is_left_that_was_not_weighed() -> None:
-    fake = make_fake()
-    fake.world.put("bottle", 0.5, 0.0)
-    targets = [at_hand.look(fake, "full") for _ in range(4)][-1]
-    select = SelectTarget(targets=targets, wanted="full_bottle")
-    assert run_skill(select, fake).reason == "unseen"
-    weigh(fake, at_hand.pick(fake, targets[0]))
-    fake.ledger.record_placement("bottle-1", "red_bin")
-    fake.tool.open()
-    fake.world.objects.clear()
-    for _ in range(4):
-        at_hand.look(fake, "full")
-    assert run_skill(select, fake).reason == "no_candidate"
-
-
 def test_a_look_alike_in_the_list_may_be_of_the_wanted_class() -> None:
     fake = make_fake()
     fake.world.put("full_bottle", 0.5, 0.0)
