@@ -38,7 +38,7 @@ def test_it_is_let_go_on_the_safe_place_where_the_next_look_finds_it(fake: FakeC
 def test_what_falls_on_the_way_is_dropped_where_the_arm_stops(fake: FakeCell, held: str) -> None:
     failure = lost(fake, held, lambda: fake.arm.tool_pose.position[1] < -0.1)
     assert failure.reason == "dropped"
-    assert "the seal on cube-1 broke on the way to the safe place, near (0.4" in failure.message
+    assert "the seal on cube-1 broke on the way to the safe place, near (" in failure.message
     assert fake.arm.at_rest
     assert fake.arm.tool_pose.position[1] == pytest.approx(-0.1, abs=0.01)
     known = fake.ledger.describe(held)
@@ -76,7 +76,7 @@ def test_what_cannot_be_carried_away_and_was_not_lifted_is_left_where_it_stood(
     result = run_skill(PutDown(held=held), fake)
     assert (result.status, fake.tool.holding, fake.ledger.find_held_item()) == ("SUCCESS", False, None)
     (row,) = fake.ledger.list_items()
-    assert (row.state, row.position[:2]) == ("seen", [0.5, 0.0])
+    assert (row.state, row.position[:2]) == ("seen", pytest.approx([0.5, 0.0], abs=1e-3))
 
 
 def test_what_hangs_in_the_air_and_cannot_be_carried_on_is_not_let_fall(fake: FakeCell, held: str) -> None:
