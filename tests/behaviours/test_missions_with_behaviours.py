@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -56,6 +56,11 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
         return path
 
     return write
+
+
+def find_outputs(result: MissionResult) -> list[Mapping[str, object]]:
+    ends = [timed.event for timed in result.events if isinstance(timed.event, NodeEnded)]
+    return [end.outputs for end in ends if end.skill]
 
 
 def find_ends(events: list[TimedEvent] | MissionResult) -> list[tuple[str, str]]:
@@ -115,11 +120,7 @@ def test_ports_are_connected_to_variables(write: Write) -> None:
   - for_each: {each: size, in: [1.5, 2.0], do: {Double: {number: $size, doubled: $twice}}}
   - Double: {number: $twice, offset: 1.0, note: again, remark: $text}
 """
-    result = run_mission(write(tree))
-    assert result.status == "SUCCESS"
-    ends = [timed.event for timed in result.events if isinstance(timed.event, NodeEnded)]
-    outputs = [end.outputs for end in ends if end.skill]
-    assert outputs == [
+    assert find_outputs(run_mission(write(tree))) == [
         {"doubled": 3.5, "remark": "note: none"},
         {"doubled": 4.5, "remark": "note: none"},
         {"doubled": 10.0, "remark": "note: again"},
@@ -224,5 +225,4 @@ def test_the_behaviour_of_the_guide_is_a_leaf(write: Write) -> None:
     Path("hall/average.py").write_text(texts["python"])
     Path("pyproject.toml").write_text(PROJECT + texts["toml"].splitlines()[-1])
     result = run_mission(write("  - Average: {first: 3.0, second: 1.0}\n  - Average: {first: $mean}\n"))
-    ends = [timed.event for timed in result.events if isinstance(timed.event, NodeEnded)]
-    assert [end.outputs for end in ends if end.skill] == [{"mean": 2.0}, {"mean": 1.0}]
+    assert find_outputs(result) == [{"mean": 2.0}, {"mean": 1.0}]

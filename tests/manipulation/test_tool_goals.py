@@ -65,16 +65,6 @@ def test_what_is_put_down_one_after_another_stands_side_by_side(fake: FakeCell, 
     assert not any(bin.contains(place) for place in map(np.array, places) for bin in fake.cell.bins.values())
 
 
-def test_where_nothing_is_free_it_is_the_safe_place_all_the_same(
-    fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("executive.manipulation.tool_goals.GRID_HALF_WIDTH", 0)
-    run_skill(PutDown(held=held), fake)
-    fake.world.put("cube", 0.5, 0.1)
-    item, cube = picked(fake, "cube"), fake.cell.classes["cube"]
-    assert make_put_down_goal(fake.cell, cube, 0.01, item).position[:2] == pytest.approx(SAFE)
-
-
 def test_a_place_out_of_reach_is_not_chosen(
     fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

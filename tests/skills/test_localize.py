@@ -5,24 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.cell.detection import Detection, Detections, Observation
+from executive.cell.detection import Detection
 from executive.cell.frame import Frame
-from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.errors import NoDepth
 from executive.skill import SkillFailed
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
 from skills.localize import Localize
-
-
-def test_positions_are_where_the_objects_stand(fake: FakeCell) -> None:
-    cube, duck = fake.world.put("cube", 0.48, 0.12), fake.world.put("duck", 0.6, -0.2)
-    detections = run_skill(Detect(), fake).outputs["detections"]
-    targets = run_skill(Localize(detections=detections), fake).outputs["targets"]
-    assert [target.item for target in targets] == ["cube-1", "duck-1"]
-    for target, thing in zip(targets, (cube, duck), strict=True):
-        assert np.allclose(target.position, thing.position, atol=1e-6)
 
 
 def test_objects_that_move_between_localization_and_update_make_the_frame_stale(fake: FakeCell) -> None:
@@ -61,20 +51,6 @@ def test_an_object_too_high_for_its_class_in_the_depth_image_contradicts_it(fake
     (row,) = fake.ledger.list_items()
     assert row.state == "rejected"
     assert "its top is 80 mm above the table, and the top of a cube is at 50, 100, 106" in row.reason
-
-
-def test_an_object_in_a_bin_may_lie_at_any_height(fake: FakeCell, monkeypatch: pytest.MonkeyPatch) -> None:
-    x, y, _ = fake.cell.bins["red_bin"].position
-    fake.world.put("cube", x, y)
-    observed: list[bool] = []
-
-    def observe(look: Detections, observations: list[Observation]) -> list[Target]:
-        observed.extend(one.is_confident for one in observations)
-        return []
-
-    monkeypatch.setattr(fake.ledger, "observe", observe)
-    look_in_depth(fake, 0.08)
-    assert observed == [True]
 
 
 def unsure(fake: FakeCell):

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from at_hand import look
 
-from executive.cell.arm import Goal
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import FakeCell, SilentOperator
 from executive.testing.run_skill import SkillResult, run_skill
@@ -56,26 +55,9 @@ def test_a_quota_counts_all_objects_or_those_of_a_class(counted_label: str | Non
     assert select(fake, [cube]).outputs["bin"] == expected_bin
 
 
-def test_an_item_on_its_way_into_a_bin_counts_as_an_object_in_the_bin() -> None:
-    fake = make_cell({("red_bin", None): 1, ("blue_bin", None): 1}, "cube", "cube")
-    first, second = look(fake)
-    fake.ledger.record_grasp(first.item)
-    assert select(fake, [second]).outputs["bin"] == "red_bin"
-    fake.arm.start(fake.arm.plan(Goal((0.24, -0.48, 0.3))).result())
-    assert select(fake, [second]).outputs["bin"] == "blue_bin"
-
-
 def test_without_a_free_quota_no_candidate_is_left_at_once() -> None:
     fake = make_cell({("red_bin", "sphere"): 1}, "sphere", "sphere")
     place_all(fake, look(fake))
     result = select(fake, look(fake), wanted="sphere")
     assert result.reason == "no_candidate"
     assert "and surplus objects; the quota of red_bin is reached" in result.message
-
-
-def test_surplus_items_are_skipped_at_the_end_also_if_the_mission_failed() -> None:
-    fake = make_cell({("red_bin", "sphere"): 1}, "sphere", "sphere")
-    place_all(fake, look(fake))
-    fake.ledger.set_final_states(completed=False)
-    states = {event.item: (event.state, event.reason) for event in fake.ledger.list_items()}
-    assert sorted(states.values()) == [("placed", ""), ("skipped", "the quota of red_bin is reached")]
