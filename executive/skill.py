@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import inspect
 import keyword
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_args, get_origin, get_type_hints
 
-from executive.errors import Fault, InputError
+from executive.errors import InputError
 
 if TYPE_CHECKING:
     from executive.cell.protocols import Cell
@@ -52,6 +53,11 @@ class ToolState(Enum):
 
 
 ANY, EMPTY, HOLDING = ToolState.ANY, ToolState.EMPTY, ToolState.HOLDING
+
+DEVICES = ("arm", "tool", "camera")
+"""Values that `Skill.uses` may contain."""
+HALT = "halt"
+"""Key of `Skill.tool_state_after_failure` for the state of the tool after a halt."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +190,11 @@ class Skill:
     waits: ClassVar[str] = ""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Convert the annotated attributes of the class body to `params` and `ports`."""
+        """Convert the annotated attributes of the class body to `params` and `ports`.
+
+        Raises:
+            TypeError: A declaration in the class body is invalid.
+        """
         super().__init_subclass__(**kwargs)
         _require_annotations(cls)
         if "tool_left" in vars(cls):
@@ -205,15 +215,18 @@ class Skill:
             if direction is not None:
                 entry = declaration if isinstance(declaration, Port) else port()
                 ports[name] = replace(entry, name=name, type=value_type, direction=direction)
+                _check_entry(cls, ports[name])
             elif isinstance(declaration, Param):
                 unit = next((value for value in metadata if isinstance(value, str)), "")
                 params[name] = replace(declaration, name=name, type=value_type, unit=unit)
+                _check_entry(cls, params[name])
             else:
                 place = f"{cls.__qualname__}.{attribute}"
                 raise TypeError(f"{place}: attributes of a skill are In[...], Out[...] or param(...)")
             if isinstance(declaration, Param | Port):
                 delattr(cls, attribute)
         cls.params, cls.ports = params, ports
+        _check_attributes(cls)
 
     def __init__(self, **values: Any) -> None:
         """Set the params and inputs in `values`, and all other params and inputs to their defaults."""
@@ -243,15 +256,7 @@ class Skill:
         return cls.is_condition or (not has_steps and annotation in ("None", None))
 
     def failure(self, reason: str, message: str) -> SkillFailed:
-        """Return the exception for a failure with a declared reason.
-
-        Raises:
-            Fault: The skill does not declare `reason`.
-        """
-        if reason not in self.reasons:
-            reasons = ", ".join(self.reasons) or "none"
-            problem = f'raised the undeclared reason "{reason}"; it declares: {reasons}'
-            raise Fault(f"{type(self).__name__} {problem}")
+        """Return the exception for a failure; an undeclared reason ends the run as a fault."""
         return SkillFailed(reason, message)
 
 
@@ -266,18 +271,81 @@ def _get_mission_name(attribute: str) -> str:
     return name if get_attribute_name(name) == attribute else attribute
 
 
-def _require_annotations(skill: type[Skill]) -> None:
-    """Check that every `param` and `port` in the class body has a type annotation.
+def list_condition_violations(skill: type[Skill]) -> list[str]:
+    """Return the reasons why a skill is not a condition, as ends of a message: `moves the arm`."""
+    effects = ["moves the arm"] if skill.moves else []
+    effects += [f"writes ${name}" for name, port in skill.ports.items() if port.direction is Direction.OUT]
+    effects += [f"uses the {device}" for device in skill.uses]
+    effects += [f"takes time ({skill.waits})"] if skill.waits else []
+    return effects + (["requires a state of the tool"] if skill.tool_state[0] is not ANY else [])
 
-    Raises:
-        TypeError: A declaration has no annotation.
-    """
+
+def _require_annotations(skill: type[Skill]) -> None:
+    """Raise TypeError if a `param` or `port` in the class body has no type annotation."""
     for name, declaration in vars(skill).items():
         if isinstance(declaration, Param | Port) and name not in skill.__annotations__:
-            has_simple_type = isinstance(declaration.default, bool | int | float | str)
-            type_name = type(declaration.default).__name__ if has_simple_type else "int"
             raise TypeError(
                 f"{skill.__qualname__}.{name} has no type annotation; "
-                f'write, for instance, "{name}: {type_name} = param(...)" for a param, '
+                f'write, for instance, "{name}: int = param(...)" for a param, '
                 f'"{name}: In[...] = port(...)" for an input, "{name}: Out[...] = port(...)" for an output'
             )
+
+
+def _check_entry(skill: type[Skill], entry: Param | Port) -> None:
+    """Raise TypeError if a param or port of a skill has no `doc`, or a default that is not allowed."""
+    name = f"{skill.__qualname__}.{entry.name}"
+    if not entry.doc.strip():
+        function = "param" if isinstance(entry, Param) else "port"
+        raise TypeError(f'{name} has no doc. Write {function}(..., doc="its meaning").')
+    if isinstance(entry, Param) and (problem := _describe_default_problem(entry)):
+        raise TypeError(f"the default of {name} must be {problem}. Correct the default or the bounds.")
+
+
+def _describe_default_problem(param: Param) -> str:
+    """Return what the default of a param must be, and what it is; "" if the default is allowed."""
+    default, unit = param.default, f" {param.unit}" if param.unit else ""
+    if param.is_required:
+        return ""
+    allowed_types = {bool: (bool,), int: (int,), float: (float, int), str: (str,)}.get(param.type)
+    if allowed_types is not None and type(default) not in allowed_types:
+        return f"of the type {param.type.__name__}, not {default!r}"
+    if isinstance(default, int | float) and param.ge is not None and default < param.ge:
+        return f"at least {param.ge:g}{unit}, not {default:g}"
+    if isinstance(default, int | float) and param.le is not None and default > param.le:
+        return f"at most {param.le:g}{unit}, not {default:g}"
+    # For names of the cell, `choices` contains additional values.
+    has_choices = param.choices is not None and not param.refers_to and default is not None
+    if has_choices and default not in (param.choices or ()):
+        return f"{' or '.join(map(repr, param.choices or ()))}, not {default!r}"
+    return ""
+
+
+def _check_attributes(skill: type[Skill]) -> None:
+    """Raise TypeError if the docstring or a class attribute of a skill violates a rule for all skills."""
+    name, summary = skill.__qualname__, inspect.cleandoc(skill.__doc__ or "").partition("\n")[0]
+    # Python removes docstrings with the option -OO. A class without `run` is a base class, or varies a skill.
+    if "run" in vars(skill) and sys.flags.optimize < 2 and not summary.endswith("."):
+        raise TypeError(
+            f'the docstring of {name} begins with "{summary}", which is not a sentence. '
+            "State in the first line what the skill achieves."
+        )
+    if isinstance(skill.reasons, str):
+        raise TypeError(
+            f'{name}.reasons is the string "{skill.reasons}". Write a tuple: ("{skill.reasons}",).'
+        )
+    unknown = [repr(skill.uses)] if isinstance(skill.uses, str) else sorted({*skill.uses} - {*DEVICES})
+    if unknown:
+        raise TypeError(f"{name} uses {', '.join(unknown)}. Write a tuple of {', '.join(DEVICES)}.")
+    if skill.moves and "arm" not in skill.uses:
+        raise TypeError(f'{name} moves the arm but does not use it. Add "arm" to uses, or remove moves.')
+    state = skill.tool_state
+    if not isinstance(state, tuple) or len(state) != 2 or not {*state} <= {*ToolState}:
+        raise TypeError(f"{name}.tool_state is {state!r}. Write two of ANY, EMPTY and HOLDING.")
+    allowed_keys = (*skill.reasons, HALT)
+    if unknown := [key for key in skill.tool_state_after_failure if key not in allowed_keys]:
+        raise TypeError(
+            f'{name}.tool_state_after_failure has "{unknown[0]}", which is not a reason of the skill. '
+            f"Allowed: {', '.join(allowed_keys)}."
+        )
+    if skill.is_condition and (effects := list_condition_violations(skill)):
+        raise TypeError(f"{name} {effects[0]}, and declares is_condition. Remove one of the two.")

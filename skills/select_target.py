@@ -6,8 +6,7 @@ import math
 
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
-from executive.manipulation.tool_goals import choose_bin, sort_pickable_targets
-from executive.manipulation.tours import sort_by_tour
+from executive.manipulation.tool_goals import choose_bin, sort_by_tour, sort_pickable_targets
 from executive.perception.evidence import describe_unknown_labels
 from executive.skill import In, Out, Skill, SkillFailed, param, port
 

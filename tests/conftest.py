@@ -23,6 +23,13 @@ def fake() -> FakeCell:
 
 
 @pytest.fixture
+def target(fake: FakeCell) -> Target:
+    """A cube in the middle of the fake table, seen once."""
+    fake.world.put("cube", 0.5, 0.0)
+    return look(fake)[0]
+
+
+@pytest.fixture
 def targets(fake: FakeCell) -> list[Target]:
     """A cube and a duck on the fake table, seen once."""
     fake.world.put("cube", 0.5, 0.0)

@@ -78,8 +78,6 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
     "Functions that skills share": [
         ("executive.manipulation.motions", "manipulation/motions.py", ""),
         ("executive.manipulation.tool_goals", "manipulation/tool_goals.py", ""),
-        ("executive.manipulation.obstacles", "manipulation/obstacles.py", ""),
-        ("executive.manipulation.drop_detection", "manipulation/drop_detection.py", ""),
         ("executive.perception.evidence", "perception/evidence.py", ""),
     ],
     "Test kit: fake cell": [
@@ -103,9 +101,8 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("effect = Effect(...)", "testing/faults.py", "Effect"),
     ],
     "Test kit: conformance": [
-        ("Checks of the declarations", "testing/conformance/declaration_checks.py", ""),
-        ("Checks of the runs", "testing/conformance/behaviour_checks.py", ""),
-        ("scene", "testing/conformance/situations.py", "SkillScene"),
+        ("Checks", "testing/conformance.py", ""),
+        ("scene", "testing/conformance.py", "SkillScene"),
     ],
 }
 """For each section and table the expression of the object, the file, and the class; "": the functions."""

@@ -8,35 +8,65 @@ from typing import Any, ClassVar, cast
 import pytest
 
 from executive.cell.protocols import Cell
-from executive.skill import In, Out, Skill, param, port
+from executive.skill import ANY, In, Metres, Out, Skill, param, port
 from executive.tree.skill_run import SkillRun
 
 
 @pytest.mark.parametrize(
-    ("declared", "kind"),
-    [(param(2), "int"), (param(0.5), "float"), (param("a"), "str"), (param(True), "bool"), (port(), "int")],
+    ("members", "text"),
+    [
+        ({"times": param(2)}, r'times has no type annotation.*"times: int = param'),
+        ({"times": port()}, "times has no type annotation"),
+        ({"times": 3, "__annotations__": {"times": int}}, r"times: attributes of a skill are In"),
+        ({"tool_left": {}}, "tool_left: the attribute is now tool_state_after_failure"),
+        ({"run": print}, 'the docstring of Knock begins with "", which is not a sentence'),
+        ({"run": print, "__doc__": "Knocks"}, 'begins with "Knocks", which is not a sentence'),
+        ({"door": port(), "__annotations__": {"door": In[str]}}, r"Knock.door has no doc. Write port"),
+        ({"reasons": "tired"}, r'reasons is the string "tired". Write a tuple: \("tired",\)'),
+        ({"uses": "arm"}, "uses 'arm'. Write a tuple of arm, tool, camera"),
+        ({"uses": ("tool", "gripper")}, "uses gripper. Write a tuple"),
+        ({"moves": True}, 'moves the arm but does not use it. Add "arm" to uses'),
+        ({"tool_state": "empty"}, "tool_state is 'empty'. Write two of ANY, EMPTY and HOLDING"),
+        ({"tool_state_after_failure": {"lost": ANY}}, 'has "lost", which is not a reason of the skill'),
+        ({"is_condition": True, "uses": ("tool",)}, "uses the tool, and declares is_condition"),
+    ],
 )
-def test_what_is_declared_without_an_annotation_is_refused(declared: Any, kind: str) -> None:
-    with pytest.raises(TypeError) as raised:
-        type("Knock", (Skill,), {"times": declared})
-    assert str(raised.value) == (
-        "Knock.times has no type annotation; write, for instance, "
-        f'"times: {kind} = param(...)" for a param, "times: In[...] = port(...)" for an input, '
-        '"times: Out[...] = port(...)" for an output'
-    )
+def test_a_wrong_declaration_is_refused(members: dict[str, Any], text: str) -> None:
+    with pytest.raises(TypeError, match=text):
+        type("Knock", (Skill,), {"__annotations__": {}, **members})
+
+
+@pytest.mark.parametrize(
+    ("annotation", "declared", "problem"),
+    [
+        (Metres, param(0.1, ge=0.2, doc="a gap"), "at least 0.2 m, not 0.1"),
+        (Metres, param(0.3, le=0.2, doc="a gap"), "at most 0.2 m, not 0.3"),
+        (Metres, param("wide", doc="a gap"), "of the type float, not 'wide'"),
+        (int, param(True, doc="a count"), "of the type int, not True"),
+        (str, param("rows", choices=("columns", "none"), doc="an order"), "'columns' or 'none', not 'rows'"),
+    ],
+)
+def test_a_default_that_is_not_allowed_is_refused(annotation: Any, declared: Any, problem: str) -> None:
+    with pytest.raises(TypeError, match=rf"the default of Knock\.gap must be {problem}\. Correct"):
+        type("Knock", (Skill,), {"__annotations__": {"gap": annotation}, "gap": declared})
+
+
+class Knock(Skill):
+    """Knock at a door; defaults may be equal to bounds, None, or a name of the cell."""
+
+    times: int = param(2, ge=2, le=2, doc="a count")
+    limit: float | None = param(None, ge=1, doc="a limit")
+    length: Metres = param(1, doc="a whole number")
+    pose: str = param("home", refers_to="pose", choices=("auto",), doc="a name of the cell, or auto")
+
+    def min_time(self) -> float:
+        """Return a value that nobody reads; former skills define this method."""
+        return 0.0
 
 
 def test_a_default_that_is_changed_needs_its_annotation_again() -> None:
-    class Knock(Skill):
-        times: int = param(2)
-
     with pytest.raises(TypeError, match=r"Louder\.times has no type annotation"):
         type("Louder", (Knock,), {"times": param(3)})
-
-
-def test_the_former_name_of_an_attribute_is_an_error() -> None:
-    with pytest.raises(TypeError, match=r"Old\.tool_left: the attribute is now tool_state_after_failure"):
-        type("Old", (Skill,), {"__annotations__": {}, "tool_left": {}})
 
 
 class Choose(Skill):
@@ -60,22 +90,32 @@ def test_a_port_may_be_named_like_a_word_of_python() -> None:
 
 def test_a_skill_is_instantaneous_if_its_run_has_no_steps_and_declares_it() -> None:
     class Plain(Skill):
+        """Have no steps."""
+
         def run(self, cell: Cell) -> None:
             del cell
 
     class Wrong(Skill):
+        """Declare no steps."""
+
         def run(self, cell: Cell) -> None:  # type: ignore[misc]
             yield
 
     class Bare(Skill):
+        """Declare nothing."""
+
         def run(self, cell):  # type: ignore[no-untyped-def]
             del cell
 
     class Steps(Skill):
+        """Have steps."""
+
         def run(self, cell):  # type: ignore[no-untyped-def]
             yield
 
     class Delegating(Skill):
+        """Have the steps of another skill."""
+
         def run(self, cell: Cell) -> Iterator[None]:
             return Steps().run(cell)
 

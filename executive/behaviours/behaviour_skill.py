@@ -1,27 +1,83 @@
-"""Skill that runs a behaviour of py_trees."""
+"""Skill that runs a behaviour of py_trees, with a blackboard of py_trees for each run.
+
+py_trees has one blackboard per process, in class attributes of `Blackboard`. Two runs in one process must not
+share data, so the class attributes are exchanged whenever code of a behaviour is executed.
+"""
 
 from __future__ import annotations
 
 import inspect
+import threading
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import replace
 from enum import Enum
 from functools import cache, partial
 from typing import Any, ClassVar, Optional, cast
+from weakref import WeakKeyDictionary
 
 from py_trees.behaviour import Behaviour
 from py_trees.behaviours import ProbabilisticBehaviour
+from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 from py_trees.ports import PortInformation, PortsMixin
 
 from executive.behaviours.arguments import find_mission_type, list_arguments, to_argument
-from executive.behaviours.run_blackboard import PORT_PREFIX, RunBlackboard
-from executive.cell.protocols import BehaviourStep, Cell, Steps
+from executive.cell.protocols import BehaviourStep, Cell, Clock, Steps
 from executive.errors import Fault, InputError
 from executive.skill import Direction, Param, Port, Skill, get_attribute_name
 
+PORT_PREFIX = "/ports of behaviours/"
+"""Start of the keys of ports on the blackboard."""
 NAME_ARGUMENT = "name"
 """Constructor argument for the name of the behaviour; missions cannot set this argument."""
+_LOCK = threading.RLock()
+"""Lock on the class attributes of `Blackboard`, because another thread may execute another run."""
+_STORAGE_BY_CLOCK: WeakKeyDictionary[Clock, dict[str, object]] = WeakKeyDictionary()
+"""Values of the blackboard of each run, by the clock of the run: every run has exactly one clock."""
+
+
+class RunBlackboard:
+    """Context manager; in the `with` block, the blackboard of py_trees contains the data of one run.
+
+    The values belong to the run. The clients and the metadata of keys belong to this object and are discarded
+    with it, so that no client of a discarded behaviour remains.
+
+    Args:
+        clock: Clock of the run.
+
+    Attributes:
+        storage: Values by key.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self.storage = _STORAGE_BY_CLOCK.setdefault(clock, {})
+        self._attributes = {"storage": self.storage, "metadata": {}, "clients": {}, "activity_stream": None}
+
+    @property
+    def shared_values(self) -> dict[str, object]:
+        """Copy of the values by key, without the ports, each of which belongs to one behaviour."""
+        return {key: value for key, value in self.storage.items() if not key.startswith(PORT_PREFIX)}
+
+    def restore(self, step: BehaviourStep) -> BehaviourStep:
+        """Replace the shared values by those of a step, which a replay did not execute; return the step."""
+        for key in self.shared_values:
+            del self.storage[key]
+        self.storage.update({key: value for key, value in step.values.items() if key.startswith("/")})
+        return step
+
+    def __enter__(self) -> None:
+        _LOCK.acquire()
+        self._swap_attributes()
+
+    def __exit__(self, *_: object) -> None:
+        self._swap_attributes()
+        _LOCK.release()
+
+    def _swap_attributes(self) -> None:
+        """Exchange the class attributes of `Blackboard` with the attributes of this object."""
+        for name, value in self._attributes.items():
+            self._attributes[name] = getattr(Blackboard, name)
+            setattr(Blackboard, name, value)
 
 
 class BehaviourSkill(Skill):
@@ -141,7 +197,10 @@ def make_behaviour_skill(name: str, behaviour_type: type[Behaviour]) -> type[Beh
         "is_condition": getattr(behaviour_type, "is_condition", False),
         "senses": getattr(behaviour_type, "senses", senses),
     }  # fmt: skip
-    return cast("type[BehaviourSkill]", type(name, (BehaviourSkill,), members))
+    try:
+        return cast("type[BehaviourSkill]", type(name, (BehaviourSkill,), members))
+    except TypeError as error:
+        raise InputError(f"cannot be a skill: {error}") from None
 
 
 def _make_params(arguments: Mapping[str, Param]) -> Iterator[tuple[str, Param]]:

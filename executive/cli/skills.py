@@ -6,9 +6,7 @@ import inspect
 import json
 import re
 import textwrap
-from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, cast, get_args
 
 import click
@@ -19,7 +17,7 @@ from executive.exit_codes import ExitCode
 
 if TYPE_CHECKING:
     from executive.skill import Param, Port, Skill
-    from executive.testing.conformance.conformance_check import Verdict
+    from executive.testing.conformance import Check
 
 _LINE_WIDTH = 100
 """Maximum length of a line [characters]."""
@@ -60,32 +58,41 @@ def command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
 
 def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
     """Check skills, print the results after each skill, and return True if all checks passed."""
-    verdicts: list[Verdict] = []
+    verdicts: list[dict[str, Any]] = []
     for name, skill in skills.items():
         with keep_stdout_clean():
             from executive.testing.conformance import list_conformance_checks
 
-            skill_verdicts = [check.run() for check in list_conformance_checks(skill, name=name)]
+            skill_verdicts = [_run_check(check) for check in list_conformance_checks(skill, name=name)]
         if not as_json:
             click.echo("\n".join(map(_describe_verdict, skill_verdicts)))
         verdicts += skill_verdicts
-    counts = Counter(verdict.status for verdict in verdicts)
+    failed_count = sum(verdict["status"] != "ok" for verdict in verdicts)
     if as_json:
-        print_json([asdict(verdict) for verdict in verdicts])
+        print_json(verdicts)
     else:
-        texts = (f"{counts[status]} {status}" for status in ("ok", "failed", "not run") if counts[status])
         skills_text = f"{len(skills)} skill{'' if len(skills) == 1 else 's'}"
-        click.echo(f"{len(verdicts)} checks of {skills_text}: {', '.join(texts)}")
-    return counts["ok"] == len(verdicts)
+        counts = f"{len(verdicts) - failed_count} ok" + (f", {failed_count} failed" if failed_count else "")
+        click.echo(f"{len(verdicts)} checks of {skills_text}: {counts}")
+    return not failed_count
 
 
-def _describe_verdict(verdict: Verdict) -> str:
+def _run_check(check: Check) -> dict[str, Any]:
+    """Run a check, and return names, rule, status (`ok` or `failed`) and violations as JSON values."""
+    problems = check.find_problems()
+    return {
+        "skill": check.runs.name,
+        "check": check.rule.__name__,
+        "doc": (check.rule.__doc__ or "").partition("\n")[0],
+        "status": "failed" if problems else "ok",
+        "problems": problems,
+    }
+
+
+def _describe_verdict(verdict: Mapping[str, Any]) -> str:
     """Return a line about a check: status, skill, name of the check, and first problem of a failed check."""
-    line = f"{verdict.status:7}  {verdict.skill}.{verdict.check}"
-    if verdict.status != "failed":
-        return line
-    other_count = len(verdict.problems) - 1
-    return f"{line}: {verdict.problems[0]}" + (f" (and {other_count} more)" if other_count else "")
+    line = f"{verdict['status']:7}  {verdict['skill']}.{verdict['check']}"
+    return ": ".join([line, *verdict["problems"][:1]])
 
 
 def collect_declarations(name: str, skill: type[Skill]) -> Declaration:

@@ -1,9 +1,9 @@
-"""Goals of the tool: the surface of an object, a slot of a bin, a free position on the table."""
+"""Goals of the tool (surfaces of objects, slots of bins, free positions on the table), obstacles, tours."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import product
 
@@ -11,19 +11,16 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.bins import BIN_THICKNESS, Bin
-from executive.cell.objects import Item, ObjectClass, Target
+from executive.cell.detection import Detection
+from executive.cell.frame import Frame
+from executive.cell.objects import Item, ObjectClass, Obstacle, Target
 from executive.cell.protocols import Cell
 from executive.cell.quotas import is_quota_reached
+from executive.errors import NoDepth
 from executive.geometry import Array
-from executive.manipulation.obstacles import (
-    compute_layer_height,
-    find_max_object_height,
-    list_obstacles,
-    make_obstacle,
-    predict_next_slot_index,
-    predict_object_count,
-)
 
+MAX_ROLL_DISTANCE = 0.002
+"""Maximum distance that an object rolls in a bin after its release [m]."""
 DROP_HEIGHT = 0.01
 """Default clearance between an item and the surface below at the release [m]."""
 OVERTRAVEL = 0.015
@@ -41,6 +38,83 @@ GRID_HALF_WIDTH = 2
 steps]."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 """Angle between two successive points of a Vogel spiral [rad]."""
+
+
+def list_obstacles(cell: Cell, excluded_item: Item | None = None) -> tuple[Obstacle, ...]:
+    """Return the objects on the table and in the bins as obstacles, except the item `excluded_item`.
+
+    An object of no item, such as what the arm ran into lately, is an obstacle as large as the largest class.
+    """
+    targets = [target for target in cell.ledger.find_objects_on_table() if target.item != excluded_item]
+    return (*(make_obstacle(cell, target) for target in targets), *_list_bin_obstacles(cell, excluded_item))
+
+
+def is_detection_in_bin(cell: Cell, detection: Detection, frame: Frame) -> bool:
+    """Return True if a detected object lies in a bin or on its walls; False if the depth is unknown."""
+    try:
+        position = cell.localizer.locate(detection, frame)
+    except NoDepth:
+        return False
+    return any(bin.contains(position, BIN_THICKNESS) for bin in cell.bins.values())
+
+
+def predict_object_count(cell: Cell, bin_name: str, label: str | None = None) -> int:
+    """Return the number of objects in a bin, including an item that the arm is moving into the bin.
+
+    `label` restricts the count to one class.
+    """
+    arriving_item = _find_arriving_item(cell, bin_name)
+    is_counted = arriving_item is not None and label in (None, cell.ledger.get_label(arriving_item))
+    return cell.ledger.count_objects_in(bin_name, label) + is_counted
+
+
+def predict_next_slot_index(cell: Cell, bin_name: str, excluded_item: Item | None = None) -> int:
+    """Return the index of the next free slot of a bin, after the release of an item that the arm is moving.
+
+    A plan with this index remains valid after the release. A moving `excluded_item` uses no slot.
+    """
+    arriving_item = _find_arriving_item(cell, bin_name, excluded_item)
+    return cell.ledger.find_next_slot_index(bin_name) + (arriving_item is not None)
+
+
+def make_obstacle(cell: Cell, target: Target) -> Obstacle:
+    """Return the bounding cylinder of a target as an obstacle; of no class: as large as the largest class."""
+    x, y, z = map(float, target.position)
+    object_class = cell.classes.get(target.label)
+    classes = [object_class] if object_class else cell.classes.values()
+    radius, height = max(each.radius for each in classes), max(each.height for each in classes)
+    return Obstacle(x, y, radius, z + height / 2, target.item)
+
+
+def find_max_object_height(cell: Cell) -> float:
+    """Return the height of the tallest class of objects [m]."""
+    return max(object_class.height for object_class in cell.classes.values())
+
+
+def compute_layer_height(bin: Bin, layer: int, max_object_height: float) -> float:
+    """Return the height of the underside of a layer of objects in a bin [m]; layer 0 lies on the floor."""
+    return float(bin.position[2]) + BIN_THICKNESS + layer * max_object_height
+
+
+def _find_arriving_item(cell: Cell, bin_name: str, excluded_item: Item | None = None) -> Item | None:
+    """Return the item that the arm is moving into a bin, or None; None also for `excluded_item`."""
+    held_item = cell.ledger.find_held_item()
+    # Without a moving item, the destination is not read, because each reading of the cell is recorded.
+    if held_item in (None, excluded_item) or not cell.bins[bin_name].contains(cell.arm.destination):
+        return None
+    return held_item
+
+
+def _list_bin_obstacles(cell: Cell, excluded_item: Item | None) -> Iterator[Obstacle]:
+    """Yield a cylinder up to the top layer for each slot with objects; `excluded_item` is not counted."""
+    radius = max(object_class.radius for object_class in cell.classes.values()) + MAX_ROLL_DISTANCE
+    for bin_name, bin in cell.bins.items():
+        next_slot_index = predict_next_slot_index(cell, bin_name, excluded_item)
+        for index, (x, y) in enumerate(bin.slots[:next_slot_index]):
+            # Objects fill the slots of a layer in order, before the next layer begins.
+            layer_count = math.ceil((next_slot_index - index) / len(bin.slots))
+            top = compute_layer_height(bin, layer_count, find_max_object_height(cell))
+            yield Obstacle(float(x), float(y), radius, top, f"the objects in slot {index + 1} of {bin_name}")
 
 
 def make_approach(
@@ -227,3 +301,36 @@ def _compute_offset(failed_attempts: int, contact_radius: float, spacing: float)
     angle = failed_attempts * GOLDEN_ANGLE
     distance = contact_radius or spacing * math.sqrt(failed_attempts)
     return distance * math.cos(angle), distance * math.sin(angle)
+
+
+def sort_by_tour(cell: Cell, targets: Sequence[Target]) -> list[Target]:
+    """Return pickable targets, sorted by the length of the tour that begins with each target, shortest first.
+
+    A tour leads from the destination of the arm to the first target, and from the bin of each target to the
+    nearest of the remaining targets. The transports from the targets to their bins are not counted, because
+    their total length is the same in all tours.
+    """
+    places = [cell.bins[choose_bin(cell, target.item)].position for target in targets]
+    distances = [
+        [math.dist(place[:2], target.position[:2]) for target in targets]
+        for place in (cell.arm.destination, *places)
+    ]
+    lengths = {target.item: _measure_tour(distances, first) for first, target in enumerate(targets)}
+    return sorted(targets, key=lambda target: (lengths[target.item], target.item))
+
+
+def _measure_tour(distances: Sequence[Sequence[float]], first: int) -> float:
+    """Return the length [m] of the tour that begins with a target.
+
+    Args:
+        distances: Horizontal distances of all targets [m]: row 0 from the start of the tour, row `i + 1` from
+            the bin of target `i`.
+        first: Index of the first target.
+    """
+    remaining, last, length = set(range(len(distances) - 1)) - {first}, first, distances[0][first]
+    while remaining:
+        row = distances[last + 1]
+        last = min(remaining, key=lambda index: (row[index], index))
+        length += row[last]
+        remaining.remove(last)
+    return length

@@ -6,8 +6,12 @@ from executive.cell.objects import Item
 from executive.cell.protocols import Cell
 from executive.events import FrameSearched, MotionPlanned, TargetSelected, TimedEvent, ToolCommanded
 from executive.manipulation.motions import make_transport_task
-from executive.manipulation.tool_goals import make_approach, make_bin_goal, sort_pickable_targets
-from executive.manipulation.tours import sort_by_tour
+from executive.manipulation.tool_goals import (
+    make_approach,
+    make_bin_goal,
+    sort_by_tour,
+    sort_pickable_targets,
+)
 
 
 class LookaheadPlanner:

@@ -20,8 +20,7 @@ from executive.cell.objects import Load
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Fault, NoDepth, Unavailable, Unreachable
 from executive.events import Observer, RunEnded, RunResumed
-from executive.manipulation.obstacles import list_obstacles
-from executive.manipulation.tool_goals import DROP_HEIGHT, make_put_down_goal
+from executive.manipulation.tool_goals import DROP_HEIGHT, list_obstacles, make_put_down_goal
 from executive.replay.input_log import UNKNOWN_ACTION, Interruption
 from executive.replay.replayed_cell import ReplayedCell
 from executive.run.lookahead_planner import LookaheadPlanner

@@ -76,7 +76,10 @@ def run_skill(
             value, or raised an exception while it was halted.
     """
     commands: list[str] = []
-    run = SkillRun(_instantiate(skill, inputs), log_commands(workcell.cell, commands))
+    if isinstance(skill, Skill) and inputs is not None:
+        raise InputError(f"an instance of {type(skill).__name__} takes no `inputs`; pass its class")
+    instance = skill(**(inputs or {})) if isinstance(skill, type) else skill
+    run = SkillRun(instance, log_commands(workcell.cell, commands))
     for tick in range(max_ticks):
         if tick == halt_at:
             run.halt()
@@ -90,15 +93,6 @@ def run_skill(
             return SkillResult("SUCCESS", outputs=run.read_outputs(), ticks=tick, commands=commands)
         workcell.advance()
     return SkillResult("RUNNING", ticks=max_ticks, commands=commands)
-
-
-def _instantiate(skill: Skill | type[Skill], inputs: Mapping[str, Any] | None) -> Skill:
-    if isinstance(skill, type):
-        return skill(**(inputs or {}))
-    if inputs is not None:
-        name = type(skill).__name__
-        raise InputError(f"an instance of {name} takes no `inputs`; pass the class {name}, or omit `inputs`")
-    return skill
 
 
 def _count_braking_steps(workcell: Workcell) -> int | None:

@@ -1,4 +1,4 @@
-"""Substitutes of skills for tests: skills that fail, succeed, raise an error or never end.
+"""Substitutes of skills for tests: skills that fail or raise an error.
 
 Each function returns a subclass of a skill, with the same ports, params and reasons, for
 `run_mission(substitutes={"*/Grasp": make_failing(Grasp, "missed", start_count=2)})`. A substitute
@@ -7,14 +7,14 @@ counts its starts over all nodes and runs, so make a new substitute for each mis
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Generator, Mapping
+from collections.abc import Callable, Container, Generator
 from contextlib import closing
 from itertools import count, islice
-from typing import Any, cast
+from typing import cast
 
 from executive.cell.protocols import Cell, Steps
 from executive.errors import InputError
-from executive.skill import Direction, Skill, get_attribute_name
+from executive.skill import Skill
 
 RunMethod = Callable[[Skill, Cell], Steps | None]
 """Type of the method `run` of a skill."""
@@ -37,32 +37,6 @@ def make_failing(
         raise self.failure(reason, message)
 
     return make_substitute(skill, "Failing", run, _list_first_starts(start_count))
-
-
-def make_succeeding(
-    skill: type[Skill], outputs: Mapping[str, Any] | None = None, *, delay_steps: int = 0
-) -> type[Skill]:
-    """Return a skill that does nothing for `delay_steps` control steps, and then succeeds with `outputs`.
-
-    Raises:
-        InputError: The names in `outputs` are not the names of the output ports of the skill.
-    """
-    values = dict(outputs or {})
-    declared = [name for name, port in skill.ports.items() if port.direction is Direction.OUT]
-    if set(values) != set(declared):
-        raise InputError(
-            f"{skill.__name__} has the outputs {', '.join(declared) or 'none'}, "
-            f"and was given {', '.join(values) or 'none'}"
-        )
-
-    def run(self: Skill, cell: Cell) -> Steps:
-        del cell
-        for _ in range(delay_steps):
-            yield
-        for name, value in values.items():
-            setattr(self, get_attribute_name(name), value)
-
-    return make_substitute(skill, "Succeeding", run)
 
 
 def make_raising(
@@ -98,17 +72,6 @@ def make_raising_when_halted(skill: type[Skill], error: Exception) -> type[Skill
     return make_substitute(skill, "RaisingWhenHalted", run)
 
 
-def make_endless(skill: type[Skill]) -> type[Skill]:
-    """Return a skill that does nothing and never ends."""
-
-    def run(self: Skill, cell: Cell) -> Steps:
-        del self, cell
-        while True:
-            yield
-
-    return make_substitute(skill, "Endless", run)
-
-
 def make_substitute(
     skill: type[Skill], prefix: str, run: RunMethod, start_numbers: Container[int] | None = None
 ) -> type[Skill]:
@@ -126,7 +89,11 @@ def make_substitute(
         is_replaced = start_numbers is None or next(start_counter) in start_numbers
         return run(self, cell) if is_replaced else _run_original(skill, self, cell)
 
-    members = {"run": choose_run, "__doc__": skill.__doc__, "__module__": skill.__module__}
+    members = {
+        "run": choose_run,
+        "__doc__": f"Substitute of {skill.__name__}.",
+        "__module__": skill.__module__,
+    }
     return cast(type[Skill], type(f"{prefix}{skill.__name__}", (skill,), members))
 
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import random
-import time
 from collections.abc import Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from py_trees.behaviour import Behaviour
-from py_trees.behaviours import Dummy, Failure, Running, Success
+from py_trees.behaviours import Failure
 from py_trees.blackboard import Blackboard
 from py_trees.common import Access, ParallelPolicy, Status
 from py_trees.composites import Parallel
@@ -40,7 +38,6 @@ class Painter(Behaviour):
         self, name: str, colour: Colour, then: Sequence[Status] = (), stroke: float = 0.1, **others: Any
     ) -> None:
         super().__init__(name, **others)
-        self.colour, self.then, self.stroke = colour, then, stroke
 
     def update(self) -> Status:
         return Status.SUCCESS
@@ -51,18 +48,13 @@ class Primer(Painter):
 
     def __init__(self, coats: int | None = None, **others: Any) -> None:
         super().__init__(**others)
-        self.coats = coats
 
 
-class Untyped(Behaviour):
+class Untyped(Painter):
     """Take anything."""
 
     def __init__(self, thing: Thing, other=3) -> None:  # type: ignore[no-untyped-def]
-        super().__init__("Untyped")
-        self.thing, self.other = thing, other
-
-    def update(self) -> Status:
-        return Status.SUCCESS
+        super().__init__("Untyped", Colour.RED)
 
 
 class Logged(Behaviour):
@@ -72,7 +64,9 @@ class Logged(Behaviour):
 
     def __init__(self, name: str, last: Status = Status.SUCCESS, broken: str = "") -> None:
         super().__init__(name)
-        self.last, self.broken, self.ticks = last, broken, 0
+        self.last = last
+        self.broken = broken
+        self.ticks = 0
         self._note("init")
 
     def _note(self, call: str) -> None:
@@ -99,28 +93,23 @@ class Logged(Behaviour):
         self._note("shutdown")
 
 
-class Never(Inverter):
-    """Succeed when the child fails: a decorator with its child."""
+class Quiet(Inverter):
+    """Fail without a word of its own."""
 
     def __init__(self, name: str) -> None:
-        super().__init__(name, Running("the child"))
+        super().__init__(name, Failure("the child"))
 
-
-class Denied(Inverter):
-    """Fail, because the child succeeds."""
-
-    def __init__(self, name: str) -> None:
-        super().__init__(name, Success("the child"))
+    def update(self) -> Status:
+        return Status.FAILURE
 
 
 class TwoArms(Parallel):
-    """Two endless children; the first cannot stop."""
+    """Two endless children that cannot stop."""
 
     stopped: ClassVar[list[str]] = []
 
     def __init__(self, name: str) -> None:
-        children = [Stubborn("left"), Stubborn("right"), Dummy("never ends")]
-        super().__init__(name, ParallelPolicy.SuccessOnAll(), children)
+        super().__init__(name, ParallelPolicy.SuccessOnAll(), [Stubborn("left"), Stubborn("right")])
 
 
 class Stubborn(Behaviour):
@@ -132,16 +121,6 @@ class Stubborn(Behaviour):
     def terminate(self, new_status: Status) -> None:
         TwoArms.stopped.append(self.name)
         raise RuntimeError(f"{self.name} does not stop")
-
-
-class Quiet(Inverter):
-    """Fail without a word of its own."""
-
-    def __init__(self, name: str) -> None:
-        super().__init__(name, Failure("the child"))
-
-    def update(self) -> Status:
-        return Status.FAILURE
 
 
 class Counter(Behaviour):
@@ -183,22 +162,11 @@ class Double(BehaviourWithPorts):
         return Status.SUCCESS
 
 
-class Abstract(Behaviour):
-    """Has no update."""
-
-
-class NeedsChild(Inverter):
-    """Take a child, which no mission can write."""
-
-
-class Reserved(Behaviour):
+class Reserved(Painter):
     """Have an argument with a reserved name."""
 
     def __init__(self, name: str, run: int) -> None:
-        super().__init__(name)
-
-    def update(self) -> Status:
-        return Status.SUCCESS
+        super().__init__(name, Colour.RED)
 
 
 class SameName(Double):
@@ -208,11 +176,10 @@ class SameName(Double):
         super().__init__(name)
 
 
-class Undeclared(BehaviourWithPorts):
-    """Declare no ports."""
+class Secretive(Double):
+    """Claim to be a condition in spite of its outputs."""
 
-    def update(self) -> Status:
-        return Status.SUCCESS
+    is_condition = True
 
 
 class Odd(Behaviour):
@@ -222,22 +189,12 @@ class Odd(Behaviour):
         return None  # type: ignore[return-value]
 
 
-class Draw(BehaviourWithPorts):
-    """Draw a number after a random time; `/drawing` exists meanwhile, `count` counts the draws."""
-
-    INPUT_PORTS: ClassVar = {}
-    OUTPUT_PORTS: ClassVar = {"number": PortInformation(float)}
-    count: ClassVar = 0
-
-    def __init__(self, name: str, most_ticks: int = 20) -> None:
-        super().__init__(name)
-        Draw.count += 1
-        self.end = time.time() + random.uniform(0.0, most_ticks / 2000)
+class Draw(Behaviour):
+    """Run for ever; `/drawing` exists meanwhile."""
 
     def update(self) -> Status:
         Blackboard.set("/drawing", True)
-        self._set_output("number", random.random())
-        return Status.RUNNING if time.time() < self.end else Status.SUCCESS
+        return Status.RUNNING
 
     def terminate(self, new_status: Status) -> None:
         Blackboard.unset("/drawing")

@@ -125,12 +125,16 @@ def build_bare(nodes: int, last_status: Status) -> Behaviour:
 
 
 class _SucceedAtOnce(Skill):
+    """Succeed in the first tick."""
+
     def run(self, cell: Cell) -> Iterator[None]:
         del cell
         yield from ()
 
 
 class _WaitForever(Skill):
+    """Never end."""
+
     def run(self, cell: Cell) -> Iterator[None]:
         del cell
         while True:

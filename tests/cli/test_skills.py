@@ -30,10 +30,10 @@ class PlaceNeatly(Skill):
     beside: In[list[str] | None] = port(default=None, doc="what it goes beside")
     placed: Out[str] = port(doc="what was put down")
     gap: Metres = param(0.01, ge=0, le=0.05, doc="between two items")
-    bin: str = param(refers_to="bin")
+    bin: str = param(refers_to="bin", doc="where")
     order: str = param("rows", choices=("rows", "columns"), doc="word " * 30)
-    speed: Speed = param(Speed.SLOW)
-    limit: float = param(float("inf"))
+    speed: Speed = param(Speed.SLOW, doc="how fast")
+    limit: float = param(float("inf"), doc="how far")
     reasons: ClassVar = ("full", "stuck")
     uses: ClassVar = ("arm", "tool")
     senses: ClassVar = True
@@ -90,7 +90,7 @@ def test_the_text_tells_the_same():
         "  beside: list[str] | None, optional. what it goes beside",
         "  placed: str. what was put down",
         "  gap: float [m], default 0.01, at least 0, at most 0.05. between two items",
-        "  bin: str, required, names a bin",
+        "  bin: str, required, names a bin. where",
         "may fail with: full, stuck",
         "uses: arm, tool; senses; moves the arm",
         "tool: holding before, empty after, any after halt",

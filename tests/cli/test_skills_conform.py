@@ -9,8 +9,8 @@ from click.testing import CliRunner, Result
 
 from executive.cell.protocols import Cell, Steps
 from executive.cli.main import main
-from executive.skill import In, Metres, Skill, param, port
-from executive.testing.conformance.conformance_check import RULES
+from executive.skill import Skill
+from executive.testing.conformance import RULES
 
 
 class Rest(Skill):
@@ -23,21 +23,18 @@ class Rest(Skill):
 
 
 class Nap(Rest):
-    """Do nothing."""
+    """Fail without a message."""
 
-    gap: Metres = param(0.3, le=0.2, doc="how far")
-    limit: Metres = param(0.0, ge=0.1, doc="at least so far")
+    reasons = ("tired",)
 
-
-class Dream(Rest):
-    """Do nothing."""
-
-    story: In[str] = port(doc="what about")
+    def run(self, cell: Cell) -> None:  # type: ignore[override]
+        """Fail."""
+        raise self.failure("tired", "")
 
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.plugins.load_skills", lambda: {"Rest": Rest, "Nap": Nap, "Dream": Dream})
+    monkeypatch.setattr("executive.plugins.load_skills", lambda: {"Rest": Rest, "Nap": Nap})
 
 
 def conform(*words: str) -> Result:
@@ -55,18 +52,10 @@ def test_a_skill_that_conforms_has_a_line_per_check_and_exit_code_0() -> None:
 def test_without_a_name_all_skills_are_checked_and_mistakes_have_exit_code_1() -> None:
     result = conform()
     lines = [line for line in result.stdout.splitlines() if not line.startswith("ok")]
-    assert lines[:3] == [
-        "failed   Nap.has_allowed_defaults: the default of Nap.gap must be at most 0.2 m, not 0.3. "
-        "Correct the default or the bounds. (and 1 more)",
-        "failed   Dream.can_succeed: Dream cannot be tested: "
-        'no value can be generated for "story" (a text). '
-        'Return it from a function in a test: list_conformance_checks(Dream, lambda scene: {"story": ...}); '
-        "skills/README.md has an example.",
-        "not run  Dream.terminates",
-    ]
-    not_run = len(lines) - 3
-    total = 3 * len(RULES)
-    assert lines[-1] == f"{total} checks of 3 skills: {total - 2 - not_run} ok, 2 failed, {not_run} not run"
+    assert lines[0].startswith("failed   Nap.can_succeed: Nap never succeeded; with an empty tool")
+    assert lines[1].startswith("failed   Nap.ends_as_declared: with an empty tool")
+    total = 2 * len(RULES)
+    assert lines[2:] == [f"{total} checks of 2 skills: {total - 2} ok, 2 failed"]
     assert result.exit_code == 1
 
 
@@ -75,8 +64,8 @@ def test_as_json_all_checks_are_one_array() -> None:
     printed = json.loads(result.stdout)
     assert [verdict["check"] for verdict in printed] == [rule.__name__ for rule in RULES]
     assert {verdict["skill"] for verdict in printed} == {"Nap"}
-    (failed,) = (verdict for verdict in printed if verdict["status"] != "ok")
-    assert (failed["check"], failed["status"]) == ("has_allowed_defaults", "failed")
-    assert failed["doc"].startswith("Each default is a valid value of its param")
-    assert len(failed["problems"]) == 2
+    first, *_ = (verdict for verdict in printed if verdict["status"] != "ok")
+    assert (first["check"], first["status"]) == ("can_succeed", "failed")
+    assert first["doc"] == RULES[0].__doc__
+    assert len(first["problems"]) == 1
     assert result.exit_code == 1

@@ -21,11 +21,11 @@ from executive.tree.node_registry import load_control_nodes
 class Look(Skill):
     """See something."""
 
-    view: str = param("table", choices=("table", "full"))
-    detector: str = param("", refers_to="detector")
-    pose: str = param("auto", refers_to="pose", choices=("auto", "next"))
-    classes: tuple[str, ...] = param((), refers_to="class")
-    seen: Out[list[int]]
+    view: str = param("table", choices=("table", "full"), doc="a view")
+    detector: str = param("", refers_to="detector", doc="a detector")
+    pose: str = param("auto", refers_to="pose", choices=("auto", "next"), doc="a pose")
+    classes: tuple[str, ...] = param((), refers_to="class", doc="classes")
+    seen: Out[list[int]] = port(doc="a value")
     reasons: ClassVar = ("unsure", "hidden")
     senses: ClassVar = True
 
@@ -37,11 +37,11 @@ class Look(Skill):
 class Pick(Skill):
     """Take something."""
 
-    seen: In[list[int]]
-    only: In[str | None] = port(default=None)
-    height: Metres = param(0.1, ge=0, le=0.5)
-    tries: int = param(1, ge=1)
-    held: Out[str]
+    seen: In[list[int]] = port(doc="a value")
+    only: In[str | None] = port(default=None, doc="a value")
+    height: Metres = param(0.1, ge=0, le=0.5, doc="a height")
+    tries: int = param(1, ge=1, doc="a number")
+    held: Out[str] = port(doc="a value")
     reasons: ClassVar = ("missed",)
 
     def run(self, cell: Any) -> Any:
@@ -52,7 +52,7 @@ class Pick(Skill):
 class Drop(Skill):
     """Put something into a bin."""
 
-    held: In[str]
+    held: In[str] = port(doc="a value")
     bin: str = param(refers_to="bin", doc="where it goes")
     reasons: ClassVar = ("stuck",)
 

@@ -16,7 +16,7 @@ from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.conformance import list_conformance_checks
 from executive.testing.run_mission import MissionResult, run_mission
-from skills.is_equal import IsEqual
+from skills.conditions import IsEqual
 
 HEAD = """\
 mission: m

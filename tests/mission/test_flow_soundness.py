@@ -71,7 +71,7 @@ class Chance(Skill):
 class Look(Chance):
     """See."""
 
-    seen: Out[int]
+    seen: Out[int] = port(doc="a value")
     senses: ClassVar = True
     reasons: ClassVar = ("dark", "lost")
 
@@ -82,9 +82,9 @@ class Look(Chance):
 class Choose(Chance):
     """Think."""
 
-    seen: In[int]
-    other: In[int | None] = port(default=None)
-    chosen: Out[int]
+    seen: In[int] = port(doc="a value")
+    other: In[int | None] = port(default=None, doc="a value")
+    chosen: Out[int] = port(doc="a value")
     reasons: ClassVar = ("none",)
 
     def end(self, world: World) -> None:
@@ -94,7 +94,7 @@ class Choose(Chance):
 class Take(Chance):
     """PossibleToolState."""
 
-    chosen: In[int]
+    chosen: In[int] = port(doc="a value")
     reasons: ClassVar = ("missed",)
     tool_state: ClassVar = (EMPTY, HOLDING)
 
@@ -109,6 +109,7 @@ class Carry(Chance):
     reasons: ClassVar = ("blocked", "dropped")
     tool_state: ClassVar = (HOLDING, HOLDING)
     tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": ANY}
+    uses: ClassVar = ("arm",)
     moves: ClassVar = True
 
     def run(self, cell: Any) -> Any:

@@ -231,5 +231,5 @@ def test_a_cell_with_a_base_needs_no_other_key(small_cell: str) -> None:
 def test_a_param_says_its_unit_bounds_and_default(skills: dict[str, type[Skill]]) -> None:
     (shape,) = make_mission_schema(skills, load_control_nodes())["definitions"]["Pick"]["allOf"]
     height = shape["properties"]["height"]
-    assert height["description"] == "[m] (at least 0, at most 0.5, 0.1 if not given)"
+    assert height["description"] == "a height [m] (at least 0, at most 0.5, 0.1 if not given)"
     assert height["anyOf"][0] == {"type": "number", "minimum": 0, "maximum": 0.5, "default": 0.1}

@@ -83,7 +83,7 @@ def test_an_undeclared_reason_is_reported_at_the_line_of_its_skill() -> None:
 
     run.fake.tool.can_seal = seals
     story = run.tell()
-    assert 'raised the undeclared reason "tired"' in story.verdict
+    assert 'it failed with the undeclared reason "tired"' in story.verdict
     assert re.fullmatch(r"record/test_diagnosis\.py:\d+, in seals", story.raised_at)
 
 

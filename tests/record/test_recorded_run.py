@@ -11,6 +11,7 @@ import py_trees
 import pytest
 from click.testing import CliRunner, Result
 from events import at, run_ended
+from executive.record.pictures.drawing_thread import PictureDrawer
 
 from executive.cell.json_values import to_json
 from executive.cells.fake.cell import FakeCell
@@ -21,7 +22,6 @@ from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.record.journal import Journal, read_journal
 from executive.record.picture_recorder import PictureRecorder
-from executive.record.pictures.drawing_thread import PictureDrawer
 from executive.record.recorded_run import GuardedView, RecordOptions, record_run
 from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory

@@ -27,13 +27,6 @@ def look(fake: FakeCell) -> Callable[..., list[Target]]:
 
 
 @pytest.fixture
-def target(fake: FakeCell, look: Callable[..., list[Target]]) -> Target:
-    """A cube in the middle of the fake table, seen once."""
-    fake.world.put("cube", 0.5, 0.0)
-    return look()[0]
-
-
-@pytest.fixture
 def held(fake: FakeCell, target: Target) -> str:
     """The cube, in the tool."""
     return at_hand.pick(fake, target)

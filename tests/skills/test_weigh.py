@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import at_hand
 import pytest
 
-from executive.cell.workcell import CellOptions
 from executive.cells.fake.arm import FakeTool
-from executive.cells.fake.cell import FakeCell, SilentOperator, load_empty_cell
+from executive.cells.fake.cell import FakeCell, load_empty_cell
 from executive.geometry import GRAVITY
 from executive.skill import SkillFailed
 from executive.testing.run_skill import SkillResult, run_skill
@@ -21,17 +19,14 @@ from skills.weigh import Weigh
 ROUTES = {"bottle": ("red_bin",), "full_bottle": ("blue_bin",), "jar": ("yellow_bin",), "duck": ("red_bin",)}
 
 
-def make_fake(
-    routes: dict[str, tuple[str, ...]] = ROUTES, limits: dict[tuple[str, str | None], int] | None = None
-) -> FakeCell:
+def make_fake(routes: dict[str, tuple[str, ...]] = ROUTES) -> FakeCell:
     """A fake cell with empty and full bottles, which look alike, and jars, which weigh as full bottles."""
     config = load_empty_cell()
     bottle = config.objects["cube"].model_copy(update={"mass": 0.05})
     full = bottle.model_copy(update={"mass": 0.20, "looks_like": "bottle"})
     jar = bottle.model_copy(update={"mass": 0.20})
     objects = {"bottle": bottle, "full_bottle": full, "jar": jar, "duck": config.objects["duck"]}
-    options = CellOptions(SilentOperator(), cell_folder=Path(), quotas=limits or {})
-    return FakeCell(config.model_copy(update={"objects": objects}), routes=routes, options=options)
+    return FakeCell(config.model_copy(update={"objects": objects}), routes=routes)
 
 
 def pick(fake: FakeCell, label: str) -> str:
@@ -53,21 +48,15 @@ def test_a_full_and_an_empty_bottle_look_alike_and_get_their_own_bins(
     fake = make_fake()
     item = pick(fake, label)
     assert (item, fake.ledger.get_label(item)) == ("bottle-1", "bottle")
-    result = weigh(fake, item)
+    height = fake.arm.tool_pose.position[2]
+    result = run_skill(Weigh(held=item, height=0.1), fake)
+    assert fake.arm.tool_pose.position[2] == pytest.approx(height + 0.1)
     assert (result.status, result.outputs["bin"]) == ("SUCCESS", bin)
     assert result.outputs["weight"] == pytest.approx(mass * GRAVITY)
     assert fake.ledger.get_label(item) == label
 
 
-def test_the_item_is_lifted_before_it_is_weighed() -> None:
-    fake = make_fake()
-    item = pick(fake, "bottle")
-    height = fake.arm.tool_pose.position[2]
-    run_skill(Weigh(held=item, height=0.1), fake)
-    assert fake.arm.tool_pose.position[2] == pytest.approx(height + 0.1)
-
-
-@pytest.mark.parametrize("zero", [0.1 * GRAVITY, -0.1 * GRAVITY, 20.0])
+@pytest.mark.parametrize("zero", [-0.1 * GRAVITY, 20.0])
 def test_the_load_of_the_empty_tool_before_the_approach_is_the_zero(zero: float) -> None:
     fake = make_fake()
     fake.tool.load_error = zero
@@ -75,7 +64,7 @@ def test_the_load_of_the_empty_tool_before_the_approach_is_the_zero(zero: float)
     assert (result.outputs["weight"], result.outputs["bin"]) == (pytest.approx(0.05 * GRAVITY), "red_bin")
 
 
-@pytest.mark.parametrize("load", [0.0, 0.05 * GRAVITY, math.nan, math.inf])
+@pytest.mark.parametrize("load", [0.05 * GRAVITY, math.nan])
 def test_a_load_that_never_changes_or_is_no_number_is_implausible(
     load: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -91,8 +80,8 @@ def test_a_weight_of_another_class_that_looks_different_contradicts_the_look() -
     fake.tool.load_error = -0.15 * GRAVITY
     result = weigh(fake, item)
     assert (result.status, result.reason) == ("FAILURE", "contradicted")
-    expected = "the class of jar-1 is uncertain: it weighs 0.49 N; expected: jar 1.96 N"
-    assert (result.message, fake.ledger.get_label(item)) == (expected, "jar")
+    assert "it weighs 0.49 N; expected: jar 1.96 N" in result.message
+    assert fake.ledger.get_label(item) == "jar"
 
 
 def test_a_weight_between_two_classes_contradicts_both() -> None:
@@ -102,13 +91,6 @@ def test_a_weight_between_two_classes_contradicts_both() -> None:
     result = weigh(fake, item)
     assert result.reason == "contradicted"
     assert "it weighs 1.18 N; expected: bottle 0.49 N or full_bottle 1.96 N" in result.message
-
-
-def test_an_item_that_was_contradicted_is_rejected_with_its_weight() -> None:
-    fake = make_fake()
-    item = pick(fake, "bottle")
-    fake.tool.load_error = 0.07 * GRAVITY
-    weigh(fake, item)
     fake.ledger.reject(item, "could not be picked")
     (row,) = fake.ledger.list_items()
     assert row.reason.startswith("could not be picked: it weighs 1.18 N")
@@ -125,32 +107,7 @@ def test_a_class_without_a_declared_mass_is_weighed_without_a_conclusion() -> No
 def test_a_class_without_a_route_has_no_bin() -> None:
     fake = make_fake({"bottle": ("red_bin",)})
     result = weigh(fake, pick(fake, "full_bottle"))
-    expected = "bottle-1 is a full_bottle: the mission has no route for it"
-    assert (result.reason, result.message) == ("no_bin", expected)
-
-
-def test_the_bin_with_the_fewest_objects_is_chosen() -> None:
-    fake = make_fake({"bottle": ("red_bin", "blue_bin")})
-    first = pick(fake, "bottle")
-    fake.ledger.record_placement(first, "red_bin")
-    fake.tool.open()
-    fake.world.objects.clear()
-    assert weigh(fake, pick(fake, "bottle")).outputs["bin"] == "blue_bin"
-
-
-def test_no_full_bottle_is_left_only_if_no_bottle_is_left_that_was_not_weighed() -> None:
-    fake = make_fake()
-    fake.world.put("bottle", 0.5, 0.0)
-    targets = [at_hand.look(fake, "full") for _ in range(4)][-1]
-    select = SelectTarget(targets=targets, wanted="full_bottle")
-    assert run_skill(select, fake).reason == "unseen"
-    weigh(fake, at_hand.pick(fake, targets[0]))
-    fake.ledger.record_placement("bottle-1", "red_bin")
-    fake.tool.open()
-    fake.world.objects.clear()
-    for _ in range(4):
-        at_hand.look(fake, "full")
-    assert run_skill(select, fake).reason == "no_candidate"
+    assert (result.reason, result.message[:27]) == ("no_bin", "bottle-1 is a full_bottle: ")
 
 
 def test_a_look_alike_in_the_list_may_be_of_the_wanted_class() -> None:
@@ -161,22 +118,6 @@ def test_a_look_alike_in_the_list_may_be_of_the_wanted_class() -> None:
     assert run_skill(select, fake).reason == "unseen"
     fake.ledger.reject("bottle-1", "slippery")
     assert run_skill(select, fake).reason == "no_candidate"
-
-
-def test_a_reached_quota_of_one_class_does_not_exempt_its_look_alikes_before_they_are_weighed() -> None:
-    fake = make_fake(limits={("red_bin", None): 1})
-    fake.ledger.record_placement(pick(fake, "bottle"), "red_bin")
-    fake.tool.open()
-    fake.world.objects.clear()
-    fake.world.put("bottle", 0.5, 0.1)
-    targets = [at_hand.look(fake, "full") for _ in range(4)][-1]
-    result = run_skill(SelectTarget(targets=targets), fake)
-    assert (result.outputs["item"], result.outputs["bin"]) == ("bottle-2", "blue_bin")
-    assert not fake.ledger.is_table_empty()
-    assert fake.ledger.describe("bottle-2").state == "open"
-    assert weigh(fake, at_hand.pick(fake, result.outputs["target"])).reason == "no_bin"
-    fake.ledger.record_put_down("bottle-2", targets[0].position)
-    assert fake.ledger.describe("bottle-2").state == "skipped"
 
 
 def test_an_item_that_falls_during_the_measurement_is_dropped_and_not_weighed() -> None:
@@ -192,27 +133,19 @@ def test_an_item_that_falls_during_the_measurement_is_dropped_and_not_weighed() 
             if loads == 40:
                 fake.tool.break_seal()
     assert failure.value.reason == "dropped"
-    assert failure.value.message.startswith(
-        "the seal on bottle-1 broke during the weighing, near (0.50, 0.00"
-    )
+    assert "broke during the weighing, near (0.50, 0.00" in failure.value.message
     assert fake.ledger.find_held_item() is None
 
 
-@pytest.mark.parametrize("load_error", [None, 0.07 * GRAVITY])
-def test_the_bin_of_one_of_two_classes_that_look_alike_is_blocked_until_the_weight_is_certain(
-    load_error: float | None,
-) -> None:
+def test_the_bin_of_one_of_two_classes_that_look_alike_is_blocked_until_the_weight_is_certain() -> None:
     fake = make_fake()
     item = pick(fake, "full_bottle")
-    if load_error is not None:
-        fake.tool.load_error = load_error
-        assert weigh(fake, item).reason == "contradicted"
+    fake.tool.load_error = 0.07 * GRAVITY
+    assert weigh(fake, item).reason == "contradicted"
     result = run_skill(Transit(held=item, bin="red_bin"), fake)
     assert (result.status, result.reason) == ("FAILURE", "blocked")
-    assert result.message == (
-        "bottle-1 may be a bottle or a full_bottle, which look alike, and red_bin is not permitted for a "
-        "full_bottle; weigh the item before the transit"
-    )
+    assert "may be a bottle or a full_bottle" in result.message
+    assert "red_bin is not permitted for a full_bottle" in result.message
     fake.tool.load_error = 0.0
     weigh(fake, item)
     assert run_skill(Transit(held=item, bin="blue_bin"), fake).status == "SUCCESS"

@@ -12,7 +12,7 @@ from build_nodes import for_each
 from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.events import BranchChosen
-from executive.skill import In, Skill
+from executive.skill import In, Skill, port
 from executive.tree.blackboard import Blackboard
 from executive.tree.halting import halt
 from executive.tree.loops import ForEach
@@ -22,7 +22,7 @@ from executive.tree.skill_leaf import SkillLeaf, Wiring
 class Use(Skill):
     """Notes what it is given; `break` is a bug."""
 
-    given: In[Any]
+    given: In[Any] = port(doc="a value")
 
     def run(self, cell: Any) -> Iterator[None]:
         cell.append(self.given)

@@ -12,7 +12,7 @@ from executive.events import NodeEnded, NodeStarted
 from executive.testing.run_mission import run_mission
 from executive.testing.substitutes import make_substitute
 from executive.tree.sequences import Guard
-from skills.has_elapsed import HasElapsed
+from skills.conditions import HasElapsed
 
 
 def make_guard(site: Any, holds: Any, do: Any) -> Guard:

@@ -24,10 +24,10 @@ class Worker(Skill):
     cleaned: ClassVar[list[str]] = []
     """Values of `way` of the workers of one test that were cleaned up."""
 
-    given: In[str]
-    extra: In[str | None] = port(default=None)
-    made: Out[str]
-    way: str = param("ok")
+    given: In[str] = port(doc="a value")
+    extra: In[str | None] = port(default=None, doc="a value")
+    made: Out[str] = port(doc="a value")
+    way: str = param("ok", doc="what happens")
     reasons: ClassVar = ("bad",)
 
     def run(self, cell: Any) -> Iterator[None]:
@@ -152,10 +152,10 @@ def test_a_skill_that_does_not_stop_cleanly_is_reported(make: Any, way: str, pro
 class Sort(Skill):
     """Finds what goes into a box."""
 
-    colour: In[str]
-    box: In[str] = port(refers_to="item")
-    unlike: In[str | None] = port(default=None, refers_to="item")
-    found: Out[str] = port(refers_to="item")
+    colour: In[str] = port(doc="a value")
+    box: In[str] = port(refers_to="item", doc="a value")
+    unlike: In[str | None] = port(default=None, refers_to="item", doc="a value")
+    found: Out[str] = port(refers_to="item", doc="a value")
 
     def run(self, cell: Any) -> Iterator[None]:
         yield

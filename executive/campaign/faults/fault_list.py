@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.drop_detection import detect_and_record_drop
+from executive.manipulation.motions import detect_and_record_drop
 from executive.mission.model.nodes import SkillNode
 from executive.record.timeline.activation import Activation
 from executive.skill import EMPTY, HOLDING, Skill

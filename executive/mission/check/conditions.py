@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, make_error
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode, list_nodes
-from executive.skill import ANY, Direction, Skill
+from executive.skill import list_condition_violations
 
 
 def find_non_conditions(context: CheckContext, parent: InnerNode) -> Iterator[Finding]:
@@ -32,15 +32,6 @@ def _find_problem(context: CheckContext, node: Node) -> str:
         case InnerNode() if not node.declaring_class.is_condition:
             return "a list runs as a sequence" if node.is_list else f"{node.type_name} is no condition"
     return ""
-
-
-def list_condition_violations(skill: type[Skill]) -> list[str]:
-    """Return the reasons why a skill is not a condition, as ends of a message: `moves the arm`."""
-    effects = ["moves the arm"] if skill.moves else []
-    effects += [f"writes ${name}" for name, port in skill.ports.items() if port.direction is Direction.OUT]
-    effects += [f"uses the {device}" for device in skill.uses]
-    effects += [f"takes time ({skill.waits})"] if skill.waits else []
-    return effects + (["requires a state of the tool"] if skill.tool_state[0] is not ANY else [])
 
 
 def _make_hint(context: CheckContext) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.errors import InputError
 from executive.geometry import GRAVITY
-from executive.manipulation.obstacles import MAX_ROLL_DISTANCE
+from executive.manipulation.tool_goals import MAX_ROLL_DISTANCE
 from executive.mission.findings import Finding, make_error, make_warning
 from executive.mission.model.mission import Mission
 from executive.mission.parse.cell_file import CellFile

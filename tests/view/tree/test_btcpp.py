@@ -11,7 +11,7 @@ import pytest
 from executive.mission.parse.read_mission import read_mission
 from executive.mission.text.file_search import find_mission, get_shipped_folder
 from executive.plugins import load_skills
-from executive.skill import In, Out, Skill, param
+from executive.skill import In, Out, Skill, param, port
 from executive.tree.node_registry import load_control_nodes
 from executive.view.tree.btcpp import format_btcpp
 
@@ -40,10 +40,10 @@ class Held(Fail):
 class Sleep(Fail):
     """Have the name of a node of BehaviorTree.CPP, and names that it reserves."""
 
-    _left: In[int]
-    ID: Out[int]
+    _left: In[int] = port(doc="a value")
+    ID: Out[int] = port(doc="a value")
     name: str = param("x", doc="name of something")
-    exact: bool = param(False)
+    exact: bool = param(False, doc="a switch")
 
 
 SKILLS = {**load_skills(), "Fail": Fail, "Held": Held, "Sleep": Sleep}

@@ -27,10 +27,10 @@ class Pick(Skill):
     Succeeds when it is held.
     """
 
-    seen: In[list[int]]
-    only: In[str | None] = port(default=None)
-    height: Metres = param(0.1)
-    held: Out[str]
+    seen: In[list[int]] = port(doc="a value")
+    only: In[str | None] = port(default=None, doc="a value")
+    height: Metres = param(0.1, doc="a height")
+    held: Out[str] = port(doc="a value")
     reasons: ClassVar = ("missed", "blocked")
 
 
