@@ -10,8 +10,8 @@ from types import MappingProxyType
 
 from packaging.requirements import Requirement
 
-DISTRIBUTION = "executive"
-"""Name of the distribution of this project."""
+DISTRIBUTION = "pick-place-executive"
+"""Name of the distribution of this project; `executive` in the package index is another project."""
 
 
 @functools.cache
