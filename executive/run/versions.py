@@ -38,11 +38,3 @@ def find_version(name: str) -> str:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return ""
-
-
-def find_installer(name: str) -> str:
-    """Return the name of the program that installed a distribution, such as `pip`; "" if unknown."""
-    try:
-        return (metadata.distribution(name).read_text("INSTALLER") or "").strip()
-    except metadata.PackageNotFoundError:
-        return ""
