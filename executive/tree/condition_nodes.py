@@ -30,7 +30,6 @@ class AllConditions(ConditionList, Sequence):
     """
 
     keyword = "all"
-    keyword_hints: ClassVar = {"and": "Write all."}
     symbol = "&"
 
 
@@ -42,7 +41,6 @@ class AnyCondition(ConditionList, Fallback):
     """
 
     keyword = "any"
-    keyword_hints: ClassVar = {"or": "Write any."}
     symbol = "≥1"
 
 

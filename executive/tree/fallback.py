@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar
 
 from py_trees.common import Status
 
@@ -26,7 +25,6 @@ class Fallback(OrderedNode):
     """
 
     keyword = "fallback"
-    keyword_hints: ClassVar = {"selector": "Write fallback."}
     symbol = "?"
     continue_status = Status.FAILURE
     unreachable_reason = "an earlier child never fails"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
@@ -26,7 +24,6 @@ class ForEach(Loop):
     """
 
     keyword = "for_each"
-    keyword_hints: ClassVar = {"for": "Write for_each."}
     symbol = "∀"
     unreachable_reason = "the body runs 0 times"
 

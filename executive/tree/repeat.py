@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar
 
 from executive.skill import ANY, EMPTY, HOLDING
 from executive.tree.failure import Reason, format_reasons
@@ -43,7 +42,6 @@ class Repeat(Loop):
     """
 
     keyword = "repeat"
-    keyword_hints: ClassVar = {"loop": "Write repeat; for a loop with a condition, write while."}
     any_of = ("times", "until")
     unreachable_reason = "the body runs 0 times"
 

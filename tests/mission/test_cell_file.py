@@ -64,7 +64,7 @@ def test_findings_say_what_and_where(old: str, new: str, expected: str, small_ce
 def test_a_renamed_key_is_found_with_its_new_name(small_cell: str) -> None:
     text = small_cell.replace("min_force: 3.0", "least_force: 3.0")
     assert 'tool has no key "least_force"' in complaint(text)
-    assert 'The key is now called "min_force".' in complaint(text)
+    assert 'Write "min_force".' in complaint(text)
 
 
 def test_a_finding_shows_line_and_caret(small_cell: str) -> None:
