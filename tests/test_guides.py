@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
-import at_hand
 import jsonschema
 import pytest
 from click.testing import CliRunner
@@ -21,8 +20,6 @@ from executive.cells.sim.scene_file import (
 )
 from executive.cli.main import main
 from executive.events import Event
-from executive.exit_codes import ExitCode
-from executive.geometry import GRAVITY
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.parse.cell_file import load_cell
@@ -32,7 +29,6 @@ from executive.mission.text.file_search import list_shipped_missions
 from executive.mission.text.yaml_text import parse_yaml
 from executive.plugins import load_cell_kind, load_skills
 from executive.run.assembly import RunOptions, assemble
-from executive.testing.run_skill import run_skill
 from executive.tree.node_registry import load_control_nodes
 
 LONGEST = 300.0
@@ -118,11 +114,6 @@ def lasting(printed: str) -> str:
     return re.sub(r"runs/\S+", "runs/...", printed).rstrip()
 
 
-def test_every_library_and_cell_of_the_mission_guides_is_used_by_a_mission_of_it() -> None:
-    missions = "".join(FILES[name].text for name in MISSIONS)
-    assert [name for name in FILES if "/" in name and name not in missions] == SCENES
-
-
 @pytest.mark.parametrize("name", SCENES)
 def test_every_scene_of_the_mission_guides_fits_the_cell_of_its_missions(name: str, folder: Path) -> None:
     scene = load_scene(Path(name), load_cell(ROOT / "missions" / "cells" / "overhead.yaml"))
@@ -140,11 +131,6 @@ def test_the_counts_that_guides_state_are_those_of_the_repository() -> None:
     counts = {"missions": len(list_shipped_missions()), "skills": len(load_skills())}
     stated = re.findall(r"(\d+) (missions|skills)\b", "".join(map(read, GUIDES)))
     assert {(int(count), noun) for count, noun in stated} == {(counts[noun], noun) for noun in counts}
-
-
-def test_the_reference_names_every_exit_code() -> None:
-    exit_codes = read("missions/reference.md").partition("## Exit codes\n")[2]
-    assert {int(code) for code in re.findall(r"\d+", exit_codes)} == set(ExitCode)
 
 
 @pytest.mark.parametrize(("guide", "limit"), [("README.md", 8_000), (TUTORIAL, 20_000)])
@@ -177,23 +163,6 @@ def test_every_piece_of_python_shown_runs_with_its_tests(text: str, tmp_path: Pa
     for name, member in list(vars(module).items()):
         if name.startswith("test_"):
             member()
-
-
-def test_the_guides_show_missions_and_skills() -> None:
-    assert len(MISSIONS) >= 15
-    assert len(MISTAKES) >= 3
-    assert len(PYTHON) >= 3
-
-
-def test_the_skill_to_copy_works(fake: FakeCell, tmp_path: Path) -> None:
-    (text,) = (block.text for block in shown("python") if "class WeighItem" in block.text)
-    skill = module_of(text, tmp_path / "weigh_item.py").WeighItem
-    fake.world.put("cube", 0.5, 0.1)
-    (target,) = at_hand.look(fake)
-    result = run_skill(skill(held=at_hand.pick(fake, target)), fake)
-    assert result.status == "SUCCESS"
-    assert result.outputs["weight"] == pytest.approx(0.1 * GRAVITY)
-    assert fake.arm.tool_pose.position == pytest.approx([0.5, 0.1, 0.1], abs=0.003)
 
 
 def test_the_skill_to_copy_declares_a_part_of_the_shipped_one(tmp_path: Path) -> None:
