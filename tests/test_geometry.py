@@ -5,7 +5,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from executive.geometry import Pose, make_tool_down_pose, rotate_about_z
-from tests.camera_poses import looking_down
 
 unit = st.floats(-1, 1, allow_nan=False)
 quaternions = st.tuples(unit, unit, unit, unit).filter(lambda q: np.linalg.norm(q) > 0.1)
@@ -35,15 +34,3 @@ def test_a_rotation_vector_is_the_axis_times_the_angle() -> None:
 def test_poses_chain(p, q, r, s, point) -> None:
     X_AB, X_BC = Pose.of(p, q), Pose.of(r, s)
     assert np.allclose((X_AB @ X_BC).apply(point), X_AB.apply(X_BC.apply(point)), atol=1e-9)
-
-
-@given(points, st.floats(-3, 3))
-def test_the_tool_points_down_at_every_yaw(position, yaw) -> None:
-    assert np.allclose(make_tool_down_pose(position, yaw).rotation[:, 2], [0, 0, -1])
-
-
-def test_a_camera_looking_down_shows_forward_at_the_top_of_its_image() -> None:
-    X_WC = looking_down((0.5, 0.0, 1.2), up=(1, 0, 0))
-    assert np.allclose(X_WC.rotation[:, 1], [-1, 0, 0]), "down in the image is backwards"
-    assert np.allclose(X_WC.rotation[:, 0], [0, -1, 0]), "right in the image is the robot's right"
-    assert np.isclose(np.linalg.det(X_WC.rotation), 1.0)

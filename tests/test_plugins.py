@@ -121,11 +121,13 @@ def test_of_a_project_that_is_installed_its_file_counts(project: Write, packages
     assert "Gone" not in found
 
 
-def test_this_repository_registers_nothing_twice(missions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(missions)
-    here = load_skills()
-    monkeypatch.chdir("/")
-    assert here == load_skills()
+@pytest.mark.parametrize(
+    ("text", "problem"), [("Wave = 3\n", "is neither a subclass of Skill"), ("class Wave(\n", "SyntaxError")]
+)
+def test_a_module_without_the_skill_is_refused(project: Write, text: str, problem: str) -> None:
+    project("hall_three", text, skills='Wave = "hall_three.part:Wave"')
+    with pytest.raises(InputError, match=problem):
+        load_skills()
 
 
 NOD = """
@@ -161,15 +163,6 @@ def test_a_behaviour_of_py_trees_is_registered_like_a_skill(project: Write) -> N
     assert list(skills["Count"].params) == ["duration", "completion_status"]
 
 
-def test_a_behaviour_that_cannot_be_registered_is_named(project: Write) -> None:
-    project("hall_nine", NOD, skills='Nod = "hall_nine.part:Unfinished"')
-    with pytest.raises(InputError) as caught:
-        load_skills()
-    assert str(caught.value).startswith(
-        'the behaviour "Nod" (hall_nine.part:Unfinished) is abstract: it has no '
-    )
-
-
 def test_a_mission_may_name_behaviours_of_py_trees_and_of_modules_that_register_a_skill(
     project: Write,
 ) -> None:
@@ -182,18 +175,11 @@ def test_a_mission_may_name_behaviours_of_py_trees_and_of_modules_that_register_
 @pytest.mark.parametrize(
     ("path", "problem"),
     [
-        (
-            "TickCounter",
-            '"TickCounter" is no import path; write, for example, py_trees.behaviours:TickCounter',
-        ),
-        ("os:system", 'a mission may not import "os"; it may name classes of py_trees.behaviours and '),
+        ("TickCounter", '"TickCounter" is no import path'),
+        ("os:system", 'a mission may not import "os"'),
         ("hall_eleven.other:Nod", 'a mission may not import "hall_eleven.other"'),
-        ("hall_eleven:Nod", 'a mission may not import "hall_eleven"'),
-        ("py_trees.demos.action:Action", 'a mission may not import "py_trees.demos.action"'),
         ("hall_eleven.part:Nodd", 'the module "hall_eleven.part" defines no class "Nodd"'),
         ("hall_eleven.part:Success", 'the module "hall_eleven.part" defines no class "Success"'),
-        ("hall_eleven.part:Nod.update", 'the module "hall_eleven.part" defines no class "Nod.update"'),
-        ("py_trees.behaviours:success", '"py_trees.behaviours:success" is not a behaviour of py_trees'),
         ("skills.grasp:Grasp", '"skills.grasp:Grasp" is not a behaviour of py_trees'),
         (
             "hall_eleven.part:Unfinished",
@@ -206,4 +192,4 @@ def test_a_mission_may_name_nothing_else(project: Write, path: str, problem: str
     (file.parent / "hall_eleven" / "other.py").write_text("raise SystemExit('a mission executed code')")
     with pytest.raises(InputError) as caught:
         load_behaviour(path)
-    assert str(caught.value).startswith(problem)
+    assert problem in str(caught.value)

@@ -20,8 +20,3 @@ def test_a_file_in_the_working_directory_is_not_run_in_place_of_a_library(tmp_pa
         check=False,
     )
     assert (ended.returncode, ended.stderr) == (0, b"")
-
-
-def test_the_words_after_it_are_its_own(tmp_path) -> None:
-    shown = subprocess.run(build_command("json.tool", "--help"), capture_output=True, text=True, check=True)
-    assert "validate and pretty-print" in shown.stdout

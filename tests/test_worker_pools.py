@@ -59,17 +59,6 @@ def test_a_worker_ends_when_its_parent_is_killed(tmp_path: Path, then: str) -> N
     wait_until(lambda: has_ended(worker))
 
 
-def interrupted() -> str:
-    """Press Ctrl-C on this process, and go on."""
-    os.kill(os.getpid(), signal.SIGINT)
-    return "unhurt"
-
-
-def test_ctrl_c_does_nothing_to_a_worker() -> None:
-    with WorkerPool(1) as pool:
-        assert pool.submit(interrupted).result() == "unhurt"
-
-
 def test_ctrl_c_at_its_very_start_does_nothing_to_a_worker(capfd: pytest.CaptureFixture[str]) -> None:
     with WorkerPool(1) as pool:
         future = pool.submit(os.getpid)
@@ -78,12 +67,6 @@ def test_ctrl_c_at_its_very_start_does_nothing_to_a_worker(capfd: pytest.Capture
         os.kill(worker.pid, signal.SIGINT)
         assert future.result() == worker.pid
     assert capfd.readouterr().err == ""
-
-
-def test_starting_a_worker_keeps_no_ctrl_c_from_its_parent() -> None:
-    with WorkerPool(1) as pool:
-        pool.submit(os.getpid).result()
-        assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
 
 def test_who_leaves_the_pool_by_an_exception_does_not_wait_for_the_work() -> None:

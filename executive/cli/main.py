@@ -109,7 +109,7 @@ def _save_traceback(error: BaseException) -> str:
 
 
 @click.group(cls=CommandGroup, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
-@click.version_option(package_name="executive")
+@click.version_option(package_name="pick-place-executive", prog_name="executive")
 @click.option("--debug", is_flag=True, help="Print the traceback of an error.")
 def main(debug: bool) -> None:
     """Run pick-and-place missions written as behaviour trees in YAML.

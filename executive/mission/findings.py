@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from executive.errors import InputError, shorten_quotations
-from executive.mission.renamed_keys import NEW_KEY_BY_FORMER_KEY
+from executive.mission.other_words import WORD_BY_OTHER_WORD
 from executive.mission.source import Span
 
 _MAX_EXCERPT_LENGTH = 140
@@ -158,10 +158,10 @@ def suggest_word(value: object, allowed_words: Iterable[str]) -> str:
 
 
 def suggest_choice(word: str, allowed_words: Iterable[str], heading: str) -> str:
-    """Return a hint for a wrong word: the new name of a renamed key, or the allowed words after `heading`."""
+    """Return a hint for a wrong word: the word to write instead, or the allowed words after `heading`."""
     allowed_words = list(allowed_words)
-    if (new_key := NEW_KEY_BY_FORMER_KEY.get(word)) in allowed_words:
-        return f'The key is now called "{new_key}".'
+    if (replacement := WORD_BY_OTHER_WORD.get(word)) in allowed_words:
+        return f'Write "{replacement}".'
     similar = find_similar_word(word, allowed_words)
     omitted_count = len(allowed_words) - _MAX_ALTERNATIVES
     ending = f" and {omitted_count} more" if omitted_count > 0 else ""

@@ -10,8 +10,8 @@ from types import MappingProxyType
 
 from packaging.requirements import Requirement
 
-DISTRIBUTION = "executive"
-"""Name of the distribution of this project."""
+DISTRIBUTION = "pick-place-executive"
+"""Name of the distribution of this project; `executive` in the package index is another project."""
 
 
 @functools.cache
@@ -36,13 +36,5 @@ def find_version(name: str) -> str:
     """Return the version of a distribution, or "" if the distribution is not installed."""
     try:
         return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return ""
-
-
-def find_installer(name: str) -> str:
-    """Return the name of the program that installed a distribution, such as `pip`; "" if unknown."""
-    try:
-        return (metadata.distribution(name).read_text("INSTALLER") or "").strip()
     except metadata.PackageNotFoundError:
         return ""

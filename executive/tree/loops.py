@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-from typing import ClassVar, TypeAlias, cast
+from typing import TypeAlias, cast
 
 from py_trees.common import Status
 
@@ -173,7 +173,6 @@ class Repeat(Loop):
     """
 
     keyword = "repeat"
-    keyword_hints: ClassVar = {"loop": "Write repeat; for a loop with a condition, write while."}
     any_of = ("times", "until")
     unreachable_reason = "the body runs 0 times"
 
@@ -285,7 +284,6 @@ class ForEach(Loop):
     """
 
     keyword = "for_each"
-    keyword_hints: ClassVar = {"for": "Write for_each."}
     symbol = "∀"
     unreachable_reason = "the body runs 0 times"
 

@@ -7,7 +7,7 @@ for the diagnosis.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from typing import ClassVar
 
 from py_trees.behaviour import Behaviour
@@ -34,7 +34,6 @@ class ControlNode(KeyOwner, TreeNode):
         remedy: Beginning of the advice to handle a failure with this node, such as `add a retry around`; the
             name of the failing node is appended. "" if this node handles no failures.
         is_condition: True if the node counts as a condition; its keys must then accept only conditions.
-        keyword_hints: Hint for each wrong keyword that an author may write instead of `keyword`.
         clock: Clock of the run.
         ledger: Ledger of the run.
     """
@@ -44,7 +43,6 @@ class ControlNode(KeyOwner, TreeNode):
     symbol: ClassVar[str] = "◇"
     remedy: ClassVar[str] = ""
     is_condition: ClassVar[bool] = False
-    keyword_hints: ClassVar[Mapping[str, str]] = {}
 
     def __init__(self, context: NodeContext, **values: object) -> None:
         super().__init__(context, self.keyword)

@@ -226,7 +226,6 @@ class Fallback(OrderedNode):
     """
 
     keyword = "fallback"
-    keyword_hints: ClassVar = {"selector": "Write fallback."}
     symbol = "?"
     continue_status = Status.FAILURE
     unreachable_reason = "an earlier child never fails"
@@ -271,7 +270,6 @@ class AllConditions(ConditionList, Sequence):
     """
 
     keyword = "all"
-    keyword_hints: ClassVar = {"and": "Write all."}
     symbol = "&"
 
 
@@ -283,7 +281,6 @@ class AnyCondition(ConditionList, Fallback):
     """
 
     keyword = "any"
-    keyword_hints: ClassVar = {"or": "Write any."}
     symbol = "≥1"
 
 

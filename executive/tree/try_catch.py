@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar
 
 from executive.tree.failure import Failure, Reason, format_reasons
 from executive.tree.flow import Flow, FlowFunction, FlowState, join_states
@@ -31,7 +30,6 @@ class TryCatch(GeneratorNode):
     """
 
     keyword = "try"
-    keyword_hints: ClassVar = dict.fromkeys(("if", "else"), "To handle a failure, write try and catch.")
     symbol = "↯"
     any_of = ("catch", "finally")
     remedy = "catch this failure in a new try around"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import signal
 import sqlite3
 import subprocess
@@ -91,23 +90,3 @@ def test_a_killed_sweep_resumes_with_the_missing_runs_only(tmp_path: Path) -> No
         [run[name] for name in names] for run in again["runs"]
     ]
     assert invoke("sweep", "--resume", str(database)).exit_code == 0, "nothing is missing"
-
-
-@pytest.mark.slow
-def test_a_sweep_whose_mission_changed_is_not_resumed(tmp_path: Path, missions: Path) -> None:
-    for name in ("sort_fruit.yaml", "cells", "library"):
-        path = missions / name
-        (shutil.copytree if path.is_dir() else shutil.copy)(path, tmp_path / name)
-    mission, runs = tmp_path / "sort_fruit.yaml", tmp_path / "runs"
-    swept = invoke("sweep", str(mission), *OBJECTS, "--seeds", "5", "--workers", "1", "--runs", str(runs))
-    assert (swept.exit_code, "1 of 1 runs succeeded" in swept.stderr) == (0, True), swept.stderr
-    (database,) = runs.glob("*/*_sweep_sort_fruit/results.sqlite")
-    assert invoke("sweep", "--resume", str(database)).exit_code == 0
-    mission.write_text(mission.read_text() + "# changed\n")
-    refused = invoke("sweep", "--resume", str(database))
-    assert (refused.exit_code, refused.stdout) == (2, "")
-    assert refused.stderr == (
-        f'the mission "{mission}", its libraries, its cell, its weights or its scene changed after the sweep '
-        f'"{database}" began, and the results would mix both versions; restore the files, or start a new '
-        "sweep without --resume\n"
-    )

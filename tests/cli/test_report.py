@@ -35,36 +35,6 @@ def run(recorded: Path, tmp_path: Path) -> Path:
     return path
 
 
-def test_it_is_written_once_more_from_what_the_record_says_now(run: Path) -> None:
-    invoke("report", str(run))
-    lines = (run / "journal.jsonl").read_text().splitlines(keepends=True)
-    (run / "journal.jsonl").write_text("".join(lines[:-1]))
-    (run / "result.json").unlink()
-    assert invoke("report", str(run)).exit_code == 0
-    assert "INTERRUPTED" in (run / "report.html").read_text()
-
-
-def test_a_run_leaves_a_report_and_names_it(tmp_path: Path) -> None:
-    shown = invoke("run", "sort_fruit", *FEW, "--runs", str(tmp_path))
-    (file,) = tmp_path.glob("[0-9]*/*/report.html")
-    assert shown.stderr.splitlines()[-1] == f"report: {file}"
-    assert "1 of 1 objects are in their bins" in file.read_text()
-
-
-def test_a_run_that_fails_names_its_report_beside_its_record(tmp_path: Path) -> None:
-    few = ("--set", "cell.kind=fake", "--set", "attempts=1", "--set", "cell.table.objects=[0, 0]")
-    mission = tmp_path / "one.yaml"
-    mission.write_text(
-        "mission: one\ndescription: One.\ncell: cells/overhead.yaml\nparams: {attempts: 2}\n"
-        "routes: {cube: red_bin}\ntree: {retry: {attempts: $attempts, do: IsHolding}}\n"
-    )
-    shown = invoke("run", str(mission), *few, "--quiet", "--runs", str(tmp_path))
-    assert shown.exit_code == 1
-    (file,) = tmp_path.glob("[0-9]*/*/report.html")
-    lines = shown.stderr.splitlines()
-    assert f"report      {file}" == lines[lines.index(f"record      {file.parent}") + 1]
-
-
 @pytest.mark.parametrize(("quiet", "said"), [((), 1), (("--quiet",), 0)])
 def test_without_its_report_a_run_ends_as_it_did(tmp_path, monkeypatch, quiet, said) -> None:
     def broken(path: Path) -> Path:

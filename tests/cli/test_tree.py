@@ -78,14 +78,6 @@ def test_every_shipped_mission_is_shown_in_every_form(mission):
     assert shown(mission).stdout.startswith(nodes[0]["name"])
 
 
-def test_every_control_node_is_known_by_its_word(every_node):
-    kinds = {node["kind"] for node in json.loads(shown(every_node, "--json").stdout)}
-    assert kinds == {
-        "for_each", "repeat", "sequence", "parallel", "timeout", "while", "invert", "fallback", "succeed",
-        "try", "retry", "skill",
-    }  # fmt: skip
-
-
 def test_what_a_mission_says_cannot_break_the_picture(every_node):
     picture = shown(every_node, "--svg").stdout
     elements = ElementTree.fromstring(picture).iter("{http://www.w3.org/2000/svg}title")
@@ -104,26 +96,9 @@ def test_ports_and_reasons_are_printed_on_demand(every_node):
     assert "on Transit.unreachable, Transit.blocked" in given and "up to 9 attempts" in given
 
 
-def test_json_tells_what_a_skill_reads_writes_and_fails_with(every_node):
-    nodes = json.loads(shown(every_node, "--json").stdout)
-    (grasp,) = [node for node in nodes if node["skill"] == "Grasp"]
-    assert grasp["reads"] == [{"port": "target", "variable": "target", "required": True}]
-    assert grasp["writes"] == [{"port": "held", "variable": "held", "required": True}]
-    assert grasp["reasons"] == ["missed"]
-    (select,) = [node for node in nodes if "wanted: $kind" in node["detail"]]
-    assert {wire["port"]: wire["variable"] for wire in select["reads"]}["wanted"] == "kind"
-
-
 def test_the_format_has_the_same_names_as_the_flags(every_node):
     for name in ("svg", "json"):
         assert shown(every_node, "--format", name).stdout == shown(every_node, f"--{name}").stdout
-
-
-def test_behavior_tree_cpp_gets_a_tree_for_each_subtree(every_node):
-    root = ElementTree.fromstring(shown(every_node, "--format", "btcpp").stdout.encode())
-    assert root.attrib == {"BTCPP_format": "4", "main_tree_to_execute": "every_node"}
-    assert [tree.attrib["ID"] for tree in root.iter("BehaviorTree")] == ["every_node", "look"]
-    assert root.find(".//RejectTarget").attrib["why"] == "<b>&\"'\ufffd ü"
 
 
 @pytest.mark.parametrize(
@@ -131,22 +106,13 @@ def test_behavior_tree_cpp_gets_a_tree_for_each_subtree(every_node):
     [
         (("--format", "btcpp", "--svg"), "--svg and --format btcpp exclude each other"),
         (("--svg", "--json"), "--svg and --json exclude each other"),
-        (("--json", "--format", "svg", "--svg"), "--svg and --json and --format svg exclude each other"),
         (("--svg", "--ports"), "--svg always contains ports and reasons; omit --ports"),
-        (("--json", "--reasons"), "--json always contains ports and reasons; omit --reasons"),
     ],
 )
 def test_forms_that_exclude_each_other_are_refused(words, sentence):
     result = shown("sort_overhead", *words)
     assert (result.exit_code, result.stdout) == (2, "")
     assert sentence in result.stderr
-
-
-def test_a_mission_with_mistakes_has_no_tree(tmp_path):
-    (tmp_path / "m.yaml").write_text("mission: m\ncell: cells/none.yaml\ntree: Grip\n")
-    result = shown(str(tmp_path / "m.yaml"), "--svg")
-    assert (result.exit_code, result.stdout) == (2, "")
-    assert "error" in result.stderr
 
 
 def test_a_folded_tree_shows_every_subtree_once():

@@ -114,15 +114,3 @@ def test_two_trees_of_one_mission_share_nothing(
     one.tick_once()
     assert (dict(first), dict(second)) == ({"seen": [1]}, {})
     assert two.status is Status.INVALID
-
-
-def test_a_labelled_use_names_its_failures(built: Any) -> None:
-    root = built(
-        HEAD
-        + "tree:\n  try: [{use: pick, as: first}]\n  catch:\n    - {on: [first.missed], do: succeed}\n"
-        + "trees: {pick: [Look, Pick]}\n"
-    )
-    assert [node.path for node in make_outline(root)] == [
-        "tree/try", "tree/try/do", "tree/try/do/first", "tree/try/do/first/do",
-        "tree/try/do/first/do/Look", "tree/try/do/first/do/Pick", "tree/try/catch/1/succeed",
-    ]  # fmt: skip

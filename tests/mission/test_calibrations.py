@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CameraConfig
-from executive.cell.config.calibration import CalibrationConfig
 from executive.mission.findings import MissionError
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.camera_model import compute_calibration, find_calibration_doubts
@@ -73,23 +72,17 @@ def test_every_form_of_a_calibration_is_the_same_camera_in_records(matrix: str, 
     [
         ("matrix: [461, 0, 319.5, 0, 461, x, 0, 0, 1]", FLIP, "c.yaml:8:39: error[wrong-type]"),
         ("matrix: [[461, 0, 319.5], [0, 461, x], [0, 0, 1]]", FLIP, "c.yaml:8:42: error[wrong-type]"),
-        ("matrix: {rows: 3, data: [461, x]}", FLIP, "c.yaml:8:37: error[wrong-type]"),
         ("matrix: [461, 0, 0, 0, 461, 0, 319.5, 239.5, 1]", FLIP, "neither transposed"),
-        ("matrix: [461, 0, 319.5, 0, 0, 461, 239.5, 0, 0, 0, 1, 0]", FLIP, "nor P"),
         ("file: nothing.yaml", FLIP, "c.yaml:8:13: error[no-calibration]"),
-        ("file: ../c.yaml", FLIP, "outside the folder"),
         ("file: c.yaml", FLIP, "camera_matrix or K"),
         ("file: cycle.yaml", FLIP, "cycle.yaml:1:1: error[wrong-type]"),
         (f"{NINE}\n      width: 1280\n      height: 960", FLIP, "for 1280 x 960"),
         (NINE, "rotation: [0.7, -0.7, 0, 0]", "quaternion_xyzw or quaternion_wxyz"),
         (NINE, "quaternion_wxyz: [0, 0.9, -0.9, 0]", "norms of rows: 1.273"),
-        (NINE, "quaternion_wxyz: [0, 1, 0]", "needs 4 values, not 3"),
         (NINE, "rotation: [0, -1, 0, -1, 0, 0, 0, 0, 1]", "determinant: -1"),
-        (NINE, "rotation: [0, -2, 0, -2, 0, 0, 0, 0, -2]", "norms of rows: 2, 2, 2"),
         (NINE, "rotation: [0.9, -0.5, 0, 0.5, 0.9, 0, 0, 0, 1]", "up to 0.06"),
         (NINE, "rotation: [180, 0, 0]", "c.yaml:9:36: error[out-of-range]"),
         (NINE, "rotation: [0, 0, 0], quaternion_wxyz: [1, 0, 0, 0]", "needs exactly one of rotation"),
-        (NINE, "quaternion_xyzw: null", "needs exactly one of rotation"),
     ],
 )
 def test_a_wrong_calibration_is_refused_at_its_place(matrix: str, rotation: str, expected: str) -> None:
@@ -119,7 +112,6 @@ def test_a_file_of_ros_or_opencv_is_read(text: str) -> None:
         ("plumb_bob", "equidistant", "info.yaml:4:19: error[wrong-value]"),
         ("319.5, 0", "319.5, o", "info.yaml:3:57: error[wrong-type]"),
         ("640", "1280", "for 1280 x 480"),
-        ("camera_matrix", "x", "camera_matrix or K"),
     ],
 )
 def test_an_error_in_a_file_is_found_in_the_file(old: str, new: str, expected: str) -> None:
@@ -131,18 +123,3 @@ def test_an_error_in_a_file_is_found_in_the_file(old: str, new: str, expected: s
 def test_distortion_is_doubtful() -> None:
     camera = read(f"{NINE}\n      distortion: [[-0.3, 0.1, 0, 0, 0]]")
     assert [key for key, _ in find_calibration_doubts(camera)] == ["distortion"]
-
-
-def test_only_a_camera_has_a_calibration() -> None:
-    Path("c.yaml").write_text(
-        "base: overhead.yaml\ncell: c\nobjects:\n"
-        "  calibration: {urdf: none.urdf, height: 0.04, radius: 0.02, colours: [[1, 0, 0], [0, 1, 0]]}\n"
-    )
-    assert load_cell(Path("c.yaml")).objects["calibration"].colours == ((1, 0, 0), (0, 1, 0))
-
-
-def test_a_matrix_in_rows_of_an_earlier_record_is_read() -> None:
-    transform = {"rotation": [0, 0, 0], "translation": [0, 0, 1]}
-    rows = [[461, 0, 320], [0, 461, 240], [0, 0, 1]]
-    calibration = CalibrationConfig.model_validate({"matrix": rows, "mount_to_camera": transform})
-    assert calibration.matrix == (461, 0, 320, 0, 461, 240, 0, 0, 1)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -31,40 +30,21 @@ def complaint(text: str, overrides: dict[str, str] | None = None) -> str:
     [
         ("table: {x: [0.4", "tabel: {x: [0.4", 'c.yaml:13:1: error[unknown-key]: the file has no key "tabel"\n'),
         ("cup_radius", "cup_radios", 'c.yaml:12:8: error[unknown-key]: tool has no key "cup_radios"\n'),
-        ("cup_radius", "cup_radios", 'error[missing-key]: tool needs the key "cup_radius"\n'),
-        ("cup_radius", "cup_radios", '  Did you mean "cup_radius"? Keys of tool: length, cup_radius'),
         ("force: 12.0", "force: strong", 'c.yaml:12:34: error[wrong-type]: tool.force must be a number, not the text "strong"\n'),
-        ("force: 12.0", "force: '12'", 'tool.force must be a number, not the text "12"\n'),
         ("force: 12.0", "force: 0", "error[out-of-range]: tool.force must be at least 0.001, not 0\n"),
-        ("force: 12.0", "force: .inf", 'error[not-finite]: ".inf" is not a finite number\n'),
-        ("x: [0.4, 0.6]", "x: [0.4]", "c.yaml:13:9: error[wrong-length]: table.x needs 2 values, not 1\n"),
-        ("x: [0.4, 0.6]", "x: [0.4, b]", 'c.yaml:13:18: error[wrong-type]: table.x[1] must be a number, not the text "b"\n'),
-        ("mount: fixed", "mount: fixd", 'cameras.top.mount must be "fixed" or "wrist", not the text "fixd" (did you mean "fixed"?)\n'),
         ("{home: [0, 0", "{hme: [0, 0", 'arm needs a pose named "home"; there are: hme, scan\n'),
         ("scan_poses: [home]", "scan_poses: [hom]", 'c.yaml:25:18: error[unknown-pose]: the arm has no pose "hom"; arm.poses_deg has: home, scan\n'),
         ("cube_small.urdf", "../cube.urdf", 'error[outside]: "../cube.urdf" must be a relative path without ".."\n'),
         ("y: [-0.2, 0.2]", "y: [-0.2, 0.2], objects: [5, 3]", "error[wrong-value]: table.objects must be in ascending order: 5 is greater than 3\n"),
         ("0.06]}", "0.06], slots: [0, 3]}", "error[out-of-range]: bins.red_bin.slots[0] must be at least 1, not 0\n"),
         ("table_view: [192, 100, 448, 356]", "table_view: [192, 100, 748, 656]", "needs a table_view that is a square inside its image of 640 x 480 pixels, not [192, 100, 748, 656]\n"),
-        ("table_view: [192, 100, 448, 356]", "table_view: [192, 100, 448, 350]", "needs a table_view that is a square inside its image"),
         ("up: [1, 0, 0]", "up: [0, 0, 1]", "cameras.top needs a look_at other than position, and an up that is not along the axis\n"),
-        ("fov_deg: 55", "width: 640", "cameras.top needs fov_deg, or a calibration instead of position, look_at, up, fov_deg\n"),
-        ("fov_deg: 55", "calibration: {matrix: [[400, 0, 320], [0, 400, 240], [0, 0, 1]], mount_to_camera: {rotation: [0, 0, 0], translation: [0, 0, 1]}}", "cameras.top must not have position, look_at, up besides calibration, which defines them\n"),
         ("fov_deg: 55", "calibration: {matrix: [[400, 0, 320], [0, 400, 240], [0, 0, 1]]}", "cameras.top.calibration needs exactly one of mount_to_camera and camera_to_mount, its inverse\n"),
-        ("fov_deg: 55", "fov_deg: 55\n    depth: {edge_dropout: 2}", "cameras.top.depth.edge_dropout must be at most 1, not 2\n"),
-        ("y: [-0.2, 0.2]", "y: [-0.2, 0.2], stacked: 30", "table.stacked must be at most 1, not 30\n"),
         ("kind: embedded", "kind: embedded, floor: 0.7", "needs a floor of at most its threshold, 0.5, not 0.7\n"),
-        ("safe_place:", "safeplace:", 'error[missing-key]: the file needs the key "safe_place"\n'),
     ],
 )  # fmt: skip
 def test_findings_say_what_and_where(old: str, new: str, expected: str, small_cell: str) -> None:
     assert expected in complaint(small_cell.replace(old, new, 1))
-
-
-def test_a_renamed_key_is_found_with_its_new_name(small_cell: str) -> None:
-    text = small_cell.replace("min_force: 3.0", "least_force: 3.0")
-    assert 'tool has no key "least_force"' in complaint(text)
-    assert 'The key is now called "min_force".' in complaint(text)
 
 
 def test_a_finding_shows_line_and_caret(small_cell: str) -> None:
@@ -84,13 +64,8 @@ def test_a_finding_shows_line_and_caret(small_cell: str) -> None:
         ("cell.table.objects", "[5]", "--set:1:20: error[wrong-length]: table.objects needs 2 values, not 1\n"),
         ("cell.tool.force", "yes", 'cell.tool.force=yes\n     |                 ^^^'),
         ("cell.tabel.x", "1", 'the cell has no key "tabel"'),
-        ("cell.table.objects", "[5", "not valid YAML"),
         ("cell.kind.x", "5", 'there is no key "x", because'),
-        ("cell.motion.descent_speed", "1e-300", "motion.descent_speed must be at least 0.001, not 1e-300"),
         ("cell.arm.limits.jerk", "[1e308, 9, 9, 9, 9, 9, 9]", "arm.limits.jerk[0] must be at most 100000"),
-        ("cell.detectors.first.jitter", "1e308", "detectors.first.jitter must be at most 1000"),
-        ("cell.detectors.first.latency", "1e308", "detectors.first.latency must be at most 600"),
-        ("cell.safe_place", "[0, 0, 1e9]", "safe_place[2] must be at most 10"),
     ],
 )  # fmt: skip
 def test_findings_about_overrides_show_the_override(
@@ -161,14 +136,6 @@ def test_the_detectors_of_a_base_are_merged_by_name(
     assert detectors(text, TWO, small_cell) == expected
 
 
-def test_the_choice_of_a_base_holds_until_a_cell_makes_its_own(small_cell: str) -> None:
-    base = f"{TWO}\ndetector: second"
-    kept = detectors("detectors: {third: {kind: fake}}", base, small_cell)
-    assert [name for name, _ in kept] == ["second", "third", "first"]
-    changed = detectors("detector: third\ndetectors: {third: {kind: fake}}", base, small_cell)
-    assert [name for name, _ in changed] == ["third", "first", "second"]
-
-
 @pytest.mark.parametrize(
     ("base", "text", "expected"),
     [
@@ -176,9 +143,7 @@ def test_the_choice_of_a_base_holds_until_a_cell_makes_its_own(small_cell: str) 
         ("{kind: fake, threshold: 0.6}", "{first: {floor: 0.7}}", "c.yaml:2:13: error[wrong-value]: detectors.first needs a floor of at most its threshold, 0.6, not 0.7\n"),
         ("{kind: fake, latency: -1}", "{first: {floor: 0.2}}", "base.yaml:26:42: error[out-of-range]: detectors.first.latency must be at least 0, not -1\n"),
         ("{kind: fake, latency: -1}", "{first: {kind: rfdetr}, other: {floor: 0.2}}", 'c.yaml:2:36: error[missing-key]: detectors.other needs the key "kind"\n'),
-        ("{kind: fake}", "{other: }", "c.yaml:2:19: error[wrong-type]: detectors.other must be a mapping, not nothing\n"),
         ("{kind: fake}", "{first: }", "c.yaml:2:1: error[wrong-length]: detectors has 0 entries, but needs at least 1\n"),
-        ("{kind: fake}", "[first]", "c.yaml:2:1: error[wrong-type]: detectors must be a mapping, not a list of length 1\n"),
     ],
 )  # fmt: skip
 def test_a_finding_about_a_merged_detector_stands_in_the_file_that_writes_the_value(
@@ -190,41 +155,13 @@ def test_a_finding_about_a_merged_detector_stands_in_the_file_that_writes_the_va
     assert found.count("error[") == 1
 
 
-def test_a_finding_about_a_value_of_the_base_stands_in_the_base(small_cell: str) -> None:
-    Path("parts").mkdir()
-    Path("parts/base.yaml").write_text(small_cell.replace("force: 12.0", "force: 0", 1))
-    text = complaint("base: parts/base.yaml\ntable: {x: [0.4]}\n")
-    assert text == (
-        "c.yaml:2:9: error[wrong-length]: table.x needs 2 values, not 1\n"
-        "   2 | table: {x: [0.4]}\n"
-        "     |         ^\n"
-        "parts/base.yaml:12:34: error[out-of-range]: tool.force must be at least 0.001, not 0\n"
-        "  12 | tool: {cup_radius: 0.006, force: 0, gap: 0.008, tilt_deg: 30, min_force: 3.0, source: a test}\n"
-        "     |                                  ^"
-    )
-
-
-def test_a_key_that_no_file_has_is_missing_in_the_file_itself(small_cell: str) -> None:
-    Path("base.yaml").write_text(small_cell.replace("cell: small\n", "").replace("safe_place: [", "table: ["))
-    text = complaint("base: base.yaml\nkind: sim\n")
-    assert 'c.yaml:1:1: error[missing-key]: the file needs the key "cell"\n' in text
-    assert (
-        'base.yaml:30:1: error[duplicate-key]: the key "table" occurs twice here; the first is in line 12\n'
-        in text
-    )
-
-
 @pytest.mark.parametrize(
     ("base", "files", "expected"),
     [
         ("bse.yaml", {"base.yaml": ""}, 'c.yaml:1:7: error[no-base]: there is no file "bse.yaml" in . or '),
-        ("../b.yaml", {}, 'c.yaml:1:7: error[no-base]: "../b.yaml" is outside the folder of the file that names it'),
         ("5", {}, "c.yaml:1:7: error[wrong-type]: base must be a text, not 5\n"),
-        ("[a.yaml]", {}, "c.yaml:1:1: error[wrong-type]: base must be a text, not a list of length 1\n"),
-        ("c.yaml", {}, 'c.yaml:1:7: error[no-base]: "c.yaml" is itself based on this file: c.yaml -> c.yaml\n'),
         ("b.yaml", {"b.yaml": "cell: b\nbase: a.yaml", "a.yaml": "base: b.yaml"}, 'a.yaml:1:7: error[no-base]: "b.yaml" is itself based on this file: c.yaml -> b.yaml -> a.yaml -> b.yaml\n'),
         ("b.yaml", {"b.yaml": "- cell"}, "c.yaml:1:7: error[no-base]: b.yaml must be a mapping, not a list of length 1\n"),
-        ("b.yaml", {"b.yaml": "cell: [b\n"}, "b.yaml:1:8: error[yaml]: not valid YAML"),
         ("1.yaml", {f"{n}.yaml": f"base: {n + 1}.yaml" for n in range(1, 7)}, "5.yaml:1:7: error[no-base]: the chain of bases of c.yaml has more than 5 files\n"),
     ],
 )  # fmt: skip
@@ -234,15 +171,6 @@ def test_a_base_that_cannot_be_one_is_refused_where_it_is_named(
     for name, text in files.items():
         Path(name).write_text(text)
     assert expected in complaint(f"base: {base}\ncell: c\n") + "\n"
-
-
-def test_the_base_itself_cannot_be_overridden(small_cell: str) -> None:
-    text = complaint(small_cell, {"cell.base": "other.yaml"})
-    assert text == (
-        "--set:1:1: error[unknown-key]: --set cannot change the base of a cell; edit the cell file\n"
-        "   1 | cell.base=other.yaml\n"
-        "     | ^^^^^^^^^"
-    )
 
 
 def test_models_are_looked_for_beside_the_file_that_names_them(small_cell: str) -> None:
@@ -308,18 +236,3 @@ def test_models_outside_of_the_folder_are_not_opened(model: str, small_cell: str
     file = read_cell(Path("c.yaml"), {})
     assert file.config is None
     assert [finding.code for finding in file.findings] == ["outside"]
-
-
-@pytest.mark.parametrize(
-    ("kind", "sentence"),
-    [("folder", "is a folder"), ("pipe", "is a pipe or a device"), ("link", "is a link to nothing")],
-)
-def test_a_base_that_is_no_file_is_named_as_what_it_is(kind: str, sentence: str, small_cell: str) -> None:
-    path = Path("base.yaml")
-    if kind == "folder":
-        path.mkdir()
-    elif kind == "pipe":
-        os.mkfifo(path)
-    else:
-        path.symlink_to("nowhere")
-    assert f'"base.yaml" in . {sentence}, not a file' in complaint("base: base.yaml\n")

@@ -14,9 +14,7 @@ from executive.mission.load import load_mission
 from executive.mission.outline import make_outline
 from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
-from executive.testing.conformance import list_conformance_checks
 from executive.testing.run_mission import MissionResult, run_mission
-from skills.conditions import IsEqual
 
 HEAD = """\
 mission: m
@@ -69,20 +67,12 @@ def compare(value: str, to: str) -> str:
         ("$target.label", "cube"),
         ("$target.item", "$item"),
         ("$item.label", "$target.label"),
-        ("$item.state", "open"),
         ("$item.attempts", "0"),
-        ("$item.bin", '""'),
-        ("$target.change_count", "0"),
     ],
 )
 def test_a_skill_reads_a_field_of_a_variable(execute: Execute, value: str, to: str) -> None:
     result = execute(compare(value, to))
     assert (result.status, result.message) == ("SUCCESS", "")
-
-
-def test_different_values_are_not_equal(execute: Execute) -> None:
-    result = execute(compare("$target.label", "duck"))
-    assert (result.reason, result.message) == ("IsEqual.different", "the value is cube, not duck")
 
 
 def test_the_fields_of_an_item_are_read_from_the_ledger_when_the_skill_starts(execute: Execute) -> None:
@@ -94,20 +84,6 @@ def test_the_fields_of_an_item_are_read_from_the_ledger_when_the_skill_starts(ex
         "  - [{IsEqual: {value: $item.state, to: placed}}, {IsEqual: {value: $item.bin, to: red_bin}}]\n"
     )
     assert (result.status, result.message, result.items["placed"]) == ("SUCCESS", "", 1)
-
-
-def test_an_argument_of_a_subtree_may_be_a_field_of_a_variable_of_the_caller(execute: Execute) -> None:
-    result = execute(
-        "tree: [{use: look}, SelectTarget, {use: another, with: {like: $target.label}}]\n"
-        "trees:\n"
-        "  another:\n"
-        "    args: [like]\n"
-        "    returns: []\n"
-        "    do:\n"
-        "      - [{use: look}, {SelectTarget: {wanted: $like}}]\n"
-        "      - IsEqual: {value: $target.label, to: $like}\n"
-    )
-    assert (result.status, result.message) == ("SUCCESS", "")
 
 
 def test_a_loop_goes_through_a_field_with_a_list(execute: Execute) -> None:
@@ -142,26 +118,6 @@ def test_a_word_stands_for_a_list_of_names(execute: Execute, word: str, elements
     assert sorted(messages) == sorted(f"the value is {element}, not no" for element in elements)
 
 
-def test_the_elements_of_loops_give_names_to_params(execute: Execute) -> None:
-    result = execute(
-        "tree:\n"
-        "  for_each:\n"
-        "    each: pose\n"
-        "    in: poses\n"
-        "    do: {for_each: {each: view, in: [table, full], do: [{MoveToScan: {pose: $pose}}, "
-        "{Detect: {view: $view, hidden: pass}}]}}\n"
-    )
-    assert (result.status, result.message) == ("SUCCESS", "")
-    assert len(list_ends(result, "Detect")) == 4
-    assert result.cell.arm.tool_pose.position == pytest.approx(result.cell.arm.poses["aside"].position)
-
-
-def test_a_param_reads_no_variable_of_its_own_name(write: Callable[[str], Path]) -> None:
-    path = write("tree: {for_each: {each: pose, in: [aside], do: [{Wait: {seconds: 0.1}}, MoveToScan]}}")
-    (warning,) = load_mission(path, load_skills()).warnings
-    assert warning.message == "no node in this for_each reads $pose"
-
-
 def test_a_field_is_shown_in_drawings(write: Callable[[str], Path]) -> None:
     loaded = load_mission(write(compare("$target.label", "cube")), load_skills())
     run = assemble(loaded, RunOptions(0, make_cell=FakeCell), [])
@@ -183,10 +139,3 @@ def test_a_word_is_no_mistake_if_the_cell_file_has_errors(tmp_path: Path) -> Non
     with pytest.raises(MissionError) as error:
         load_mission(path, load_skills())
     assert {finding.path for finding in error.value.findings} == {str(tmp_path / "broken.yaml")}
-
-
-@pytest.mark.parametrize(
-    "check", list_conformance_checks(IsEqual, lambda scene: {"value": "a", "to": "a"}), ids=str
-)
-def test_is_equal_conforms(check: Callable[[], None]) -> None:
-    check()

@@ -29,15 +29,6 @@ def skill(loaded: LoadedMission, name: str) -> nodes.SkillNode:
     return next(node for node in walked if isinstance(node, nodes.SkillNode) and node.skill == name)
 
 
-def test_a_mission_knows_its_files(load: Load) -> None:
-    text = HEAD + "description: A test.\nroutes: {cube: red_bin}\ntree: Look\n"
-    loaded = load(text)
-    assert (loaded.mission.name, loaded.mission.description) == ("m", "A test.")
-    assert loaded.text == text
-    assert (loaded.path, loaded.cell_path) == (Path("m.yaml"), Path("cells/small.yaml"))
-    assert loaded.routes == {"cube": ("red_bin",)}
-
-
 def test_overrides_take_the_type_of_the_default(load: Load) -> None:
     given = {"tries": "5", "high": "1", "name": "007", "wide": "false", "kinds": "[cube, sphere]"}
     params = load(PARAMS, given).params
@@ -133,24 +124,6 @@ def test_names_are_replaced_by_what_they_stand_for(
 ) -> None:
     setting = skill(load(HEAD + text), found).settings[port].value
     assert (setting.name if isinstance(setting, Reference) else setting.value) == value
-
-
-BUSH = "".join(f"  t{i}: [{', '.join([f'{{use: t{i + 1}}}'] * 10)}]\n" for i in range(8))
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        (f"tree: {{use: t0}}\ntrees:\n{BUSH}  t8: Look\n", r"error\[too-large\].*the tree has more than 5000 nodes"),
-        ("tree: " + "{invert: " * 45 + "Look" + "}" * 45 + "\n", "the tree is more than 40 levels deep"),
-        (f"tree: {{repeat: {{times: {'9' * 40}, do: Look}}}}\n", r"repeat\.times must be a whole number"),
-        (f"params: {{a: {{default: 1, min: 0x{'f' * 298}}}}}\ntree: {{repeat: {{times: $a, do: Look}}}}\n", r'min of the param "a" must be a finite number'),
-    ],
-    ids=["a bush", "a deep tree", "40 digits", "298 digits"],
-)  # fmt: skip
-def test_what_is_too_large_is_refused_without_a_traceback(load: Load, text: str, sentence: str) -> None:
-    with pytest.raises(MissionError, match=sentence):
-        load(HEAD + text)
 
 
 def test_a_name_that_no_file_can_have_is_not_there_and_an_empty_one_is_a_finding(load: Load) -> None:

@@ -56,10 +56,7 @@ def test_a_mesh_is_found_beside_the_base_that_names_it() -> None:
         ("mesh: parts/washer.obj, ", "", "objects.washer needs either a urdf or a mesh\n"),
         ("mesh:", "urdf: cube_small.urdf, mesh:", "objects.washer needs either a urdf or a mesh, not both\n"),
         ("ring: 0.017", "ring: 0.03", "objects.washer has a ring of 0.03 m, which must be smaller than the radius, 0.025 m\n"),
-        ("ring: 0.017", "ring: -0.01", "objects.washer.ring must be at least 0, not -0.01\n"),
-        ("ring: 0.017", "mass: 0", "objects.washer.mass must be at least 0.0001, not 0\n"),
         ("parts/washer.obj", "../washer.obj", 'error[outside]: "../washer.obj" must be a relative path without ".."\n'),
-        ("parts/washer.obj", "/washer.obj", 'error[outside]: "/washer.obj" must be a relative path without ".."\n'),
     ],
 )  # fmt: skip
 def test_findings_say_what_an_object_needs(old: str, new: str, expected: str) -> None:

@@ -86,15 +86,6 @@ def test_variables_of_subtrees(case: str, load: Load, skills: dict[str, type[Ski
     assert wiring(load(HEAD + text), skills) == expected
 
 
-def test_what_a_subtree_does_not_return_cannot_be_read(load: Load) -> None:
-    with pytest.raises(MissionError) as caught:
-        load(
-            HEAD + "tree: [use: get, {Pick: {seen: $seen}}, {Drop: {bin: red_bin}}]\n"
-            "trees: {get: {returns: [held], do: [Look, Pick]}}\n"
-        )
-    assert "3:32: error[unwritten]: Pick.seen reads $seen, which no node writes" in str(caught.value)
-
-
 def test_a_loop_in_a_closed_subtree_has_a_variable_of_its_own(load: Load) -> None:
     loaded = load(
         HEAD + "tree: [use: get, {Drop: {bin: red_bin}}]\n"
@@ -119,13 +110,6 @@ def test_a_library_lends_its_subtrees(load: Load, skills: dict[str, type[Skill]]
     assert loaded.libraries == {"library/eyes.yaml": Path("library/eyes.yaml").read_text()}
 
 
-def test_subtrees_of_several_libraries_use_each_other(load: Load, skills: dict[str, type[Skill]]) -> None:
-    library("eyes", "library: eyes\ntrees: {look: Look}\n")
-    library("hands", "library: hands\ntrees: {get: [use: look, Pick]}\n")
-    loaded = load(HEAD + "library: [library/eyes.yaml, library/hands.yaml]\ntree: {use: get}\n")
-    assert [line.split()[0] for line in wiring(loaded, skills)] == ["Look", "Pick"]
-
-
 def test_a_library_does_not_see_the_params_of_the_mission(load: Load) -> None:
     library("hands", "library: hands\ntrees: {get: [Look, {Pick: {height: $high}}]}\n")
     with pytest.raises(MissionError) as caught:
@@ -133,17 +117,6 @@ def test_a_library_does_not_see_the_params_of_the_mission(load: Load) -> None:
     text = str(caught.value)
     assert "library/hands.yaml:2:37: error[unknown-param]: Pick.height must be a constant" in text
     assert "A library cannot use params: declare high below args of the subtree" in text
-
-
-def test_mistakes_in_a_library_are_found_in_its_own_file(load: Load) -> None:
-    library("hands", "library: hands\ntres: {}\ntrees: {get: [Look, Pik]}\n")
-    with pytest.raises(MissionError) as caught:
-        load(HEAD + "library: library/hands.yaml\ntree: {use: get}\n")
-    places = [(f.path, f.line, f.col, f.code) for f in caught.value.findings]
-    assert places == [
-        ("library/hands.yaml", 2, 1, "unknown-key"),
-        ("library/hands.yaml", 3, 21, "unknown-skill"),
-    ]
 
 
 def test_what_a_library_has_and_nobody_uses_is_no_mistake(load: Load) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import platform
 
-from executive.run.versions import find_version, list_requirements, list_versions
+from executive.run.versions import DISTRIBUTION, find_version, list_requirements, list_versions
 
 
 def test_names_this_project_python_and_every_package_asked_for_but_no_extras() -> None:
     found = list_versions()
-    assert found["executive"] == find_version("executive") != ""
+    assert found[DISTRIBUTION] == find_version(DISTRIBUTION) != ""
     assert found["python"] == platform.python_version()
     assert set(list_requirements()) <= set(found)
     assert {"py-trees", "pybullet", "ruckig"} <= set(list_requirements())

@@ -17,6 +17,7 @@ from executive.campaign.results.rows import RunRecord
 from executive.campaign.sweep_job import SweepJob, make_fault_record
 from executive.errors import InputError
 from executive.run.signals import HALT_SIGNALS, handle_signals
+from executive.run.versions import DISTRIBUTION
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -98,7 +99,7 @@ def _connect(address: str) -> Client:
     try:
         from distributed import Client
     except ImportError:
-        advice = 'install them with `uv sync --extra cluster` or `pip install "executive[cluster]"`'
+        advice = f'install them with `uv sync --extra cluster` or `pip install "{DISTRIBUTION}[cluster]"`'
         raise InputError(f'--cluster needs the packages of the extra "cluster"; {advice}') from None
     try:
         return Client(address, timeout=CONNECTION_TIMEOUT, set_as_default=False)

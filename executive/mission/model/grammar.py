@@ -66,7 +66,7 @@ KEYWORD_HINTS: Mapping[str, str] = {
     "with": 'Write "with" next to "use", with the same indentation.',
     "returns": 'Write "returns" next to "use", with the same indentation.',
 }
-"""Hints for words that authors write as keywords by mistake; control nodes declare more hints."""
+"""Hints for words that authors write as keywords by mistake."""
 
 MISSION_KEYS: GrammarKeys = {
     "mission": GrammarKey("name", "Name of the mission.", is_required=True),

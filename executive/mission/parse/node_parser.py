@@ -198,7 +198,6 @@ class NodeParser:
         for name, node_class in self._node_classes.items():
             keys = grammar.find_sibling_keys(node_class)
             hints |= {key: f"Write {key} at the level of {name}, not below {name}." for key in keys}
-            hints |= node_class.keyword_hints
         hint = hints.get(word) or (f'Did you mean the skill "{skill}"?' if skill else "")
         if not hint:
             keywords = suggest_choice(word, self._keywords, "Control nodes")

@@ -24,6 +24,7 @@ from executive.mission.outline import make_outline
 from executive.processes import build_command
 from executive.record.result import Result
 from executive.run.run import Run
+from executive.run.versions import DISTRIBUTION
 from executive.view.live import messages
 from executive.view.tree.svg import NodeResult, make_svg
 
@@ -58,7 +59,7 @@ class LivePage:
 
     def __init__(self) -> None:
         if missing := [name for name in REQUIRED_PACKAGES if find_spec(name) is None]:
-            advice = 'install the extra: uv sync --extra view, or pip install "executive[view]"'
+            advice = f'install the extra: uv sync --extra view, or pip install "{DISTRIBUTION}[view]"'
             raise InputError(f"--view needs {', '.join(missing)}; {advice}")
         token = secrets.token_urlsafe(24)
         self._error_file = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the page)

@@ -1,20 +1,19 @@
 """Generator of `skills/reference.md`: all that a skill may call, and the test kit, from docstrings.
 
-Write the file again with `.venv/bin/python -m tests.skill_reference`.
+Write the file again with `uv run python .ci/skill_reference.py`.
 """
 
 from __future__ import annotations
 
 import ast
 import inspect
-import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 PATH = ROOT / "skills" / "reference.md"
-COMMAND = ".venv/bin/python -m tests.skill_reference"
+COMMAND = "uv run python .ci/skill_reference.py"
 INTRODUCTION = f"""# Reference: everything that a skill may call, and the test kit
 
 Generated from the docstrings of the protocols by `{COMMAND}`. The guide is [README.md](README.md).
@@ -26,7 +25,6 @@ Generated from the docstrings of the protocols by `{COMMAND}`. The guide is [REA
 * `Box` contains the left, top, right and bottom side of a box in an image [pixel].
 * `Seconds`, `Metres` and `MetresPerSecond` are floats with a unit; so is `Annotated[float, "N"]`.
 * Exceptions are defined in `executive/errors.py`, `SkillFailed` in `executive/skill.py`.
-* The examples are taken from the shipped skills and from the functions that skills share.
 * All times and effects of faults are imported from `executive.testing.faults`.
 """
 
@@ -107,14 +105,8 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
 }
 """For each section and table the expression of the object, the file, and the class; "": the functions."""
 
-MAX_EXAMPLE = 90
-"""Maximum number of characters of an example."""
-
-EXAMPLE_FOLDERS = ("cell/", "manipulation/", "perception/", "geometry.py", "skill.py")
-"""Folders and files of `executive/` whose members get examples."""
-
-Row = tuple[str, str, str]
-"""Code of a member, its meaning, and an example or ""."""
+Row = tuple[str, str]
+"""Code of a member, and its meaning."""
 
 
 def generate() -> str:
@@ -133,36 +125,29 @@ def _format_table(expression: str, file: str, name: str) -> str:
         owner = next(one for one in ast.walk(owner) if isinstance(one, ast.ClassDef) and one.name == name)
         title = f"### {name}: `{expression}`"
     text, entries = _parse_docstring(owner)
-    variable = expression.partition(" = ")[0].rpartition(".")[2] if name else ""
     attributes = dict(entries.get("Attributes", ()))
     if file.startswith("cells/") and name != "FakeWorld":
         # The methods are those of the protocols.
-        rows = [(_format_code(attribute), _escape(meaning), "") for attribute, meaning in attributes.items()]
+        rows = [(_format_code(attribute), _escape(meaning)) for attribute, meaning in attributes.items()]
     else:
-        rows = list(_list_rows(owner, variable, attributes, has_examples=file.startswith(EXAMPLE_FOLDERS)))
-    columns = ("member", "meaning", "example")[: 3 if any(example for *_, example in rows) else 2]
-    lines = [columns, ("---",) * len(columns), *(row[: len(columns)] for row in rows)]
+        rows = list(_list_rows(owner, attributes))
+    lines = [("member", "meaning"), ("---", "---"), *rows]
     return f"{title}\n\n{text}\n\n" + "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def _list_rows(
-    owner: ast.AST, variable: str, attributes: dict[str, str], has_examples: bool
-) -> Iterator[Row]:
+def _list_rows(owner: ast.AST, attributes: dict[str, str]) -> Iterator[Row]:
     """Yield a row for each public attribute, property, method or function of a class or module."""
     for member in getattr(owner, "body", ()):
-        example = ""
         if isinstance(member, ast.AnnAssign) and isinstance(owner, ast.ClassDef):
             name = ast.unparse(member.target)
             code = re.sub(r": ClassVar\[(.*)\] =", r": \1 =", ast.unparse(member))
             meaning = attributes[name]
-            example = _find_example(name, variable) if variable == "cell" else ""
         elif isinstance(member, ast.FunctionDef) and not member.name.startswith("_"):
             code, meaning = _format_signature(member), _describe(member)
-            example = _find_example(member.name, variable) if has_examples else ""
         else:
             continue
         code = re.sub("'([^'\"]*)'", r'"\1"', code).replace("field(default_factory=dict)", "{}")
-        yield _format_code(code.replace("field(default_factory=list)", "[]")), _escape(meaning), example
+        yield _format_code(code.replace("field(default_factory=list)", "[]")), _escape(meaning)
 
 
 def _format_signature(function: ast.FunctionDef) -> str:
@@ -195,45 +180,6 @@ def _parse_docstring(owner: ast.AST) -> tuple[str, dict[str, list[tuple[str, str
             (name, " ".join(meaning.split())) for names, meaning in found for name in names.split(", ")
         ]
     return " ".join(text.split()), entries
-
-
-def _find_example(name: str, variable: str) -> str:
-    """Return the first use of a member by a skill, with a link to the file, or ""."""
-    files = [*sorted(PATH.parent.glob("*.py")), *sorted((ROOT / "executive/manipulation").glob("*.py"))]
-    for file in files:
-        text = file.read_text(encoding="utf-8")
-        found = _find_use(ast.parse(text), text, name, variable)
-        if found:
-            return f"{_format_code(found)} ([{file.stem}]({os.path.relpath(file, PATH.parent)}))"
-    return ""
-
-
-def _find_use(node: ast.AST, text: str, name: str, variable: str) -> str:
-    """Return the largest short piece of `text` around the first use of a member below `node`, or ""."""
-    for child in ast.iter_child_nodes(node):
-        if found := _find_use(child, text, name, variable):
-            piece = _join_source(node, text)
-            is_call = (
-                isinstance(node, ast.Call) and node.func is child
-            )  # The arguments belong to the example.
-            return piece if found in piece and (is_call or len(piece) <= MAX_EXAMPLE) else found
-    match node:
-        case ast.Call(func=ast.Name(id=called)) if not variable and called == name:
-            return _join_source(node, text)
-        case ast.Attribute(attr=attribute, value=ast.Name(id=owner) | ast.Attribute(attr=owner)):
-            return _join_source(node, text) if (owner, attribute) == (variable, name) else ""
-    return ""
-
-
-def _join_source(node: ast.AST, text: str) -> str:
-    """Return the code of a node in one line; of an `if` or `while` the condition, of other blocks ""."""
-    if isinstance(node, ast.If | ast.While):
-        return f"{type(node).__name__.lower()} {_join_source(node.test, text)}:"
-    is_block = hasattr(node, "body") and not isinstance(node, ast.IfExp | ast.Lambda)
-    if is_block or isinstance(node, ast.Tuple):
-        return ""
-    line = " ".join((ast.get_source_segment(text, node) or "").split())
-    return re.sub(r"\( | (?=\))|,(?= \))", lambda match: match[0].strip(" ,"), line)
 
 
 def _format_code(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Generator of `missions/reference.md`; `.venv/bin/python -m tests.mission_reference` writes it again."""
+"""Generator of `missions/reference.md`; `uv run python .ci/mission_reference.py` writes it again."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from executive.tree.node_registry import load_control_nodes
 
 MISSIONS = Path(__file__).parent.parent / "missions"
 PATH = MISSIONS / "reference.md"
-COMMAND = ".venv/bin/python -m tests.mission_reference"
+COMMAND = "uv run python .ci/mission_reference.py"
 INTRODUCTION = f"""# Reference: missions, skills, cells and findings
 
 This file is generated from the code: `{COMMAND}`. The tutorial is [README.md](README.md).
