@@ -153,7 +153,7 @@ def test_the_elements_of_loops_give_names_to_params(execute: Execute) -> None:
     )
     assert (result.status, result.message) == ("SUCCESS", "")
     assert len(list_ends(result, "Detect")) == 4
-    assert result.cell.arm.tool_pose.position == pytest.approx(result.cell.arm.poses["aside"].position)
+    assert result.cell.arm.q == pytest.approx(result.cell.arm.poses["aside"])
 
 
 def test_a_param_reads_no_variable_of_its_own_name(write: Callable[[str], Path]) -> None:

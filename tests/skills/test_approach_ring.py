@@ -30,7 +30,8 @@ def fake(missions: Path) -> FakeCell:
 
 def test_a_part_with_a_hole_is_touched_beside_it(fake: FakeCell, target: Target) -> None:
     assert run_skill(Approach(target=target), fake).status == "SUCCESS"
-    assert np.linalg.norm(fake.arm.tool_pose.position[:2] - target.position[:2]) == pytest.approx(RING)
+    distance = np.linalg.norm(fake.arm.tool_pose.position[:2] - target.position[:2])
+    assert distance == pytest.approx(RING, abs=2e-4)
 
 
 def test_further_attempts_go_round_the_ring(
@@ -42,7 +43,7 @@ def test_further_attempts_go_round_the_ring(
         run_skill(Approach(target=target), fake)
         steps.append(fake.arm.tool_pose.position[:2] - target.position[:2])
         fake.ledger.record_failed_pick(target.item)
-    assert np.linalg.norm(steps, axis=1) == pytest.approx([RING] * 5)
+    assert np.linalg.norm(steps, axis=1) == pytest.approx([RING] * 5, abs=2e-4)
     angles = sorted(math.atan2(y, x) for x, y in steps)
     gaps = np.diff([*angles, angles[0] + math.tau])
     assert math.radians(30) < gaps.min() <= gaps.max() < math.radians(150)

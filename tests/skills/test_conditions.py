@@ -50,7 +50,7 @@ def test_a_target_beyond_the_arm_is_unreachable(fake: FakeCell, target: Target) 
     assert run_skill(IsReachable(target=target), fake).status == "SUCCESS"
     far = replace(target, position=np.array([2.0, 0.0, 0.025]))
     result = run_skill(IsReachable(target=far), fake)
-    assert (result.reason, result.message[:16]) == ("unreachable", "cube-1: the goal")
+    assert (result.reason, result.message[:16]) == ("unreachable", "cube-1: the tool")
 
 
 def test_an_item_is_placed_when_it_is_in_a_bin(fake: FakeCell, held: str) -> None:

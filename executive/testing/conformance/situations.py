@@ -13,7 +13,6 @@ from executive.cell.detection import Detections
 from executive.cell.objects import Item, Target
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import SHIPPED_ROUTES, FakeCell, SilentOperator, load_empty_cell
-from executive.geometry import make_tool_down_pose
 from executive.mission.model.port_types import describe_type, is_union
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
 
@@ -190,7 +189,7 @@ def build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
     if is_holding or starts_at_target:
         object_class = fake.cell.classes[targets[0].label]
         top = targets[0].position + np.array([object_class.contact_radius, 0.0, object_class.height / 2])
-        fake.arm.set_tool_pose(make_tool_down_pose(top, 0.0))
+        fake.arm.set_tool_position(top)
     if is_holding:
         fake.tool.close()
         fake.ledger.record_touch(item)

@@ -120,7 +120,7 @@ def _list_faults(skill: type[Skill], run: SkillTestRun) -> Iterator[NamedFault]:
 def _move_arm(occurrence: Occurrence) -> bool:
     """Start a motion of the arm, as a preceding skill could have done."""
     arm = occurrence.context.cell.arm
-    arm.start(FakeMotion([arm.tool_pose] * PRECEDING_MOTION_STEPS))
+    arm.start(FakeMotion(np.tile(arm.q, (PRECEDING_MOTION_STEPS, 1))))
     return True
 
 

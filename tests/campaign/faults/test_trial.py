@@ -123,7 +123,7 @@ class Restless(FakeCell):
     """A cell whose arm never says that it rests, once the run is over."""
 
     def audit(self) -> dict[str, int]:
-        self.arm._path = [self.arm.tool_pose] * 9
+        self.arm._path = [self.arm.q] * 9
         return super().audit()
 
 

@@ -72,8 +72,8 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ]),
     ("can_succeed", faulty.Shake, [
         'Shake never succeeded; with an item in the tool it failed with "blocked" (the motion would bring '
-        "the held cube 0.030 m into the table, with the tool at (0.530, -0.110, 0.020) m). Set up a scene "
-        f"in which it succeeds: list_conformance_checks(Shake, lambda scene: ...); {ARRANGE}",
+        "tool or load 30 mm too near to the table, with the tool at (0.530, -0.110, 0.020) m). Set up a "
+        f"scene in which it succeeds: list_conformance_checks(Shake, lambda scene: ...); {ARRANGE}",
     ]),
     ("can_succeed", faulty.NeedsUnknown, [
         'NeedsUnknown cannot be tested: no value can be generated for "plan" (dict) and "words" (a text). '

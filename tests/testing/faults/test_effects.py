@@ -279,7 +279,7 @@ def test_a_tool_that_sticks_lets_go_when_it_is_opened_once_more() -> None:
 )
 def test_nothing_seals_or_one_object_does_not(effect: Effect, sealed: bool) -> None:
     cell: Any = cell_with(effect)
-    cell.fake.arm.tool_pose.position[:] = [*PLACES["cube"], 0.05]
+    cell.fake.arm.set_tool_position(np.array([*PLACES["cube"], 0.05]))
     cell.cell.tool.close()
     assert (cell.fake.tool.holding, bool(cell.events)) == (sealed, not sealed)
 

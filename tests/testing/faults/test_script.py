@@ -138,7 +138,7 @@ def test_everything_else_is_the_cell_that_it_wraps() -> None:
     assert cell.accounts is cell.cell.ledger is fake.ledger
     assert cell.cell.bins is fake.cell.bins
     assert (cell.audit(), cell.inner) == (fake.audit(), fake)
-    assert cell.cell.arm.tool_pose is fake.arm.tool_pose
+    assert cell.cell.arm.q is fake.arm.q
 
 
 def test_a_kind_of_cell_has_faults_in_one_run_after_the_other() -> None:

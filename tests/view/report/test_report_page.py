@@ -75,7 +75,7 @@ def test_every_object_has_its_outcome_time_picture_and_problems(failed):
     assert all(f"{row.item} rejected" in text for row in facts.last_item_changes)
     assert [row.item for row in facts.last_item_changes] == ["sphere-1", "sphere-2"]
     assert "2 seen, 0 placed, 2 rejected" in text
-    assert "0.83 s Grasp.missed no seal on sphere-1" in text
+    assert "0.81 s Grasp.missed no seal on sphere-1" in text
     alts = [attributes["alt"] for tag, attributes in found.elements if tag == "img"]
     assert alts.count("Image for the decision about sphere-1") == 1
     assert alts.count("sphere-1: missed") == 2
@@ -141,7 +141,7 @@ def test_the_time_and_the_pictures_of_what_was_no_object_are_shown_all_the_same(
         ),
     )
     found = page(run)
-    assert "sphere-1 missed at step 332" in found.texts["objects"]
+    assert "sphere-1 missed at step 330" in found.texts["objects"]
     assert "Image for the decision about sphere-1" not in found.texts["objects"]
     table, _ = found.texts["objects"].split(" look: ")
     assert "sphere-1" in table

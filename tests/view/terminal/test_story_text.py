@@ -52,13 +52,13 @@ def test_an_object_that_slips_out_of_the_cup_every_time(abroad) -> None:
     assert (
         text(run)
         == """\
-FAILURE after 1.97 s: Transit of cube-1 failed (dropped) on the last of 3 attempts: the seal on cube-1 broke
+FAILURE after 2.14 s: Transit of cube-1 failed (dropped) on the last of 3 attempts: the seal on cube-1 broke
   on the way to red_bin, near (0.50, 0.10, 0.12) m
 why no node in trial.yaml handled the failure, from the root down:
   retry              all 3 attempts failed: 1 x Grasp.missed, 2 x Transit.dropped (line 11)
   Transit of cube-1  tree/5:retry/do/Transit (line 15)
-readings    tool.holding = False (1.97 s), tool.touching = True (1.79 s), tool.bears = 7.9 (1.32 s)
-last look   cube-1 as cube 0.90 at (0.498, 0.102, 0.025) m: frame 3, camera overhead, by embedded, at 1.45 s;
+readings    tool.holding = False (2.14 s), tool.touching = True (1.94 s), tool.bears = 7.9 (1.38 s)
+last look   cube-1 as cube 0.90 at (0.498, 0.102, 0.025) m: frame 3, camera overhead, by embedded, at 1.53 s;
             3 looks, 3 failed attempts in all
 now         the arm is at rest, the tool is empty
 left to do  1: cube-1
@@ -91,11 +91,11 @@ def test_an_exception_in_a_part(abroad) -> None:
     assert (
         text(run, tail=TAIL + GO_ON)
         == """\
-FAULT after 0.64 s: Grasp: ZeroDivisionError: vacuum gauge
+FAULT after 0.63 s: Grasp: ZeroDivisionError: vacuum gauge
 where       tree/5:retry/do/Grasp (trial.yaml:15)
 raised at   terminal/test_story_text.py:N, in broken; the whole traceback is in the journal, event
             "FaultRaised"
-readings    command raised ZeroDivisionError (0.64 s)
+readings    command raised ZeroDivisionError (0.63 s)
 last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
             1 look, 0 failed attempts in all
 now         the arm is at rest, the tool is empty
@@ -145,7 +145,7 @@ def test_an_object_that_is_lost(at_home) -> None:
     assert (
         text(run, numbered=False)
         == """\
-FAILURE after 0.93 s: 1 object was lost: cube-1
+FAILURE after 0.94 s: 1 object was lost: cube-1
 lost        cube-1 last detected at (0.500, 0.100, 0.025) m at 0.05 s, not detected in the 2 later looks;
             Transit.dropped at 0.82 s: the seal on cube-1 broke on the way to red_bin, near (0.50, 0.10,
             0.12) m
@@ -165,7 +165,7 @@ def test_an_arm_whose_way_is_barred_whenever_it_carries(at_home) -> None:
     assert (
         text(run, numbered=False)
         == """\
-FAILURE after 2.14 s: PutDown of cube-1 failed (blocked): link 5 met a wrench
+FAILURE after 2.35 s: PutDown of cube-1 failed (blocked): link 5 met a wrench
 why no node in missions/sort_overhead.yaml handled the failure, from the root down:
   repeat                this failure is not in until (choice.no_candidate) (line N)
   carry_and_watch: try  caught Transit.blocked (link 5 met a wrench), but the handler failed
@@ -173,7 +173,7 @@ why no node in missions/sort_overhead.yaml handled the failure, from the root do
   put_off: try          catches only PutDown.dropped (missions/library/sorting.yaml:N)
   PutDown of cube-1     tree/2:repeat/do/carry_and_watch/try/catch/3/put_off/try/do/PutDown
                         (missions/library/sorting.yaml:N)
-readings    arm.met = link 5 met a wrench (1.23 s), tool.bears = 7.9 (0.75 s), tool.holding = True (0.74 s)
+readings    arm.met = link 5 met a wrench (1.29 s), tool.bears = 7.9 (0.73 s), tool.holding = True (0.73 s)
 last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
             1 look, 0 failed attempts in all
 now         the arm is at rest, the tool holds cube-1
