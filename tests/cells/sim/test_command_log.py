@@ -59,20 +59,6 @@ def test_a_command_that_was_torn_is_left_out_wherever_it_was(path: Path, overhea
         assert kinds == [log.RUN_STEP] + [log.JOINT_TARGETS] * (length >= whole + 65), length
 
 
-def test_what_goes_on_begins_after_the_last_whole_command(path: Path) -> None:
-    written = CommandLog(path, 7)
-    written.append(log.RUN_STEP)
-    written.append(log.JOINT_TARGETS, *range(8))
-    written.close()
-    written.close()
-    path.write_bytes(path.read_bytes()[:-5])
-    again = CommandLog(path, 7, resume=True)
-    again.append(log.VACUUM_OFF)
-    again.close()
-    CommandLog().append(log.RUN_STEP)  # nothing is kept without a path
-    assert [one.kind for one in read_commands(path)] == [log.RUN_STEP, log.VACUUM_OFF]
-
-
 def test_a_damaged_log_says_so(path: Path) -> None:
     written = CommandLog(path, 7)
     written.append(log.RUN_STEP)
@@ -102,14 +88,6 @@ def test_a_file_that_is_no_log_says_so(path: Path) -> None:
     assert not log.is_command_log(path)
     CommandLog(path, 7).close()
     assert log.is_command_log(path)
-
-
-def test_the_header_states_the_number_of_joints(path: Path) -> None:
-    written = CommandLog(path, 6)
-    written.append(log.JOINT_TARGETS, *range(7))
-    written.close()
-    assert path.read_bytes().startswith(b"executive world 2 joints 6\n")
-    assert [one.numbers for one in read_commands(path)] == [tuple(range(7))]
 
 
 @pytest.mark.parametrize("header", [b"executive world 1\n", b"executive world 3 arms 2\n"])
