@@ -83,8 +83,8 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("fake.world", "cells/fake/world.py", "FakeWorld"),
         ("fake.arm", "cells/fake/arm.py", "FakeArm"),
         ("fake.tool", "cells/fake/arm.py", "FakeTool"),
-        ("fake.camera", "cells/fake/camera.py", "FakeCamera"),
-        ("fake.detector", "cells/fake/camera.py", "FakeDetector"),
+        ("fake.camera", "cells/fake/cell.py", "FakeCamera"),
+        ("fake.detector", "cells/fake/cell.py", "FakeDetector"),
     ],
     "Test kit: run a skill or a mission": [
         ("executive.testing.run_skill", "testing/run_skill.py", ""),

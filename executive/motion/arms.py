@@ -1,11 +1,14 @@
-"""Supported arms: the kinematics for each arm model that a cell file can name."""
+"""Supported arms: kinematics for each arm model that a cell file can name, and the check of its reach."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
+from executive.cell.arm import Goal
 from executive.cell.config import CellConfig
+from executive.cell.layout import find_unreachable_places
 from executive.cell.workcell import KeyPath
+from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
 from executive.motion.clearance_model import SAMPLING_MARGIN
 from executive.motion.iiwa14_kinematics import IIWA14_JOINT_COUNT, Iiwa14
@@ -48,3 +51,25 @@ def build_planner(config: CellConfig, check_collision: CollisionCheck | None = N
     """Return the planner for the arm of a cell file, optionally with an additional collision check."""
     kinematics = build_kinematics(config, config.motion.margin + SAMPLING_MARGIN)
     return Planner(config, kinematics, check_collision)
+
+
+def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for each place or named pose of the cell file that the arm cannot reach.
+
+    The tool must reach each slot of each bin and the safe place, from travel height down to the release
+    height in one inverse kinematics branch. Each named pose must be within the joint limits.
+    """
+    planner = build_planner(config)
+
+    def require_reachable(position: Array, floor_height: float) -> None:
+        height = floor_height + config.max_object_height
+        planner.require_reachable(Goal((float(position[0]), float(position[1]), height)))
+
+    ranges = config.arm.limits.position_ranges_deg
+    for name, pose in config.arm.poses_deg.items():
+        for joint, (angle, (lower, upper)) in enumerate(zip(pose, ranges, strict=True), start=1):
+            if not lower <= angle <= upper:
+                limit = f"{upper:g}" if lower == -upper else f"{lower:g} to {upper:g}"
+                message = f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}'
+                yield ("arm", "poses_deg", name), message
+    yield from find_unreachable_places(config, require_reachable)

@@ -137,14 +137,15 @@ class ClearanceModel:
         self._end_positions, self._discs = end_positions, discs
         self._end_margins = np.full(len(self._prisms.names), self._margin)
 
-    def relax_end_margins(self, tcps: Array, axes: Array) -> None:
+    def relax_end_margins(self, tcps: Array, axes: Array, min_margin: float = -math.inf) -> None:
         """For each prism, limit the required distance near the ends to the smallest distance at the ends.
 
-        `tcps` `(E, 3)` [m] and `axes` `(E, 3)` are the tool centre points and tool axes at the ends.
+        `tcps` `(E, 3)` [m] and `axes` `(E, 3)` are the tool centre points and tool axes at the ends. The
+        required distance stays at least `min_margin` [m].
         """
         all_prisms = np.arange(len(self._prisms.names))
         end_distances = self._compute_all_distances(tcps, axes, all_prisms).min(axis=(1, 2))
-        self._end_margins = np.minimum(end_distances, self._margin)
+        self._end_margins = np.clip(end_distances, min_margin, self._margin)
 
     def find_nearest_pairs(self, tcps: Array, axes: Array, max_slack: float = math.inf) -> NearestPairs:
         """Return the pair of disc and prism with the smallest slack in each state.

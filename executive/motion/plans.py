@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -66,8 +66,7 @@ class PlanFactory(Generic[M]):
     """Makes plans in a worker, stores at most one plan for a later request, and emits events.
 
     Args:
-        plan: Function that plans a motion from joint positions at rest; called by the worker.
-        worker: Executor of the planning, with one thread; the caller closes it.
+        submit: Function that begins to plan a motion from joint positions at rest, for instance in a worker.
         clock: Clock of the run.
         planning_time: Time from the request of a plan until the plan is ready [s].
         emit: Function that receives an event for each requested plan when the plan is ready.
@@ -76,16 +75,18 @@ class PlanFactory(Generic[M]):
 
     def __init__(
         self,
-        plan: Callable[[Array, Goal | str, Task], M],
-        worker: Executor,
+        submit: Callable[[Array, Goal | str, Task], Future[M]],
         clock: Clock,
         planning_time: float,
         emit: Emit,
         *,
         is_realtime: bool = False,
     ) -> None:
-        self._plan_motion, self._worker, self._planning_time = plan, worker, planning_time
-        self._clock, self._emit, self._is_realtime = clock, emit, is_realtime
+        self._submit = submit
+        self._clock = clock
+        self._planning_time = planning_time
+        self._emit = emit
+        self._is_realtime = is_realtime
         self._stored_query: tuple[bytes, Goal | str, Task] | None = None
         self._stored_plan: Plan[M] | None = None
 
@@ -97,7 +98,7 @@ class PlanFactory(Generic[M]):
                 # A plan that the worker has already started cannot be cancelled, but nobody reads its result.
                 self._stored_plan.future.cancel()
             ready_time = self._clock.now + self._planning_time
-            future = self._worker.submit(self._plan_motion, start.copy(), goal, task)
+            future = self._submit(start.copy(), goal, task)
             self._stored_query = query
             self._stored_plan = Plan(self._clock, ready_time, future, self._is_realtime)
         return self._stored_plan

@@ -23,7 +23,6 @@ from executive.cell.objects import Item, Target
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import SHIPPED_ROUTES, FakeCell, SilentOperator
-from executive.geometry import make_tool_down_pose
 from executive.mission.model.port_types import describe_type, find_element_type, is_assignable, is_union
 from executive.skill import ANY, EMPTY, HALT, HOLDING, Direction, Param, Port, Skill
 from executive.testing import faults
@@ -172,7 +171,7 @@ def _build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
     touches_target = Target in [port.type for port in list_input_ports(skill)] and "arm" not in skill.uses
     if is_holding or (touches_target and "tool" in skill.uses):
         offset = (classes[first.label].contact_radius, 0.0, classes[first.label].height / 2)
-        fake.arm.set_tool_pose(make_tool_down_pose(first.position + offset, 0.0))
+        fake.arm.set_tool_position(first.position + offset)
     if is_holding:
         fake.tool.close()
         fake.ledger.record_touch(first.item)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -29,18 +28,10 @@ def changed(cell: str, **values: Any) -> CellConfig:
     return config
 
 
-@pytest.mark.parametrize("path", sorted(CELLS.glob("*.yaml")), ids=lambda path: path.stem)
-def test_the_views_of_shipped_cells_show_the_workspace(path: Path) -> None:
-    assert list(find_view_errors(load_cell(path))) == []
-
-
 @pytest.mark.parametrize(
     ("cell", "values", "keys", "fragment"),
     [
-        ("overhead", {"table_view": [0, 0, 64, 64]}, ["table_view"], "100% of the workspace"),
         ("overhead", {"table_view": [250, 150, 390, 290]}, ["table_view"], "view is [231, 139, 409, 317]"),
-        ("overhead", {"width": 1280, "height": 960}, ["table_view"], "view is [462, 277, 818, 633]"),
-        ("overhead", {"look_at": [0.5, 0, 2]}, ["position"], "100% of the workspace"),
         ("overhead", {"position": [0.5, 0, -1.2]}, ["position"], "100% of the workspace"),
         ("overhead", {"fov_deg": 5.5}, ["position"], "86% of the workspace"),
         ("overhead", {"fov_deg": 170}, ["fov_deg"], "1.0 pixels"),
@@ -48,9 +39,7 @@ def test_the_views_of_shipped_cells_show_the_workspace(path: Path) -> None:
         ("depth", {"calibration": INVERSE.replace("-2.2214, 0]", "-2, 0.3]")}, ["table_view"], "exchange"),
         ("depth", {"calibration": INVERSE.replace("461", "46")}, ["calibration"], "2.3 pixels"),
         ("wrist", {"scan_poses": "[scan, home]"}, ["scan_poses", 1], 'from the pose "home"'),
-        ("wrist", {"scan_poses": "[none, scan, home]"}, ["scan_poses", 2], 'from the pose "home"'),
         ("wrist", {"table_view": [200, 120, 440, 360]}, ["table_view"], "view is [103, 27, 534, 458]"),
-        ("wrist", {"mount": "fixed"}, ["position"], "100% of the workspace"),
         ("wrist_halves", {"scan_poses": "[left_half]"}, ["scan_poses"], "y -0.22 to -0.02 m"),
         ("wrist_halves", {"partial_views": "false"}, ["scan_poses", 0], 'from the pose "left_half"'),
         ("wrist_halves", {"table_view": [0, 0, 64, 64]}, ["table_view"], "correct"),
@@ -62,11 +51,6 @@ def test_a_view_without_the_workspace_is_named_with_what_it_lacks(
     key_path, message = next(find_view_errors(changed(cell, **values)))
     assert list(key_path[2:]) == keys
     assert fragment in message
-
-
-@pytest.mark.parametrize("cell", ["wrist", "wrist_halves"])
-def test_unknown_scan_poses_are_left_to_another_check(cell: str) -> None:
-    assert list(find_view_errors(changed(cell, scan_poses="[none]"))) == []
 
 
 @pytest.mark.parametrize("kind", [SimCell, FakeCell])

@@ -89,6 +89,7 @@ def test_findings_of_the_robot_stand_in_the_cell_file(load: Load) -> None:
 
 
 def test_an_error_of_compute_mass_is_a_finding(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FakeCell, "check", lambda config, cell_folder: ())
     monkeypatch.setattr(FakeCell, "compute_mass", Mock(side_effect=InputError("no scale")), raising=False)
     with pytest.raises(MissionError, match=r"cells/small.yaml.*robot.*cube.*no scale"):
         load(HEAD + "routes: {cube: red_bin}\ntree: Look\n", find_cell_kind=lambda name: FakeCell)

@@ -1,12 +1,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import positions
 
-from executive.cell.arm import Goal
 from executive.geometry import Array
 from executive.motion.braking import plan_braking
 from executive.motion.joints import JointState
@@ -41,15 +39,3 @@ def test_a_halt_at_any_tick_is_short_and_inside_the_stop_limits(
     end = start + (end - start) * 10**power
     trajectory = Trajectory([connector.connect(JointState.at_rest(start), JointState.at_rest(end))])
     assert_short_and_inside(trajectory, STEP * int(share * trajectory.duration / STEP), limits)
-
-
-def test_a_halt_on_a_way_around_something_is_inside_the_stop_limits_too(planner, limits, home) -> None:
-    picked = planner.plan(home, Goal((0.55, 0.15, 0.055), guarded_length=0.02, guarded_speed=0.04)).end
-    trajectory = planner.plan(picked, Goal((0.24, -0.44, 0.08)))
-    for s in np.arange(0.0, trajectory.duration, 10 * STEP):
-        assert_short_and_inside(trajectory, float(s), limits)
-    shares = (0.0, 0.2, 0.5, 0.8, 0.99)
-    stops = [plan_braking(trajectory, share * trajectory.duration, limits) for share in shares]
-    assert [len(times) for times in stops] == [5, 83, 83, 39, 2]
-    ends = [0.01, 0.331967, 0.573134, 0.803889, 0.803889]
-    assert [times[-1] for times in stops] == pytest.approx(ends, abs=1e-5)

@@ -62,19 +62,6 @@ def test_the_tool_goes_straight_down_inside_all_limits(descent: Descent, enters:
 
 @given(descents())
 @settings(max_examples=20)
-def test_velocity_and_acceleration_are_the_derivatives_of_the_way(descent: Descent) -> None:
-    states = passed(
-        CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, starts_in_motion=True)
-    )
-    middle = slice(1, -2)  # the last sample is not a whole step after the one before
-    measured = (states.q[2:-1] - states.q[:-3]) / (2 * SOONER)
-    assert np.allclose(measured, states.qd[middle], atol=1e-4)
-    measured = (states.qd[2:-1] - states.qd[:-3]) / (2 * SOONER)
-    assert np.allclose(measured, states.qdd[middle], atol=2 * SOONER * LIMITS.jerk.max())
-
-
-@given(descents())
-@settings(max_examples=20)
 def test_leaving_it_is_the_same_way_mirrored_in_time(descent: Descent) -> None:
     down = CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, starts_in_motion=True)
     up = CartesianLine(descent.chain[::-1], descent.length, LIMITS, descent.speed, ends_in_motion=True)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
-from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, compute_max_pile_height
+from executive.cell.layout import TOOL_RADIUS
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
@@ -112,36 +112,6 @@ def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) ->
         assert found <= -(config.motion.margin + SAMPLING_MARGIN) + 1e-9
 
 
-def test_a_load_hangs_below_the_tool_and_is_as_wide_as_its_ring_puts_it(config: CellConfig) -> None:
-    empty, washer = (
-        make_tool_discs(config, None),
-        make_tool_discs(config, Load(ObjectClass("washer", 0.006, 0.02, 0.015))),
-    )
-    assert np.allclose(empty.offsets, [0.0, -NECK_LENGTH])
-    assert np.allclose(empty.radii, [config.tool.cup_radius, TOOL_RADIUS])
-    wide = 0.02 + 0.015 + POSITION_TOLERANCE
-    assert np.allclose(washer.offsets, [0.006, 0.0, -NECK_LENGTH]), (
-        "its underside, its top, the tool above it"
-    )
-    assert np.allclose(washer.radii, [wide, wide, TOOL_RADIUS])
-    assert washer.min_cosine > empty.min_cosine
-
-
-@given(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.01, 0.06))
-@settings(max_examples=60)
-def test_the_workspace_is_not_entered_low_but_where_it_was_looked_at(config, x, y, z) -> None:
-    end = np.array([[0.53, 0.0]])
-    tip, discs = (x, y, min(z, compute_max_pile_height(config))), make_tool_discs(config, None)
-    away = math.hypot(x - end[0, 0], y - end[0, 1])
-    if away > OBSERVED_RADIUS + compute_max_pile_height(config):
-        assert slack(ClearanceModel(config, (), end, discs), tip) < 0
-    elif away < OBSERVED_RADIUS - 1e-9:
-        wanted = min(
-            tip[2] - (config.motion.margin + SAMPLING_MARGIN), DISTANCE_PER_COSINE * (1 - discs.min_cosine)
-        )
-        assert slack(ClearanceModel(config, (), end, discs), tip) == pytest.approx(wanted, abs=1e-9)
-
-
 def test_near_an_end_what_is_unavoidable_there_is_allowed_and_elsewhere_it_is_not(config) -> None:
     discs = make_tool_discs(config, None)
     beside = np.array([POST.x + POST.radius + POSITION_TOLERANCE + TOOL_RADIUS + 0.002, POST.y, 0.1])
@@ -186,31 +156,3 @@ def test_an_error_names_the_thing_the_lack_and_the_place(config: CellConfig) -> 
         require((0.24, 0.48, 0.0))
     with pytest.raises(Blocked, match=re.escape("would tilt the tool too far, with the tool at (-0.600")):
         require((-0.6, 0.0, 0.4), (0.9, 0.0, -math.sqrt(1 - 0.81)))
-
-
-@given(near_the_post, st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.booleans())
-@settings(max_examples=80)
-def test_slopes_are_the_differences_of_slack(config, tip, tilt, turn, loaded: bool) -> None:
-    axis = np.array([math.sin(tilt), math.cos(tilt) * math.sin(turn), -math.cos(tilt) * math.cos(turn)])
-    clearance = ClearanceModel(config, (POST,), AWAY, make_tool_discs(config, CUBE if loaded else None))
-    h = 1e-5
-    tips, axes = tip + h * np.eye(3), np.broadcast_to(axis, (3, 3))
-    pairs = clearance.find_nearest_pairs(tip[None], axis[None])
-    found = clearance.compute_slack_changes(pairs, tips[None], axes[None])[0] / h
-    here = slack(clearance, tip, axis)
-    forward = (clearance.find_nearest_pairs(tips, axes).slack - here) / h
-    backward = (here - clearance.find_nearest_pairs(2 * tip - tips, axes).slack) / h
-    smooth = np.abs(forward - backward) < 1e-2  # no kink between
-    assert np.allclose(found[smooth], forward[smooth], atol=1e-6)
-
-
-@given(st.lists(near_the_post, min_size=2, max_size=5), st.booleans())
-@settings(max_examples=40)
-def test_far_obstacles_are_left_out_only_where_the_slack_is_large(config, tips, loaded: bool) -> None:
-    discs = make_tool_discs(config, CUBE if loaded else None)
-    clearance = ClearanceModel(config, (POST,), AWAY, discs)
-    axes = np.broadcast_to(DOWN, (len(tips), 3))
-    exact = clearance.find_nearest_pairs(np.array(tips), axes).slack
-    quick = clearance.find_nearest_pairs(np.array(tips), axes, 0.03).slack
-    assert np.array_equal(quick[exact < 0.03], exact[exact < 0.03])
-    assert np.all(quick >= exact)

@@ -81,16 +81,3 @@ def test_what_cannot_be_reached_says_at_which_height_and_why(place, length: floa
     point, reason = text.split(" m: ")
     with pytest.raises(Unreachable, match=f"{re.escape(point)} m: {reason}"):
         find_configuration_pairs(narrow, Goal(place), length, np.zeros(7))
-
-
-def test_heights_that_only_different_postures_reach_are_unreachable_together() -> None:
-    narrow = arm_within(np.radians([15, 120, 18, 120, 170, 120, 175]))
-    x, y, low, high = 0.42, 0.18, 0.05, 0.25
-    for height in (low, high):
-        assert len(find_configuration_pairs(narrow, Goal((x, y, height), 0.0), 0.0, START).lower_qs)
-    text = (
-        "the heights 0.250 and 0.050 m above (0.420, 0.180) m, "
-        "but not without a change of the configuration of the arm in between"
-    )
-    with pytest.raises(Unreachable, match=re.escape(text)):
-        find_configuration_pairs(narrow, Goal((x, y, low), 0.0), high - low, START)

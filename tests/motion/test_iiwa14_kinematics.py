@@ -50,12 +50,3 @@ def test_forward_kinematics_agree_with_pybullet() -> None:
         state = client.getLinkState(arm, 6, computeForwardKinematics=True)
         assert_same(ARM.compute_tool_pose(q), Pose.of(*state[4:6]) @ Pose.of([0, 0, 0.165]), 1e-5)
     client.disconnect()
-
-
-def test_tips_are_where_the_tool_is_and_where_it_points() -> None:
-    qs = np.random.default_rng(4).uniform(-LIMIT, LIMIT, (200, 7))
-    tips, axes = ARM.compute_tcps_and_axes(qs)
-    for q, tip, axis in zip(qs, tips, axes, strict=True):
-        X_WT = ARM.compute_tool_pose(q)
-        assert np.allclose(tip, X_WT.position, atol=1e-12)
-        assert np.allclose(axis, X_WT.rotation[:, 2], atol=1e-12)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import re
-
 import numpy as np
 import pytest
 from joint_states import passed, peaks
@@ -13,9 +10,7 @@ from six_joint_arm import SixJointArm
 from executive.cell.arm import Goal, Task
 from executive.cell.config import ArmConfig, CellConfig, LimitsConfig
 from executive.cell.objects import Load, ObjectClass, Obstacle
-from executive.errors import Blocked, Unreachable
 from executive.motion.arm_model import Kinematics
-from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import JointLimits
 from executive.motion.planner import Planner
 
@@ -45,20 +40,6 @@ def arm(six: CellConfig) -> Kinematics:
     return SixJointArm(six.tool.length, JointLimits.from_config(LIMITS).position)
 
 
-def test_the_kinematics_of_the_test_arm_are_consistent(arm: Kinematics) -> None:
-    rng, limits = np.random.default_rng(1), JointLimits.from_config(LIMITS).position
-    qs = rng.uniform(limits.lower, limits.upper, (100, 6))
-    tips, axes = arm.compute_tcps_and_axes(qs)
-    for q, tip, axis in zip(qs, tips, axes, strict=True):
-        X_WT = arm.compute_tool_pose(q)
-        assert np.allclose(tip, X_WT.position)
-        assert np.allclose(axis, X_WT.rotation[:, 2])
-        assert np.allclose(arm.solve([X_WT], arm.find_branch(q)), q, atol=1e-6)
-        for solution in arm.solve_all(X_WT, q, 0.1).qs:
-            assert np.allclose(arm.compute_tool_pose(solution).position, X_WT.position, atol=1e-9)
-            assert np.allclose(arm.compute_tool_pose(solution).rotation, X_WT.rotation, atol=1e-9)
-
-
 def test_motions_of_six_joints_reach_their_goals_within_asymmetric_limits(
     six: CellConfig, arm: Kinematics
 ) -> None:
@@ -86,29 +67,6 @@ def test_motions_of_six_joints_reach_their_goals_within_asymmetric_limits(
     assert all(path.shape[1] == 6 for path in checked)
 
 
-def test_the_yaw_of_a_goal_is_that_of_the_tool(six: CellConfig, arm: Kinematics) -> None:
-    motion = Planner(six, arm).plan(HOME, Goal((0.5, 0.1, 0.1), yaw=0.4))
-    assert arm.compute_tool_pose(motion.end).rotation[:, 1] == pytest.approx(
-        [-math.sin(0.4), math.cos(0.4), 0], abs=1e-6
-    )
-
-
-def test_only_configurations_within_asymmetric_limits_are_found(arm: Kinematics) -> None:
-    found = find_configuration_pairs(arm, Goal((0.5, 0.1, 0.05)), 0.1, HOME)
-    assert len(found.lower_qs)
-    assert (found.lower_qs[:, 2] >= math.radians(20)).all()
-
-
-def test_errors_state_both_limits_of_a_joint(six: CellConfig, arm: Kinematics) -> None:
-    with pytest.raises(Unreachable, match=r"leaves joint \d \d+\.\d° outside -?\d+° to \d+°$"):
-        find_configuration_pairs(arm, Goal((-0.3, -0.02, 0.05)), 0.0, HOME)
-    narrow = HOME.copy()
-    narrow[4] = math.radians(-25)
-    text = "would take joint 5 to -25.0°; its limit is -20° to 120°"
-    with pytest.raises(Blocked, match=re.escape(text)):
-        Planner(six, arm).plan(HOME, narrow)
-
-
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
@@ -121,8 +79,3 @@ def test_errors_state_both_limits_of_a_joint(six: CellConfig, arm: Kinematics) -
 def test_limits_that_do_not_fit_together_are_refused(changes, text: str) -> None:
     with pytest.raises(ValueError, match=text):
         LimitsConfig(**{**LIMITS.model_dump(), **changes})
-
-
-def test_a_pose_of_another_number_of_joints_is_refused() -> None:
-    with pytest.raises(ValueError, match='has 7 angles in the pose "home" and limits of 6 joints'):
-        ArmConfig(limits=LIMITS, poses_deg={"home": (0.0,) * 7})

@@ -55,19 +55,6 @@ def strongest(trajectory: Trajectory, kinematics) -> float:
     return float(np.max(radius * np.hypot(qdd[:, 0], qd[:, 0] ** 2)))
 
 
-def test_a_seal_affords_all_of_a_motion_or_nothing(sway, kinematics) -> None:
-    weight, most = SAFETY_FACTOR * KIND.mass * GRAVITY, strongest(sway, kinematics)
-    for bears, share in (
-        (SAFETY_FACTOR * KIND.mass * math.hypot(GRAVITY, 1.01 * most), 1.0),
-        (0.99 * weight, 0.0),
-    ):
-        assert PayloadLimit(Load(KIND, bears), kinematics).find_acceleration_fraction(sway) == share
-    assert PayloadLimit(Load(KIND, 1.2 * weight), kinematics).max_lift_acceleration == pytest.approx(
-        0.2 * GRAVITY
-    )
-    assert PayloadLimit(Load(KIND, weight), kinematics).max_lift_acceleration == 0.5
-
-
 @pytest.mark.parametrize("share", [0.25, 0.6, 0.9])
 def test_flown_at_the_root_of_the_share_a_motion_is_just_affordable(sway, kinematics, share: float) -> None:
     bears = SAFETY_FACTOR * KIND.mass * math.hypot(GRAVITY, share * strongest(sway, kinematics))
@@ -78,11 +65,6 @@ def test_flown_at_the_root_of_the_share_a_motion_is_just_affordable(sway, kinema
     assert rate == pytest.approx(math.sqrt(share), rel=0.01)
     assert payload.find_acceleration_fraction(gentle) == pytest.approx(1.0, abs=0.01)
     assert payload.find_acceleration_fraction(sway.make_slower_copy(1.1 * rate)) < 0.9
-
-
-def test_a_motion_too_short_to_pull_at_anything_is_affordable(kinematics, connector, home) -> None:
-    still = Trajectory([connector.connect(JointState.at_rest(home), JointState.at_rest(home))])
-    assert PayloadLimit(Load(KIND, 0.5), kinematics).find_acceleration_fraction(still) == 1.0
 
 
 def test_a_demand_is_what_the_seal_bears_beyond_weight_and_hold(sway, kinematics) -> None:
@@ -103,30 +85,3 @@ def test_a_demand_is_what_the_seal_bears_beyond_weight_and_hold(sway, kinematics
     assert 0 < len(near.slack) < len(demand.slack)
     for values, every in zip(near, demand, strict=True):
         assert np.array_equal(values, every[demand.slack < 0.096]), "what is far from its bounds is left out"
-
-
-def test_slopes_are_the_derivatives_of_a_demand_by_the_positions(sway, kinematics) -> None:
-    qs = np.array([sway.state_at(place).q for place in SAMPLE_FRACTIONS])
-    payload, h = PayloadLimit(Load(KIND, 3.0), kinematics), 1e-6
-    demand = payload.linearize(qs, LENGTH / SAMPLES_PER_STEP, math.inf)
-    for row in range(0, len(demand.slack), 5):
-        for k, joint in np.ndindex(3, 7):
-            there = [qs.copy(), qs.copy()]
-            for moved, sign in zip(there, (1, -1), strict=True):
-                moved[demand.samples[row, k], joint] += sign * h
-            after, before = (
-                payload.linearize(moved, LENGTH / SAMPLES_PER_STEP, math.inf).slack[row] for moved in there
-            )
-            assert demand.gradients[row, k, joint] == pytest.approx(
-                (after - before) / (2 * h), rel=1e-2, abs=0.02
-            )
-
-
-def test_growth_is_the_derivative_of_a_demand_by_the_length_of_a_step(sway, kinematics) -> None:
-    qs = np.array([sway.state_at(place).q for place in SAMPLE_FRACTIONS])
-    payload, h = PayloadLimit(Load(KIND, 3.0), kinematics), 1e-6
-    demand, after, before = (
-        payload.linearize(qs, (LENGTH + change) / SAMPLES_PER_STEP, math.inf) for change in (0.0, h, -h)
-    )
-    assert demand.step_derivatives.max() > 0.1
-    assert demand.step_derivatives == pytest.approx((after.slack - before.slack) / (2 * h), rel=1e-4)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from joint_states import SOONER, passed, peaks, tool_velocities
+from joint_states import passed, peaks, tool_velocities
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
@@ -16,7 +16,6 @@ from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.arms import build_planner
 from executive.motion.iiwa14_kinematics import interpolate_max_joint_6_angle
-from executive.motion.payload import GRAVITY
 from executive.motion.planner import MAX_CHECK_SPACING, Planner
 from executive.motion.trajectory import Trajectory
 
@@ -85,13 +84,6 @@ def test_a_fixed_question_gets_a_fixed_answer(planner, config, home, name: str) 
     assert (motion.duration, motion.guarded_start_time) == pytest.approx((duration, guarded), rel=1e-5)
     # On another kind of processor the optimizer ends up to 2e-4 rad beside.
     assert motion.samples.q.mean(axis=0) == pytest.approx(mean, abs=2e-4)
-
-
-def test_a_motion_may_begin_inside_its_guarded_part(planner, home) -> None:
-    start = planner.plan(home, Goal((0.5, 0.0, 0.055))).end
-    goal = Goal((0.5, 0.0, 0.05), guarded_length=0.015, guarded_speed=0.04, fast_length=0.014)
-    motion = planner.plan(start, goal, Task(target=Obstacle(0.5, 0.0, 0.0354, 0.05, "it")))
-    assert motion.guarded_start_time == 0.0
 
 
 @given(on_the_table, st.floats(0.008, 0.03), st.floats(0.02, 0.08))
@@ -195,29 +187,6 @@ def test_when_all_ways_are_blocked_the_error_is_the_first_ones_and_counts(config
     assert str(caught.value) == f"way 1 is too near; all {len(asked)} motions that were tried are blocked"
 
 
-def pull(planner: Planner, motion: Trajectory, kind: ObjectClass) -> float:
-    """Largest `m |a + g|` of a load on the way [N]."""
-    tips, axes = planner.kinematics.compute_tcps_and_axes(passed(motion).q)
-    middle = tips + kind.height / 2 * axes
-    acceleration = np.diff(middle[:-1], 2, axis=0) / SOONER**2
-    return float(kind.mass * np.linalg.norm(acceleration + np.array([0, 0, GRAVITY]), axis=1).max())
-
-
-@pytest.mark.parametrize(
-    ("mass", "bears", "x", "y"), [(0.1, 3.0, 0.55, 0.1), (0.1, 2.25, 0.45, -0.2), (0.3, 8.0, 0.55, 0.1)]
-)
-def test_a_seal_bears_twice_what_is_asked_of_it(planner, home, mass, bears, x, y) -> None:
-    """As long as it bears more than twice the weight, with some room."""
-    kind = ObjectClass("cube", 0.05, 0.0354, mass=mass)
-    picked = planner.plan(home, pick(x, y)).end
-    motion = planner.plan(picked, BIN, Task(Load(kind, bears)))
-    unhurried = planner.plan(picked, BIN, Task(Load(kind)))
-    assert pull(planner, motion, kind) <= bears / 2 * 1.01
-    if pull(planner, unhurried, kind) > bears / 2 * 1.01:
-        # It is not gentler than it has to be.
-        assert pull(planner, motion, kind) > bears / 2 * 0.85
-
-
 def test_the_wrist_folds_no_farther_than_links_5_and_7_keep_the_margin(planner, config, limits, home) -> None:
     """The data sheet would let joint 6 bend by 120 degrees."""
     most = interpolate_max_joint_6_angle(config.motion.margin)
@@ -227,18 +196,6 @@ def test_the_wrist_folds_no_farther_than_links_5_and_7_keep_the_margin(planner, 
         planner.require_reachable(Goal((0.9, 0.0, 0.114)))
     with pytest.raises(Unreachable, match=r"leaves joint 6 \d\.\d° outside ±106°"):
         planner.plan(home, Goal((0.3, 0.0, 0.7)))
-
-
-def test_the_arm_unfolds_although_its_slow_motion_would_fold_the_wrist_more(planner, home) -> None:
-    folded = np.radians((-20.59, 108.69, -99.08, -102.23, 106.75, 102.35, 4.85))
-    motion = planner.plan(folded, home)
-    assert motion.duration < 1.35
-    assert np.degrees(np.abs(motion.samples.q[:, 5])).max() < 102.4
-
-
-def test_joint_positions_out_of_range_are_refused(planner, home) -> None:
-    with pytest.raises(Blocked, match=r"would take joint 4 to -12\d\.\d°; its limit is ±120°"):
-        planner.plan(home, np.radians([0, 20, 0, -125, 0, 70, 0]))
 
 
 def test_random_motions_keep_every_limit(planner, limits, config, home) -> None:

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pytest
@@ -36,9 +37,8 @@ class Bench:
         self.time, self.may_end, self.events, self.goals = 0.0, threading.Event(), list[Event](), list[str]()
         clock = StepClock(lambda: self.time)
         self.worker = ThreadPoolExecutor(1, "planner")
-        self.factory = PlanFactory(
-            self.plan, self.worker, clock, PLANNING_TIME, self.events.append, is_realtime=is_realtime
-        )
+        submit = partial(self.worker.submit, self.plan)
+        self.factory = PlanFactory(submit, clock, PLANNING_TIME, self.events.append, is_realtime=is_realtime)
 
     def plan(self, start: Array, goal: Goal | str, task: Task) -> Line:
         assert self.may_end.wait(10)
@@ -90,18 +90,6 @@ def test_a_fast_worker_is_not_ready_before_its_time(make_bench) -> None:
         bench.time = PLANNING_TIME
         assert plan.ready
         assert bench.events == [MotionPlanned(False, PLANNING_TIME, 2.0)]
-
-
-def test_in_simulation_the_clock_waits_for_the_worker(make_bench) -> None:
-    bench = make_bench(is_realtime=False)
-    plan = bench.factory.plan(START, "home", Task())
-    assert not plan.ready
-    bench.time = PLANNING_TIME
-    release = threading.Timer(0.0, bench.may_end.set)
-    release.start()
-    assert plan.ready
-    assert bench.may_end.is_set()
-    release.join()
 
 
 @pytest.mark.parametrize(("goal", "error"), [("blocked", Blocked), ("bug", ZeroDivisionError)])

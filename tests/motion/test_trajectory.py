@@ -39,19 +39,6 @@ def test_pieces_that_do_not_meet_are_a_fault(field: str, off: str) -> None:
         Trajectory([first, second])
 
 
-def test_a_motion_that_does_not_begin_or_end_at_rest_is_a_fault() -> None:
-    with pytest.raises(Fault, match="the start is not at rest; the joint velocity differs"):
-        Trajectory([CONNECTOR.connect(MOVING, JointState.at_rest(B))])
-    with pytest.raises(Fault, match="the end is not at rest; the joint velocity differs"):
-        Trajectory([CONNECTOR.connect(JointState.at_rest(A), MOVING)])
-
-
-@pytest.mark.parametrize("s", [math.nan, math.inf, -math.inf])
-def test_a_time_that_would_crash_ruckig_is_a_fault(s: float) -> None:
-    with pytest.raises(Fault, match=rf"has no state at the time {s}; its times are 0 to \d\.\d\d\d s"):
-        by_way_of().state_at(s)
-
-
 @given(states(), st.floats(0.2, 1.0))
 @settings(max_examples=20)
 def test_slowed_it_takes_the_same_path_in_more_time(between: JointState, rate: float) -> None:

@@ -12,8 +12,11 @@ import pytest
 from executive.cell.arm import Goal
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
+from executive.errors import Unreachable
 from executive.events import FrameSearched, MotionPlanned, TargetSelected, TimedEvent
 from executive.manipulation.tool_goals import sort_pickable_targets
+from executive.motion.arm_model import Kinematics
+from executive.motion.configurations import ConfigurationPairs, find_configuration_pairs
 from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.run_context import RunContext
 from executive.skill import Skill, SkillFailed
@@ -191,11 +194,16 @@ def test_what_cannot_be_picked_is_not_planned(bench: Bench, planned: list[Goal])
 def test_a_target_out_of_reach_fails_in_its_approach_only(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("executive.cells.fake.arm.MAX_REACH", 0.62)
+    def find_near_pairs(kinematics: Kinematics, goal: Goal, *others: Any) -> ConfigurationPairs:
+        if goal.position[0] > 0.55:
+            raise Unreachable("beyond the reach of the arm")
+        return find_configuration_pairs(kinematics, goal, *others)
+
+    monkeypatch.setattr("executive.cells.fake.arm.find_configuration_pairs", find_near_pairs)
     bench.fake.world.put("duck", 0.6, 0.2)
     cube, duck = bench.look()
     bench.carry([cube])
-    with pytest.raises(SkillFailed, match=r"the arm reaches") as failure:
+    with pytest.raises(SkillFailed, match="beyond the reach of the arm") as failure:
         bench.run(Approach(target=duck))
     assert (failure.value.reason, bench.ahead[-1]) == ("unreachable", True)
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from at_hand import look, pick
 
@@ -60,11 +63,9 @@ def test_an_object_in_the_tool_is_put_down_and_seen_again(fake: FakeCell, target
     assert fake.audit()["left"] == 2
 
 
-def test_an_object_that_cannot_be_put_down_stays_in_the_tool(
-    fake: FakeCell, targets: list[Target], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_object_that_cannot_be_put_down_stays_in_the_tool(fake: FakeCell, targets: list[Target]) -> None:
     pick(fake, targets[0])
-    monkeypatch.setattr("executive.cells.fake.arm.MAX_REACH", 0.0)
+    fake.cell = replace(fake.cell, safe_place=np.array([2.0, 0.0, 0.0]))
     with pytest.raises(Fault, match=r"cannot be put down: .* take it out of the tool and resume the run"):
         recover(fake)
     assert fake.tool.holding

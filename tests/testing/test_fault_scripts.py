@@ -80,11 +80,11 @@ def test_a_fault_occurs_in_its_activations(activations: tuple[int, ...], missed:
 
 
 def test_a_fault_lasts_from_its_start_until_before_its_end() -> None:
-    script = [between(2.0, 3.0, effects.detector_dead()), after(3.0, effects.seal_fails())]
+    script = [between(1.0, 3.0, effects.detector_dead()), after(3.0, effects.seal_fails())]
     result = run_mission("sort_overhead", faults=script)
     injected = [one for one in result.events if isinstance(one.event, FaultInjected)]
     dead = [one.clock for one in injected if one.event == FaultInjected("detector_dead", "", "", "", [])]
-    assert dead and 2.0 <= min(dead) <= max(dead) < 3.0
+    assert dead and 1.0 <= min(dead) <= max(dead) < 3.0
     closed = [one.clock for one in result.events if one.event == ToolCommanded("close")]
     assert [one.clock for one in injected[len(dead) :]] == [clock for clock in closed if clock >= 3.0]
 

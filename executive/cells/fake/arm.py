@@ -1,38 +1,35 @@
-"""Ideal arm and tool of the fake cell, with attributes by which tests provoke failures."""
+"""Arm and tool of the fake cell, with attributes by which tests provoke failures."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
-from itertools import chain, pairwise
-from typing import ParamSpec, TypeVar
 
 import numpy as np
 
 from executive.cell.arm import Goal, Motion, Task, reject_generator
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
-from executive.cell.layout import compute_travel_height, find_unreachable_places
+from executive.cell.layout import compute_travel_height
 from executive.cell.protocols import Clock
-from executive.cell.workcell import KeyPath
-from executive.cells.fake.fake_obstacles import Collision, FakeObstacles
 from executive.cells.fake.world import FakeWorld
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit
-from executive.geometry import GRAVITY, Array, Pose, make_tool_down_pose
-from executive.motion.arms import build_kinematics
+from executive.geometry import GRAVITY, Array, Pose
+from executive.motion.arms import build_planner
+from executive.motion.clearance_model import ClearanceModel, make_tool_discs
+from executive.motion.configurations import (
+    find_configuration_pairs,
+    find_vertical_waypoints,
+    solve_vertical_waypoints,
+)
 from executive.motion.plans import Plan, PlanFactory
+from executive.motion.search import EXTRA_HEIGHTS
 
-P = ParamSpec("P")
-T = TypeVar("T")
-
-MAX_REACH = 0.85
-"""Maximum distance of the tool of the fake arm from the base [m]."""
-
-MAX_TOOL_SPEED = 1.0
-"""Speed of the fake tool outside of guarded motions, and maximum speed of guarded motions [m/s]."""
+JOINT_SPEED = 1.5
+"""Speed of the fastest joint of the fake arm outside of guarded motions [rad/s]."""
 
 DEFAULT_BREAKAWAY_FORCE = 7.9
 """Breakaway force of the seals of the fake tool, unless a test changes it [N]."""
@@ -43,44 +40,31 @@ LOAD_NOISE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class FakeMotion:
-    """A motion of the fake arm; `path` has one tool pose for each control step."""
+    """A motion of the fake arm; `qs` are the joint positions after each control step `(N, n)` [rad]."""
 
-    path: Sequence[Pose]
+    qs: Array
 
     @property
     def duration(self) -> float:
         """Duration of the motion [s]."""
-        return len(self.path) * STEP
-
-
-class ImmediateExecutor(Executor):
-    """Executor that calls each submitted function at once, in the thread of the caller."""
-
-    def submit(self, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Call a function, and return its result or exception."""
-        future: Future[T] = Future()
-        try:
-            future.set_result(function(*args, **kwargs))
-        except Exception as error:
-            future.set_exception(error)
-        return future
+        return len(self.qs) * STEP
 
 
 class FakeArm:
-    """An arm without links, whose tool moves along straight lines at constant speed.
+    """An arm that moves on straight joint paths, stops without braking, and never hits an obstacle by itself.
 
-    The arm stops without braking. Its reach is limited, and neither the tool tip nor the lower end of the
-    load may enter the table or the bins. Objects on the table are no obstacles.
+    A motion rises to the travel height, crosses, and descends. It is blocked if tool or load would come
+    nearer to an obstacle than the cell file permits. The links of the arm are not checked.
 
     Args:
         world: The world that contains the held object.
-        config: The cell file: named poses, travel height, bins and planning time.
+        config: The cell file.
         clock: Clock of the run.
         emit: Receives the events of the arm.
 
     Attributes:
-        poses: Tool pose of each named pose; a run begins at `home`.
-        tool_pose: Pose of the tool centre point; changed by `set_tool_pose`.
+        poses: Joint positions `(n,)` [rad] of each named pose; a run begins at `home`.
+        q: Joint positions `(n,)` [rad].
         tool_velocity: Velocity zero `(3,)` [m/s]: a released object falls straight down.
         collision: Description of the obstacle that stopped the last motion, or None.
         contact_point: Position of the tool `(x, y, z)` [m] at the last `next_obstacle`, or None.
@@ -89,56 +73,51 @@ class FakeArm:
     """
 
     def __init__(self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit) -> None:
-        compute_tool_pose = build_kinematics(config).compute_tool_pose
-        self.poses = {name: compute_tool_pose(np.radians(q)) for name, q in config.arm.poses_deg.items()}
-        self.tool_pose, self.tool_velocity = self.poses["home"], np.zeros(3)
+        self.poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
+        self.q = self.poses["home"]
+        self.tool_velocity = np.zeros(3)
         self.collision: str | None = None
         self.contact_point: Sequence[float] | None = None
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
         self._world = world
-        self._travel_height = compute_travel_height(config)
-        self._joint_count = config.arm.joint_count
-        self._obstacles = FakeObstacles(config)
-        worker = ImmediateExecutor()
-        self._factory = PlanFactory(self._plan_motion, worker, clock, config.motion.planning_time, emit)
-        self._path: list[Pose] = []
-        self._half_pose_count = 0
+        self._config = config
+        self._planner = build_planner(config)
+        self._kinematics = self._planner.kinematics
+        self._factory = PlanFactory(self._plan_motion, clock, config.motion.planning_time, emit)
+        self._path: list[Array] = []
+        self._half_length = 0
 
     @property
-    def q(self) -> Array:
-        """Tool position [m], padded with zeros to the number of joints `(n,)`."""
-        return np.concatenate([self.tool_pose.position, np.zeros(self._joint_count - 3)])
+    def tool_pose(self) -> Pose:
+        """Pose of the tool centre point."""
+        return self._kinematics.compute_tool_pose(self.q)
 
     @property
     def destination(self) -> Array:
         """Position of the tool `(3,)` [m] at the end of the running motion, or now if the arm is at rest."""
-        return (self._path[-1] if self._path else self.tool_pose).position
+        return self._kinematics.compute_tool_pose(self._end_q).position
 
     @property
     def at_rest(self) -> bool:
         """True while no motion runs."""
         return not self._path
 
+    @property
+    def _end_q(self) -> Array:
+        return self._path[-1] if self._path else self.q
+
     def describe_unreachable(self, goal: Goal) -> str:
-        """Return a sentence if a goal is farther than `MAX_REACH` from the base, else ""."""
-        try:
-            check_reachable(np.array(goal.position))
-        except Unreachable as error:
-            return str(error)
-        return ""
+        """Return a sentence if no joint configuration within the limits reaches a goal, else ""."""
+        return self._planner.describe_unreachable(goal)
 
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[FakeMotion]:
-        """Begin to plan a motion to a goal or a named pose; a plan from `plan_ahead` is complete at once.
-
-        The plan raises Unreachable for a goal beyond `MAX_REACH` from the base, and Blocked if the tool tip
-        or the load would enter the table or a bin, even on the guarded part of the motion.
-        """
-        return self._factory.plan(self.destination, goal, task)
+        """Begin to plan a motion to a goal or a named pose; a plan from `plan_ahead` is complete at once."""
+        return self._factory.plan(self._end_q, goal, task)
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
         """Plan the next motion, from the end of the running motion, before `plan` requests it."""
-        self._factory.plan_ahead(self.destination, goal, task)
+        self._factory.plan_ahead(self._end_q, goal, task)
 
     def start(self, motion: Motion) -> None:
         """Begin to follow a motion.
@@ -153,13 +132,16 @@ class FakeArm:
             raise Fault(f"the fake arm follows its own planned motions, not a {type(motion).__name__}")
         self.commands.append("start")
         self._world.is_commanded = True
-        self._path = list(motion.path)
-        self._half_pose_count = len(self._path) // 2
-        self.collision = self.contact_point = None
+        self._path = list(motion.qs)
+        self._half_length = len(self._path) // 2
+        self.collision = None
+        self.contact_point = None
 
-    def set_tool_pose(self, pose: Pose) -> None:
-        """Move the tool to a pose at once; the arm is then at rest."""
-        self.tool_pose, self._path = pose, []
+    def set_tool_position(self, position: Array) -> None:
+        """Move the tool, which then points down, to a position `(3,)` [m] at once."""
+        x, y, z = map(float, position)
+        self.q = find_configuration_pairs(self._kinematics, Goal((x, y, z)), 0.0, self.q).lower_qs[0]
+        self._path = []
 
     def stop(self) -> None:
         """End the running motion without braking."""
@@ -174,60 +156,74 @@ class FakeArm:
             self.stop()
 
     def advance(self) -> None:
-        """Move tool and held object to the next pose; stop before the object enters the table or a bin."""
-        if self._path and (hit := self._find_load_collision(self._path[0])):
-            self.stop_after_collision(f"{hit.part} ran into {hit.obstacle}, {hit.position_text}")
-        elif self._path:
-            self.tool_pose = self._path.pop(0)
-            if self.next_obstacle is not None and len(self._path) <= self._half_pose_count:
-                self.collision, self.next_obstacle = self.next_obstacle, None
-                self.contact_point = self.tool_pose.position.tolist()
-                self.stop()
+        """Move arm and held object by one control step."""
+        if not self._path:
+            return
+        self.q = self._path.pop(0)
         if (held := self._world.held_object) is not None:
             height = self._world.classes[held.label].height
             held.position = self.tool_pose.position - np.array([0.0, 0.0, height / 2])
+        if self.next_obstacle is not None and len(self._path) <= self._half_length:
+            self.collision = self.next_obstacle
+            self.next_obstacle = None
+            self.contact_point = self.tool_pose.position.tolist()
+            self.stop()
 
-    def _find_load_collision(self, pose: Pose) -> Collision | None:
-        """Return the collision of the held object on the way to `pose`, or None.
+    def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> Future[FakeMotion]:
+        """Return a motion, or the error of the first attempt if every path is blocked or out of reach."""
+        future: Future[FakeMotion] = Future()
+        errors: list[Exception] = []
+        travel_height = compute_travel_height(self._config)
+        rise = max(0.0, travel_height - float(self._kinematics.compute_tool_pose(start).position[2]))
+        attempts = [(rise + extra_height, travel_height + extra_height) for extra_height in EXTRA_HEIGHTS]
+        for attempt in [(0.0, 0.0), *attempts] if isinstance(goal, str) else attempts:
+            try:
+                qs = self._find_path(start, goal, *attempt)
+                self._require_clearance(np.vstack([start, qs]), task)
+            except (Blocked, Unreachable) as error:
+                errors.append(error)
+            else:
+                future.set_result(FakeMotion(qs))
+                return future
+        future.set_exception(errors[0])
+        return future
 
-        A plan for a task without a load has not checked the held object.
-        """
-        held = self._world.held_object
-        if held is None:
-            return None
-        tip_positions = np.array([self.tool_pose.position, pose.position])
-        return self._obstacles.find_collision(tip_positions, self._world.classes[held.label])
-
-    def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> FakeMotion:
-        load = task.load.object_class if task.load else None
-        message = ""
-        for path in self._generate_paths(start, goal):
-            tip_positions = np.array([start, *(pose.position for pose in path)])
-            collision = self._obstacles.find_collision(tip_positions, load)
-            if collision is None:
-                return FakeMotion(path)
-            part, obstacle, depth, position_text = collision
-            message = f"the motion would bring {part} {depth:.3f} m into {obstacle}, {position_text}"
-        raise Blocked(message)
-
-    def _generate_paths(self, start: Array, goal: Goal | str) -> Iterator[list[Pose]]:
-        """Yield paths: for a named pose a straight path, then for any goal a path at travel height."""
-        raised_position = np.array([*start[:2], max(start[2], self._travel_height)])
+    def _find_path(self, start: Array, goal: Goal | str, rise: float, height: float) -> Array:
+        """Return joint positions `(N, n)` [rad] of a path up by `rise` [m], and down from `height` [m]."""
+        waypoints = find_vertical_waypoints(self._kinematics, start, rise)
+        corners = start[None] if waypoints is None else waypoints
         if isinstance(goal, str):
-            end = self.poses[goal]
-            end_position = guarded_start = end.position
-            rotation, speed = end.rotation, MAX_TOOL_SPEED
-            yield [*_make_straight_path(start, end_position, rotation, MAX_TOOL_SPEED)[:-1], end]
-        else:
-            end_position = np.array(goal.position)
-            check_reachable(end_position)
-            guarded_start = np.array([*end_position[:2], end_position[2] + goal.guarded_length])
-            rotation = make_tool_down_pose(end_position, goal.yaw or 0.0).rotation
-            speed = min(goal.guarded_speed, MAX_TOOL_SPEED)
-        position_over_goal = np.array([*end_position[:2], max(guarded_start[2], self._travel_height)])
-        fast_lines = pairwise([start, raised_position, position_over_goal, guarded_start])
-        fast_parts = [_make_straight_path(*line, rotation, MAX_TOOL_SPEED) for line in fast_lines]
-        yield [*chain(*fast_parts), *_make_straight_path(guarded_start, end_position, rotation, speed)]
+            return _interpolate(np.vstack([corners, self.poses[goal]]), 0.0)
+        pairs = find_configuration_pairs(self._kinematics, goal, goal.guarded_length, start)
+        # The largest change of a joint would be smaller with another norm, but the tool would sink more.
+        nearest = np.argmin(np.linalg.norm(pairs.upper_qs - corners[-1], axis=1))
+        length = max(0.0, height - goal.position[2] - goal.guarded_length)
+        branch = pairs.branches[nearest]
+        descent = solve_vertical_waypoints(self._kinematics, pairs.upper_qs[nearest], length, branch)
+        corners = np.vstack([corners, descent[::-1], pairs.lower_qs[nearest]])
+        return _interpolate(corners, goal.guarded_length / goal.guarded_speed)
+
+    def _require_clearance(self, qs: Array, task: Task) -> None:
+        """Raise Blocked if tool or load come too near to an obstacle at joint positions `(N, n)` [rad]."""
+        tcps, axes = self._kinematics.compute_tcps_and_axes(qs)
+        discs = make_tool_discs(self._config, task.load)._replace(min_cosine=-1.0)
+        # Only other objects may be as near as they are at the ends: the goal may not be inside table or bins.
+        for obstacles, min_margin in (((), 0.0), (task.obstacles, -math.inf)):
+            clearance = ClearanceModel(self._config, obstacles, tcps[[0, -1], :2], discs)
+            clearance.relax_end_margins(tcps[[0, -1]], axes[[0, -1]], min_margin)
+            clearance.require_clearance(tcps, axes)
+
+
+def _interpolate(corners: Array, min_last_time: float) -> Array:
+    """Return the joint positions after each control step on straight lines between corners `(K, n)` [rad].
+
+    The last line takes at least `min_last_time` [s].
+    """
+    times = np.abs(np.diff(corners, axis=0)).max(axis=1) / JOINT_SPEED
+    times[-1] = max(times[-1], min_last_time)
+    corner_times = np.cumsum([0.0, *times])
+    step_times = np.append(np.arange(STEP, corner_times[-1], STEP), corner_times[-1])
+    return np.column_stack([np.interp(step_times, corner_times, joint) for joint in corners.T])
 
 
 class FakeTool:
@@ -282,47 +278,14 @@ class FakeTool:
         self._world.is_commanded = True
         fake_object = self._world.find_touched_object(self._get_tip_position())
         if fake_object is not None and self.can_seal():
-            self._world.held_object, fake_object.is_dropped = fake_object, False
+            fake_object.is_dropped = False
+            self._world.held_object = fake_object
 
     def open(self) -> None:
         """Release the held object; it falls straight down."""
         self._world.is_commanded = True
-        self._release()
+        self._world.release()
 
     def break_seal(self) -> None:
         """Break the seal: the held object falls straight down, and rolls off other objects and bin walls."""
-        fake_object = self._world.held_object
-        self._release()
-        if fake_object is not None:
-            fake_object.is_dropped = True
-            self._world.roll_to_free_position(fake_object)
-            fake_object.rest_positions[-1] = fake_object.position.copy()
-
-    def _release(self) -> None:
-        fake_object, self._world.held_object = self._world.held_object, None
-        if fake_object is not None:
-            fake_object.position[2] = self._world.classes[fake_object.label].height / 2
-            fake_object.rest_positions.append(fake_object.position.copy())
-
-
-def check_reachable(position: Array) -> None:
-    """Check that the fake tool reaches a position `(3,)` [m].
-
-    Raises:
-        Unreachable: The position is farther than `MAX_REACH` from the base.
-    """
-    distance = float(np.linalg.norm(position))
-    if distance > MAX_REACH:
-        raise Unreachable(f"the goal is {distance:.2f} m from the base, the arm reaches {MAX_REACH:.2f} m")
-
-
-def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each bin beyond `MAX_REACH`, and for a safe place beyond `MAX_REACH`."""
-    height = compute_travel_height(config)
-    return find_unreachable_places(config, lambda place, _: check_reachable(np.array([*place, height])))
-
-
-def _make_straight_path(start: Array, end: Array, rotation: Array, speed: float) -> list[Pose]:
-    """Return the tool pose after each control step from `start` to `end` `(3,)` [m] at `speed` [m/s]."""
-    count = math.ceil(float(np.linalg.norm(end - start)) / speed / STEP)
-    return [Pose(rotation, start + (end - start) * (i + 1) / count) for i in range(count)]
+        self._world.release(is_dropped=True)

@@ -11,9 +11,7 @@ import numpy as np
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass
-from executive.errors import InputError
 from executive.geometry import Array
-from executive.mission.findings import suggest_choice
 
 MAX_SEAL_OFFSET = 0.012
 """Maximum horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
@@ -45,17 +43,17 @@ class FakeWorld:
 
     Attributes:
         classes: Classes of the objects, by label.
+        bins: The bins of the cell.
         objects: The objects, in the order in which they were added.
         removed_objects: The objects that were removed from the world.
-        bins: The bins of the cell.
         held_object: The object that the tool holds, or None.
         is_commanded: True if arm or tool has received a command since the last control step.
     """
 
     classes: Mapping[str, ObjectClass]
+    bins: Collection[Bin] = ()
     objects: list[FakeObject] = field(default_factory=list)
     removed_objects: list[FakeObject] = field(default_factory=list)
-    bins: Collection[Bin] = ()
     held_object: FakeObject | None = None
     is_commanded: bool = False
 
@@ -66,13 +64,7 @@ class FakeWorld:
             label: Class of the object.
             x: Position of the centre along x [m].
             y: Position of the centre along y [m].
-
-        Raises:
-            InputError: The cell has no such class.
         """
-        if label not in self.classes:
-            hint = suggest_choice(label, self.classes, "The cell file has the classes")
-            raise InputError(f'no object of the class "{label}" can be put on the fake table. {hint}')
         position = np.array([x, y, self.classes[label].height / 2])
         fake_object = FakeObject(label, position, [position.copy()])
         self.objects.append(fake_object)
@@ -83,38 +75,39 @@ class FakeWorld:
         self.objects.remove(fake_object)
         self.removed_objects.append(fake_object)
 
-    def roll_to_free_position(self, fake_object: FakeObject) -> None:
-        """Move a dropped object off bin walls and off other objects.
-
-        An object on the wall of a bin rolls into the bin. An object outside of all bins rolls off each
-        overlapping object in turn. An object inside a bin stays.
-        """
-        if self._move_into_bin(fake_object):
+    def release(self, *, is_dropped: bool = False) -> None:
+        """Let the held object fall straight down; if it is dropped, it rolls to a free position."""
+        fake_object = self.held_object
+        if fake_object is None:
             return
+        self.held_object = None
+        fake_object.position[2] = self.classes[fake_object.label].height / 2
+        fake_object.is_dropped = is_dropped
+        if is_dropped:
+            self._roll_to_free_position(fake_object)
+        fake_object.rest_positions.append(fake_object.position.copy())
+
+    def _roll_to_free_position(self, fake_object: FakeObject) -> None:
+        """Move an object off each overlapping object in turn, or from the wall of a bin into the bin."""
         radius = self.classes[fake_object.label].radius
-        for obstacle in self.objects:
+        for obstacle in self.objects if self.find_bin(fake_object) is None else ():
             min_distance = radius + self.classes[obstacle.label].radius
             direction = fake_object.position[:2] - obstacle.position[:2]
             distance = float(np.linalg.norm(direction))
             if obstacle is not fake_object and distance < min_distance:
                 direction = direction / distance if distance else np.array((1.0, 0.0))
                 fake_object.position[:2] = obstacle.position[:2] + min_distance * direction
-        self._move_into_bin(fake_object)
+        if (bin := self.find_bin(fake_object)) is not None:
+            max_offset = np.maximum(bin.size[:2] / 2 - radius, 0.0)
+            offset = fake_object.position[:2] - bin.position[:2]
+            fake_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
 
     def find_bin(self, fake_object: FakeObject) -> Bin | None:
         """Return the bin that contains an object; if there is none, the bin on whose wall the object lies."""
         wall_margin = BIN_THICKNESS + self.classes[fake_object.label].radius / 2
-        margins_and_bins, position = itertools.product((0.0, wall_margin), self.bins), fake_object.position
+        margins_and_bins = itertools.product((0.0, wall_margin), self.bins)
+        position = fake_object.position
         return next((bin for margin, bin in margins_and_bins if bin.contains(position, margin)), None)
-
-    def _move_into_bin(self, fake_object: FakeObject) -> bool:
-        """Move an object on a bin wall into the bin, and return True if the object is then in a bin."""
-        bin = self.find_bin(fake_object)
-        if bin is not None and not bin.contains(fake_object.position):
-            max_offset = np.maximum(bin.size[:2] / 2 - self.classes[fake_object.label].radius, 0.0)
-            offset = fake_object.position[:2] - bin.position[:2]
-            fake_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
-        return bin is not None
 
     def find_touched_object(self, tip_position: Array) -> FakeObject | None:
         """Return the object that a cup at `tip_position` `(3,)` [m] touches from above, or None."""
@@ -130,34 +123,17 @@ class FakeWorld:
 
 
 def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
-    """Put objects of random classes on random grid points; the cell file limits the number of objects.
-
-    Raises:
-        InputError: The workspace has no room for the objects.
-    """
+    """Put objects of random classes on random grid points; the cell file limits the number of objects."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(*config.table.objects, endpoint=True))
-    if room_error := describe_lack_of_room(config, count):
-        raise InputError(room_error)
-    points, _ = _compute_grid_points(config)
+    points = list_grid_points(config)
     for index in rng.permutation(len(points))[:count]:
         world.put(str(rng.choice(list(config.objects))), *points[index])
 
 
-def _compute_grid_points(config: CellConfig) -> tuple[list[tuple[float, float]], float]:
-    """Return the grid points for objects on the table, and the minimum distance between two points [m]."""
+def list_grid_points(config: CellConfig) -> list[tuple[float, float]]:
+    """Return the points on the table at which objects can lie beside each other [m]."""
     distance = 2 * max(object_class.radius for object_class in config.objects.values()) + config.table.gap
     ranges = config.table.x, config.table.y
     xs, ys = (np.linspace(low, high, 1 + int((high - low) / distance)) for low, high in ranges)
-    return [(float(x), float(y)) for x in xs for y in ys], distance
-
-
-def describe_lack_of_room(config: CellConfig, count: int) -> str:
-    """Return a message if the workspace lacks room for `count` objects, else ""."""
-    points, distance = _compute_grid_points(config)
-    if count <= len(points):
-        return ""
-    return (
-        f"{count} objects find no room on the workspace of cell {config.cell}, which has {len(points)} "
-        f"places {distance:.3f} m apart; ask for fewer or widen table.x and table.y"
-    )
+    return [(float(x), float(y)) for x in xs for y in ys]

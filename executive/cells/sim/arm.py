@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 
@@ -71,7 +71,7 @@ class SimArm:
         self._world = world
         self._poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
         self._worker = ThreadPoolExecutor(1, "planner")
-        self._factory = PlanFactory(self._plan_motion, self._worker, clock, config.motion.planning_time, emit)
+        self._factory = PlanFactory(self._plan_motion, clock, config.motion.planning_time, emit)
         self._contact_monitor = ContactMonitor(world, get_held_body)
         self._motion: Trajectory | None = None
         self._motion_time = 0.0
@@ -209,9 +209,10 @@ class SimArm:
         """Joint positions `(n,)` [rad] at the end of the running motion, or now if the arm is at rest."""
         return self._commanded_q if self._motion is None else self._motion.end
 
-    def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> Trajectory:
-        """Plan a motion; called in the worker thread, which alone uses the collision check of the planner."""
-        return self.planner.plan(start, goal if isinstance(goal, Goal) else self._poses[goal], task)
+    def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> Future[Trajectory]:
+        """Plan a motion in the worker thread, which alone uses the collision check of the planner."""
+        end = goal if isinstance(goal, Goal) else self._poses[goal]
+        return self._worker.submit(self.planner.plan, start, end, task)
 
     def _require_pose(self, goal: Goal | str) -> None:
         if isinstance(goal, str) and goal not in self._poses:

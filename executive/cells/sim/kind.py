@@ -10,9 +10,9 @@ from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions, KeyPath, Workcell
 from executive.cells.sim.models import compute_mass, find_model_errors
 from executive.cells.sim.object_positions import find_object_count_errors
-from executive.cells.sim.poses import find_places_out_of_reach, find_pose_errors
+from executive.cells.sim.poses import find_pose_errors
 from executive.events import Emit
-from executive.motion.arms import find_arm_errors
+from executive.motion.arms import find_arm_errors, find_places_out_of_reach
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 
 

@@ -1,4 +1,4 @@
-"""Checks of a cell file: reach of bins, poses and safe place, clearance of poses, view of the cameras."""
+"""Checks of a cell file: clearance of poses, and view of the cameras."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.arm import Goal
 from executive.cell.clock import StepClock
 from executive.cell.config import CellConfig
-from executive.cell.layout import find_unreachable_places
 from executive.cell.workcell import KeyPath
 from executive.cells.sim.arm_occlusion import ArmOcclusion
 from executive.cells.sim.camera import SimCamera, get_camera_pose
@@ -19,32 +17,10 @@ from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.world import World
 from executive.cells.table_views import find_view_errors
 from executive.geometry import Array
-from executive.motion.arms import build_kinematics, build_planner
+from executive.motion.arms import build_kinematics
 
 POINTS_PER_SIDE = 9
 """Number of positions of the flattest object along each side of the workspace for the check of occlusion."""
-
-
-def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each place or named pose of the cell file that the arm cannot reach.
-
-    The tool must reach each slot of each bin and the safe place, from travel height down to the release
-    height in one inverse kinematics branch. Each named pose must be within the joint limits.
-    """
-    planner = build_planner(config)
-
-    def require_reachable(position: Array, floor_height: float) -> None:
-        height = floor_height + config.max_object_height
-        planner.require_reachable(Goal((float(position[0]), float(position[1]), height)))
-
-    ranges = config.arm.limits.position_ranges_deg
-    for name, pose in config.arm.poses_deg.items():
-        for joint, (angle, (lower, upper)) in enumerate(zip(pose, ranges, strict=True), start=1):
-            if not lower <= angle <= upper:
-                limit = f"{upper:g}" if lower == -upper else f"{lower:g} to {upper:g}"
-                message = f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}'
-                yield ("arm", "poses_deg", name), message
-    yield from find_unreachable_places(config, require_reachable)
 
 
 def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:

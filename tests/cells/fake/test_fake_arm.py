@@ -1,4 +1,4 @@
-"""The fake arm goes up, across and down, and takes its time to plan."""
+"""The fake arm goes up, across and down on straight joint paths, and takes its time to plan."""
 
 from __future__ import annotations
 
@@ -11,171 +11,138 @@ from executive.cell.arm import Goal, Motion, Task
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.clock import STEP
 from executive.cell.objects import Load, Obstacle
-from executive.cells.fake.arm import MAX_TOOL_SPEED
+from executive.cells.fake.arm import JOINT_SPEED
 from executive.cells.fake.cell import FakeCell, load_empty_cell
 from executive.errors import Blocked, Fault, Unreachable
-from executive.geometry import Array, make_tool_down_pose
+from executive.geometry import Array
 
 LATENCY = load_empty_cell().motion.planning_time
 BESIDE = Goal((0.5, 0.2, 0.03), guarded_length=0.02, guarded_speed=0.05)
 
 
-def motion_to(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> Motion:
+def plan_motion(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> Motion:
     planning = fake.arm.plan(goal, task)
     while not planning.ready:
         fake.advance()
     return planning.result()
 
 
-def go(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> Array:
-    """Go to a goal and return where the tool was at every step `(N, 3)` [m]."""
-    fake.arm.start(motion_to(fake, goal, task))
-    places = []
+def move(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> tuple[Array, Array]:
+    """Go to a goal; return joint positions `(N, n)` [rad] and tool positions `(N, 3)` [m] of all steps."""
+    fake.arm.start(plan_motion(fake, goal, task))
+    states = []
     while not fake.arm.at_rest:
         fake.advance()
-        places.append(fake.arm.tool_pose.position)
-    return np.array(places)
-
-
-def test_it_goes_up_across_and_down_and_the_last_part_slowly(fake: FakeCell) -> None:
-    go(fake, Goal((0.4, -0.2, 0.05)))
-    places = go(fake, BESIDE)
-    assert places[-1] == pytest.approx(BESIDE.position)
-    across = np.hypot(*(places[:, :2] - [0.4, -0.2]).T) > 1e-9
-    beside = np.hypot(*(places[:, :2] - [0.5, 0.2]).T) > 1e-9
-    assert places[across & beside, 2] == pytest.approx(0.16), "load over wall, with clearance"
-    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / STEP
-    guarded = places[1:, 2] < 0.05 - 1e-9
-    assert speeds.max() <= MAX_TOOL_SPEED + 1e-9
-    assert speeds[~guarded].max() > 0.9 * MAX_TOOL_SPEED
-    assert speeds[guarded] == pytest.approx(0.05, rel=0.02)
-
-
-def test_the_tool_turns_as_the_goal_says(fake: FakeCell) -> None:
-    go(fake, Goal((0.5, 0.0, 0.1), yaw=math.pi / 2))
-    assert fake.arm.tool_pose.rotation[:, 0] == pytest.approx([0, -1, 0], abs=1e-9)
-
-
-def test_a_plan_takes_its_time_unless_it_was_asked_for_before(fake: FakeCell) -> None:
-    fake.arm.start(motion_to(fake, "aside"))
-    assert np.allclose(fake.arm.destination, fake.arm.poses["aside"].position)
-    fake.advance()
-    fake.arm.plan_ahead(BESIDE)
-    while not fake.arm.at_rest:
-        fake.advance()
-    assert fake.arm.plan(BESIDE).ready
-    planning, before = fake.arm.plan(BESIDE), fake.cell.clock.now
-    assert not planning.ready, "a plan made ahead is used once"
-    while not planning.ready:
-        fake.advance()
-    assert fake.cell.clock.now - before == pytest.approx(LATENCY, abs=STEP)
-
-
-def test_a_plan_for_another_task_or_from_another_place_is_another_plan(fake: FakeCell) -> None:
-    among = Task(obstacles=(Obstacle(0.4, -0.2, 0.03, 0.05, "cube-1"),))
-    fake.arm.plan_ahead(BESIDE)
-    assert not fake.arm.plan(BESIDE, among).ready
-    fake.arm.plan_ahead("aside")
-    go(fake, BESIDE)
-    assert not fake.arm.plan("aside").ready
-
-
-def test_what_is_out_of_reach_is_said_when_the_plan_is_known(fake: FakeCell) -> None:
-    planning = fake.arm.plan(Goal((0.8, 0.4, 0.1)))
-    with pytest.raises(Unreachable, match=r"the goal is 0\.90 m from the base, the arm reaches 0\.85 m"):
-        planning.result()
+        states.append((fake.arm.q, fake.arm.tool_pose.position))
+    qs, places = zip(*states, strict=True)
+    return np.array(qs), np.array(places)
 
 
 def hold_cube(fake: FakeCell) -> Task:
     """Let the tool hold a cube that stands on the table, and return the task of carrying it."""
     fake.world.held_object = fake.world.put("cube", 0.5, 0.0)
-    fake.arm.set_tool_pose(make_tool_down_pose((0.5, 0.0, 0.05)))
+    fake.arm.set_tool_position(np.array((0.5, 0.0, 0.05)))
     return Task(Load(fake.cell.classes["cube"]))
 
 
-@pytest.mark.parametrize(
-    ("goal", "text"),
-    [
-        (Goal((0.5, 0.2, -0.01)), "tool 0.010 m into the table, with the tool at (0.500, 0.200, -0.010) m"),
-        (Goal((0.5, 0.2, -0.01), guarded_length=0.05, guarded_speed=0.05), "tool 0.010 m into the table, "),
-        (Goal((0.24, -0.48, 0.002)), "tool 0.003 m into red_bin, with the tool at (0.240, -0.480, 0.002) m"),
-        (Goal((0.1175, -0.48, 0.03)), "tool 0.009 m into red_bin, "),
-    ],
-    ids=["table", "table, guarded", "floor of a bin", "wall of a bin"],
-)
-def test_the_tool_enters_neither_table_nor_bins(fake: FakeCell, goal: Goal, text: str) -> None:
-    with pytest.raises(Blocked) as raised:
-        motion_to(fake, goal)
-    assert str(raised.value).startswith(f"the motion would bring the {text}")
+def test_it_goes_up_across_and_down_and_the_last_part_slowly(fake: FakeCell) -> None:
+    move(fake, Goal((0.4, -0.2, 0.05)))
+    qs, places = move(fake, BESIDE)
+    assert places[-1] == pytest.approx(BESIDE.position)
+    across = np.hypot(*(places[:, :2] - [0.4, -0.2]).T) > 0.005
+    beside = np.hypot(*(places[:, :2] - [0.5, 0.2]).T) > 0.005
+    assert places[across & beside, 2].min() > 0.12, "above the walls"
+    joint_speeds = np.abs(np.diff(qs, axis=0)).max(axis=1) / STEP
+    assert joint_speeds.max() == pytest.approx(JOINT_SPEED)
+    is_guarded = places[1:, 2] < 0.05 - 1e-3
+    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / STEP
+    assert speeds[is_guarded][:-1] == pytest.approx(0.05, rel=0.05)
+
+
+def test_a_named_pose_is_reached_on_a_straight_line_of_the_joints(fake: FakeCell) -> None:
+    start = fake.arm.q
+    qs, _ = move(fake, "aside")
+    assert qs[-1] == pytest.approx(fake.arm.poses["aside"])
+    shares = (qs - start)[:, 0] / (qs[-1] - start)[0]
+    assert qs == pytest.approx(start + shares[:, None] * (qs[-1] - start))
+
+
+def test_the_tool_turns_as_the_goal_says(fake: FakeCell) -> None:
+    move(fake, Goal((0.5, 0.0, 0.1), yaw=math.pi / 2))
+    assert fake.arm.tool_pose.rotation[:, 0] == pytest.approx([0, -1, 0], abs=1e-9)
+
+
+def test_a_plan_takes_its_time_unless_it_was_asked_for_before(fake: FakeCell) -> None:
+    fake.arm.start(plan_motion(fake, "aside"))
+    fake.arm.plan_ahead(BESIDE)
+    destination = fake.arm.destination
+    while not fake.arm.at_rest:
+        fake.advance()
+    assert destination == pytest.approx(fake.arm.tool_pose.position)
+    assert fake.arm.plan(BESIDE).ready
+    planning, before = fake.arm.plan(BESIDE), fake.cell.clock.now
+    while not planning.ready:
+        fake.advance()
+    assert fake.cell.clock.now - before == pytest.approx(LATENCY, abs=STEP), "a plan is used once"
 
 
 @pytest.mark.parametrize(
-    ("goal", "text"),
+    ("goal", "is_loaded", "message"),
     [
-        (Goal((0.5, 0.0, 0.02)), "0.030 m into the table, with the tool at (0.500, 0.000, 0.020) m"),
-        (Goal((0.24, -0.48, 0.05)), "0.005 m into red_bin, with the tool at (0.240, -0.480, 0.050) m"),
-        (Goal((0.15, -0.48, 0.06)), "0.005 m into red_bin, "),
+        (Goal((0.5, 0.2, -0.01)), False, "the table, with the tool at"),
+        (Goal((0.5, 0.2, -0.01), guarded_length=0.05, guarded_speed=0.05), False, "the table"),
+        (Goal((0.24, -0.48, 0.002)), False, "the floor of red_bin"),
+        (Goal((0.1175, -0.48, 0.03)), False, "red_bin"),
+        (Goal((0.5, 0.0, 0.02)), True, "the table"),
+        (Goal((0.15, -0.48, 0.06)), True, "red_bin"),
     ],
-    ids=["table", "floor of a bin", "wall of a bin"],
+    ids=["table", "table, guarded", "floor of a bin", "wall of a bin", "load, table", "load, wall of a bin"],
 )
-def test_a_load_enters_neither_table_nor_bins(fake: FakeCell, goal: Goal, text: str) -> None:
-    task = hold_cube(fake)
-    with pytest.raises(Blocked) as raised:
-        motion_to(fake, goal, task)
-    assert str(raised.value).startswith(f"the motion would bring the held cube {text}")
+def test_neither_tool_nor_load_enters_table_or_bins(
+    fake: FakeCell, goal: Goal, is_loaded: bool, message: str
+) -> None:
+    task = hold_cube(fake) if is_loaded else Task()
+    with pytest.raises(Blocked, match=rf"too near to {message}"):
+        plan_motion(fake, goal, task)
+
+
+def test_it_goes_over_a_known_obstacle_or_not_at_all(fake: FakeCell) -> None:
+    _, places = move(fake, "aside")
+    x, y, _ = places[len(places) // 2]
+    low, high = (Task(obstacles=(Obstacle(x, y, 0.03, top, "pole-1"),)) for top in (0.27, 0.6))
+    _, over = move(fake, "home", low)
+    assert over[:, 2].max() > 0.3 > places[:, 2].max()
+    with pytest.raises(Blocked, match="pole-1"):
+        plan_motion(fake, "aside", high)
 
 
 def test_a_load_may_lie_on_the_table_and_on_the_floor_of_a_bin(fake: FakeCell) -> None:
     task = hold_cube(fake)
     for place in ((0.5, 0.0, 0.1), (0.5, 0.0, 0.05), (0.24, -0.48, 0.05 + BIN_THICKNESS)):
-        assert go(fake, Goal(place), task)[-1] == pytest.approx(place)
+        _, places = move(fake, Goal(place), task)
+        assert places[-1] == pytest.approx(place)
+        held = fake.world.held_object
+        assert held is not None
+        assert held.position == pytest.approx(np.subtract(place, (0.0, 0.0, 0.025)))
 
 
-def test_what_is_pressed_into_the_table_can_be_lifted_and_not_be_pressed_deeper(fake: FakeCell) -> None:
-    task = hold_cube(fake)
-    fake.arm.set_tool_pose(make_tool_down_pose((0.5, 0.0, 0.045)))
-    with pytest.raises(Blocked, match=r"the held cube 0\.006 m into the table"):
-        motion_to(fake, Goal((0.5, 0.0, 0.044)), task)
-    assert go(fake, Goal((0.5, 0.0, 0.1)), task)[-1, 2] == pytest.approx(0.1)
-
-
-def test_a_load_that_the_plan_did_not_know_of_stops_the_arm_where_it_touches(fake: FakeCell) -> None:
-    hold_cube(fake)
-    places = go(fake, Goal((0.5, 0.0, 0.02)))
-    assert fake.arm.collision is not None
-    assert fake.arm.collision.startswith(
-        "the held cube ran into the table, with the tool at (0.500, 0.000, 0.04"
-    )
-    assert places[:, 2].min() == pytest.approx(0.05, abs=MAX_TOOL_SPEED * STEP)
-    assert places[:, 2].min() >= 0.05
-    assert fake.arm.commands == ["start", "stop"]
-    go(fake, Goal((0.5, 0.0, 0.1)))
-    assert fake.arm.collision is None
-
-
-def test_it_goes_to_a_named_pose_straight_or_else_over_the_wall(fake: FakeCell) -> None:
-    aside = fake.arm.poses["aside"].position
-    straight = go(fake, "aside")
-    way = (aside - straight[0]) / np.linalg.norm(aside - straight[0])
-    assert np.linalg.norm(np.cross(straight - straight[0], way), axis=1).max() < 1e-9
-    task = hold_cube(fake)
-    go(fake, Goal((0.3, 0.4, 0.065)), task)
-    places = go(fake, "aside", task)
-    beside = np.hypot(*(places[:, :2] - [0.3, 0.4]).T) > 1e-9
-    assert places[beside, 2].min() == pytest.approx(0.16, abs=1e-3)
-    assert np.allclose(places[-1], aside)
-    assert np.allclose(fake.arm.tool_pose.rotation, fake.arm.poses["aside"].rotation)
+def test_a_goal_out_of_reach_is_unreachable(fake: FakeCell) -> None:
+    far = Goal((0.8, 0.4, 0.1))
+    with pytest.raises(Unreachable, match="beyond the reach"):
+        plan_motion(fake, far)
+    assert "beyond the reach" in fake.arm.describe_unreachable(far)
+    assert fake.arm.describe_unreachable(BESIDE) == ""
 
 
 def test_a_motion_that_runs_into_something_ends_half_way_and_the_next_does_not(fake: FakeCell) -> None:
-    start = fake.arm.tool_pose.position
+    start = fake.arm.q
     fake.arm.next_obstacle = "a hand"
-    places = go(fake, "aside")
-    aside = fake.arm.poses["aside"].position
-    assert np.linalg.norm(places[-1] - start) == pytest.approx(np.linalg.norm(aside - start) / 2, rel=0.05)
-    assert fake.arm.collision == "a hand"
-    assert np.allclose(fake.arm.destination, places[-1]), "where it stands now"
-    assert np.allclose(go(fake, "aside")[-1], aside)
+    qs, places = move(fake, "aside")
+    assert qs[-1] == pytest.approx((start + fake.arm.poses["aside"]) / 2, abs=0.02)
+    assert (fake.arm.collision, fake.arm.contact_point) == ("a hand", places[-1].tolist())
+    assert fake.arm.destination == pytest.approx(places[-1])
+    qs, _ = move(fake, "aside")
+    assert qs[-1] == pytest.approx(fake.arm.poses["aside"])
     assert fake.arm.collision is None
 
 
@@ -183,9 +150,12 @@ def test_it_follows_one_motion_at_a_time_and_none_of_another_arm(fake: FakeCell)
     class Hop:
         duration = 1.0
 
-    with pytest.raises(Fault, match="the fake arm follows its own planned motions, not a Hop"):
+    with pytest.raises(Fault, match="follows its own planned motions, not a Hop"):
         fake.arm.start(Hop())
-    motion = motion_to(fake, "aside")
+    motion = plan_motion(fake, "aside")
     fake.arm.start(motion)
-    with pytest.raises(Fault, match="the arm was started while it moves"):
+    with pytest.raises(Fault, match="started while it moves"):
         fake.arm.start(motion)
+    fake.arm.stop()
+    fake.arm.stop_after_collision("not while it rests")
+    assert (fake.arm.commands, fake.arm.collision) == (["start", "stop"], None)

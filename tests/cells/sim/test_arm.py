@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from rig import Rig
 
-from executive.cell.arm import Goal, Motion, Task
-from executive.cell.objects import Obstacle
-from executive.errors import Fault, Unreachable
-from executive.events import MotionPlanned
+from executive.cell.arm import Goal, Motion
+from executive.errors import Fault
 from executive.motion.braking import RETREAT_TIME
 
 OVER = Goal((0.5, 0.1, 0.15))
@@ -28,17 +26,6 @@ def test_it_follows_a_motion_to_a_hundredth_of_a_degree(rig: Rig) -> None:
     assert rig.arm.at_rest
     assert rig.arm.collision is None
     assert np.allclose(rig.arm.tool_pose.position, OVER.position, atol=1e-4)
-
-
-def test_a_plan_takes_time_on_the_clock_and_is_recorded(rig: Rig) -> None:
-    planning = rig.arm.plan(OVER)
-    waited = 0
-    while not planning.ready:
-        rig.step()
-        waited += 1
-    assert waited == round(rig.config.motion.planning_time * 240) == 24
-    duration = round(planning.result().duration, 4)
-    assert rig.events == [MotionPlanned(False, 0.1, duration)]
 
 
 def test_a_motion_planned_ahead_is_known_at_once_and_begins_where_the_running_one_ends(rig: Rig) -> None:
@@ -58,38 +45,6 @@ def test_a_motion_planned_ahead_is_known_at_once_and_begins_where_the_running_on
     assert np.allclose(rig.arm.tool_pose.position, BESIDE.position, atol=1e-4)
 
 
-def test_a_motion_planned_ahead_too_late_is_waited_for_as_long_as_it_takes(rig: Rig) -> None:
-    rig.arm.start(rig.planned(OVER))
-    rig.run()
-    rig.arm.plan_ahead("home")
-    rig.step(4)
-    planning = rig.arm.plan("home")
-    assert not planning.ready
-    rig.step(20)
-    assert planning.ready
-    assert rig.events[-1].delay == pytest.approx(20 / 240, abs=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("goal", "task"),
-    [
-        (OVER, Task()),
-        (Goal(BESIDE.position, yaw=0.0), Task()),
-        ("home", Task()),
-        (BESIDE, Task(obstacles=(Obstacle(0.6, 0.2, 0.03, 0.05, "cube-1"),))),
-    ],
-    ids=["another place", "another yaw", "a pose", "other surroundings"],
-)
-def test_what_was_planned_ahead_answers_no_other_question(rig: Rig, goal: Goal | str, task: Task) -> None:
-    rig.arm.plan_ahead(BESIDE)
-    rig.step(20)
-    planning = rig.arm.plan(goal, task)
-    assert not planning.ready
-    rig.step(24)
-    assert planning.ready
-    assert rig.events[-1].planned_ahead is False
-
-
 def test_what_was_planned_ahead_is_of_no_use_once_the_arm_was_stopped_on_its_way(rig: Rig) -> None:
     rig.arm.start(rig.planned(OVER))
     rig.step(24)
@@ -101,26 +56,6 @@ def test_what_was_planned_ahead_is_of_no_use_once_the_arm_was_stopped_on_its_way
     assert not planning.ready
     rig.step(12)
     assert np.allclose(planning.result().start, rig.arm.q, atol=1e-4)
-
-
-def test_its_destination_is_where_the_running_motion_ends_or_where_it_stands(rig: Rig) -> None:
-    assert np.allclose(rig.arm.destination, rig.arm.tool_pose.position, atol=1e-4)
-    rig.arm.start(rig.planned(OVER))
-    rig.step(30)
-    assert rig.arm.destination == pytest.approx(OVER.position, abs=1e-9)
-    rig.arm.stop()
-    rig.run()
-    assert np.allclose(rig.arm.destination, rig.arm.tool_pose.position, atol=1e-4)
-
-
-def test_what_cannot_be_reached_is_said_by_the_result_in_its_time(rig: Rig) -> None:
-    planning = rig.arm.plan(Goal((0.9, 0.0, 0.114)))
-    assert not planning.ready
-    rig.step(24)
-    assert planning.ready
-    with pytest.raises(Unreachable, match=r"the tool cannot reach \(0\.900, 0\.000, 0\.114\) m"):
-        planning.result()
-    assert rig.events[-1].duration == 0.0
 
 
 def test_an_unknown_pose_is_a_fault_that_lists_the_known_ones(rig: Rig) -> None:
@@ -186,18 +121,3 @@ def test_its_tool_velocity_is_how_far_the_tool_gets_in_a_control_step(rig: Rig) 
     assert fastest > 0.3
     rig.step(30)
     assert rig.arm.tool_velocity == pytest.approx(np.zeros(3), abs=1e-3)
-
-
-def test_a_thread_plans_the_motion_that_the_planner_returns_directly_and_ends_with_the_arm(rig: Rig) -> None:
-    task = Task(obstacles=(Obstacle(0.6, 0.2, 0.03, 0.05, "cube-1"),))
-    planning = rig.arm.plan(OVER, task)
-    (worker,) = rig.arm._worker._threads
-    rig.step(24)
-    assert planning.ready
-    direct = rig.planner.plan(rig.arm._commanded_q, OVER, task)
-    assert np.array_equal(planning.result().samples.q, direct.samples.q)
-    running, waiting = rig.arm.plan(BESIDE), rig.arm.plan("home")
-    rig.arm.close()
-    assert not worker.is_alive()
-    assert running.future.done()
-    assert waiting.future.done()

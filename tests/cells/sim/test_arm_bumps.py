@@ -73,16 +73,6 @@ def test_an_object_in_the_way_of_the_tool_makes_the_arm_brake_along_its_path(rig
     assert rig.arm.tool_pose.position == pytest.approx(RIGHT.position, abs=1e-4)
 
 
-def test_it_counts_on_the_guarded_part_of_a_motion_as_well(rig: Rig) -> None:
-    """What the tool is meant to touch there, the wrist is not."""
-    rig.go(LEFT)
-    motion = rig.planned(LONG_DESCENT)
-    under_the_flange = np.add(on_the_way_down(rig, motion), (0, -0.045, rig.config.tool.length - 0.025))
-    float_at(rig, "cube", under_the_flange, mass=1.0)
-    said = bump(rig, motion, earliest=motion.guarded_start_time)
-    assert re.match(r"link 7 ran into a cube, with the tool at", said)
-
-
 def test_what_the_held_object_runs_into_counts_but_neither_the_tool_nor_the_table_it_lay_on(rig: Rig) -> None:
     held = rig.add("cube", 0.5, 0.1)
     rig.step(60)

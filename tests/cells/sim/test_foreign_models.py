@@ -124,12 +124,9 @@ def test_links_joined_by_fixed_joints_are_one_object(shape: str, tmp_path: Path)
     ("parts", "key", "reason"),
     [
         ({"inertial": ""}, "urdf", "a mass of 0 kg"),
-        ({"inertial": INERTIAL.replace("0.1", "-1")}, "urdf", "a mass of -1 kg"),
         ({"inertial": AWAY + INERTIAL}, "urdf", "centre of mass at .* outside of its visual"),
         ({"collision": '<box size="0.05 0.05 0.1"/>'}, "urdf", r"from 0\.025 to 0\.075 m, not 0 to 0\.05"),
-        ({"collision": '<box size="0.03 0.05 0.05"/>'}, "urdf", r"differs by 0\.010 m"),
         ({"visual": '<box size="0.05 0.05 0"/>'}, "urdf", r'size="0\.05 0\.05 0" in a <box>'),
-        ({"visual": '<plane normal="0 0 1"/>'}, "urdf", "geometry <plane>"),
         ({"visual": '<mesh filename="p.stl" scale="1000 1000 1000"/>'}, "height", "height of 50"),
         (
             {"inertial": f"{INERTIAL}</inertial></link><link name='k'><inertial>{INERTIAL}"},

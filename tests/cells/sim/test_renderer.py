@@ -58,14 +58,6 @@ def test_an_image_with_stored_immobile_bodies_is_equal_to_an_image_of_all_bodies
     assert all(is_equal(renderer.render(), after) for renderer in renderers)
 
 
-def test_immobile_bodies_are_rendered_only_once(world: World) -> None:
-    renderer = Renderer(world)
-    first = renderer.render()
-    client, far_away = world.client, [9, 9, 9]
-    client.resetBasePositionAndOrientation(world.table, far_away, [0, 0, 0, 1])
-    assert is_equal(renderer.render(), first)
-
-
 def test_a_moved_camera_gets_a_new_image_of_the_immobile_bodies(world: World) -> None:
     renderer = Renderer(world)
     first = renderer.render()

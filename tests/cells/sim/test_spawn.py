@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cell.layout import compute_travel_height
-from executive.cell.workcell import CellOptions
-from executive.cells.fake.cell import SilentOperator
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.spawn import build_initial_world, derive_seeds, spawn_objects
+from executive.cells.sim.spawn import derive_seeds, spawn_objects
 from executive.cells.sim.world import World
 from executive.errors import InputError
-from executive.events import discard_event
-from executive.testing.oracle import make_oracle_kind
 
 Build = Callable[[CellConfig], World]
 
@@ -98,26 +92,6 @@ def test_objects_stand_still_apart_and_inside_the_workspace(
 def test_too_many_objects_are_refused_with_what_to_change(build: Build, overhead: CellConfig) -> None:
     with pytest.raises(InputError, match=r"100 objects found no room .* ask for fewer or widen table\.x"):
         spawn_objects(build(with_stacks(overhead, 0.0, 100)), 1)
-
-
-def test_a_load_travels_over_stacks(overhead: CellConfig) -> None:
-    stacks = with_stacks(overhead, 0.3)
-    tallest = max(kind.height for kind in overhead.objects.values())
-    over_stack = compute_travel_height(stacks) - tallest - overhead.motion.clearance
-    assert over_stack == pytest.approx(2 * tallest)
-
-
-def test_the_first_world_is_the_one_that_a_cell_of_the_same_seed_begins_with(overhead: CellConfig) -> None:
-    options = CellOptions(SilentOperator(), cell_folder=Path("."))
-    cell = make_oracle_kind()(overhead, seed=9, routes={}, emit=discard_event, options=options)
-    world = build_initial_world(overhead, 9)
-    assert world.labels == cell._world.labels
-    assert world.rest_positions.keys() == world.labels.keys()
-    for body in world.labels:
-        one, other = (each.client.getBasePositionAndOrientation(body) for each in (world, cell._world))
-        assert one == other
-    cell.close()
-    world.close()
 
 
 def test_the_parts_draw_from_seeds_of_their_own() -> None:

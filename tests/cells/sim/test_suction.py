@@ -74,26 +74,6 @@ def test_a_tilted_face_costs_tilt_and_no_gap(client: BulletClient, angle: float)
     assert seal.gap == pytest.approx(0, abs=2e-5)
 
 
-def test_the_rays_look_through_the_tool_they_start_in(client: BulletClient) -> None:
-    body = box(client, (0, 0, -0.025), 0.025)
-    around_the_lip = box(client, (0, 0, 0.0515), 0.05)
-    seal = measure_contact(client, make_tool_down_pose([0, 0, 0.0015]), {body}, 0.006, REACH)
-    assert seal is not None and seal.body == body != around_the_lip
-    assert seal.distance == pytest.approx(0.0015, abs=1e-5)
-    assert seal.gap == pytest.approx(0, abs=1e-5)
-
-
-def test_two_objects_under_one_cup_are_no_seal(client: BulletClient) -> None:
-    bodies = {box(client, (-0.0255, 0, -0.025), 0.025), box(client, (0.0255, 0, -0.025), 0.025)}
-    seal = measure_contact(client, make_tool_down_pose([0.001, 0, 0.001]), bodies, 0.006, REACH)
-    assert seal is not None and math.isinf(seal.gap)
-
-
-def test_a_surface_out_of_reach_bears_nothing() -> None:
-    assert compute_breakaway_force(CupContact(1, REACH - 1e-6, 0.0, 0.0), TOOL) == TOOL.force
-    assert compute_breakaway_force(CupContact(1, REACH + 1e-6, 0.0, 0.0), TOOL) == 0
-
-
 def test_half_the_gap_and_half_the_tilt_leave_a_quarter_of_the_force() -> None:
     seal = CupContact(1, 0.0, TOOL.gap / 2, math.radians(TOOL.tilt_deg) / 2)
     assert compute_breakaway_force(seal, TOOL) == pytest.approx(TOOL.force / 4)

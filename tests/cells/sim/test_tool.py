@@ -87,21 +87,6 @@ def test_the_lip_feels_a_surface_within_a_millimetre(bench: Bench, height: float
     assert bench.tool.touching is touching
 
 
-def test_the_lip_feels_the_table_too(bench: Bench) -> None:
-    bench.put(0.0007 - bench.top, dx=0.09)
-    assert bench.tool.touching
-    bench.tool.close()
-    assert not bench.tool.holding
-
-
-def test_the_shaft_of_the_tool_beside_an_object_is_no_touch_of_the_lip(bench: Bench) -> None:
-    bench.put(-0.03, dx=CUBE / 2 + 0.0125)
-    near = bench.world.client.getClosestPoints(
-        bench.world.arm, bench.body, 0.001, linkIndexA=bench.world.tool_index
-    )
-    assert near and not bench.tool.touching
-
-
 def test_a_vacuum_already_on_seals_on_what_comes_within_reach(bench: Bench) -> None:
     bench.put(0.01)
     bench.tool.close()
@@ -137,13 +122,6 @@ def test_the_gauge_tells_what_the_seal_bears_until_nothing_is_held(bench: Bench)
     assert bench.tool.holding_force == force
     bench.steps(60, pull=1.05 * force - weight)
     assert (bench.tool.holding, bench.tool.holding_force) == (False, 0.0)
-
-
-def test_a_blow_of_a_single_step_does_not_break_the_seal(bench: Bench) -> None:
-    bench.hang()
-    bench.steps(1, pull=2 * bench.config.force)
-    bench.steps(30)
-    assert bench.tool.holding
 
 
 def test_a_seal_that_gave_way_forms_again_only_after_the_vacuum_was_off_or_the_cup_clear(
@@ -188,14 +166,6 @@ def test_the_load_of_a_hanging_object_is_its_weight_and_noise_of_the_declared_si
     bench.world.close()
 
 
-def test_the_load_of_an_object_that_lies_on_the_table_is_not_its_weight(bench: Bench) -> None:
-    bench.put(0.0012)
-    bench.tool.close()
-    bench.steps(60)
-    assert bench.tool.holding
-    assert bench.tool.load < 0.5 * 0.1 * GRAVITY
-
-
 def test_the_noise_of_the_load_depends_on_the_seed_and_the_step_and_not_on_the_number_of_readings(
     bench: Bench,
 ) -> None:
@@ -205,14 +175,3 @@ def test_the_noise_of_the_load_depends_on_the_seed_and_the_step_and_not_on_the_n
     assert other.load != first
     bench.steps(1)
     assert bench.tool.load != first
-
-
-def test_the_load_contains_the_inertia_of_an_object_that_is_lifted(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bench.hang()
-    loads, advance = [], bench.tool.advance
-    monkeypatch.setattr(bench.tool, "advance", lambda: (advance(), loads.append(bench.tool.load)))
-    bench.raise_by(0.05, steps=60)
-    assert max(loads) > 0.1 * GRAVITY + 4 * bench.tool.load_std
-    assert min(loads) < 0.1 * GRAVITY - 4 * bench.tool.load_std

@@ -7,7 +7,7 @@ import pytest
 
 from executive.cell.config import CellConfig
 from executive.cells.sim.world import World, name_load
-from executive.geometry import Pose, make_tool_down_pose, rotate_about_z
+from executive.geometry import Pose
 
 Build = Callable[[CellConfig], World]
 
@@ -19,27 +19,6 @@ def test_the_table_top_is_at_height_zero_and_the_bin_floors_just_above(
     hits = world.client.rayTestBatch([[0.5, 0, 1], [0.2, 0.44, 1]], [[0.5, 0, -1], [0.2, 0.44, -1]])
     assert [hit[0] for hit in hits] == [world.table, world.bin_bodies["blue_bin"]]
     assert [hit[3][2] for hit in hits] == pytest.approx([0.0, 0.005], abs=1e-6)
-
-
-def test_the_tool_ends_where_the_tool_centre_point_is(build: Build, wrist: CellConfig) -> None:
-    world = build(wrist)
-    world.set_joint_positions(np.radians(wrist.arm.poses_deg["scan"]))
-    X_WT = world.get_tool_pose()
-    assert X_WT.rotation == pytest.approx(make_tool_down_pose([0, 0, 0]).rotation, abs=1e-5)
-    low, high = world.client.getAABB(world.arm, world.tool_index)
-    assert low[2] == pytest.approx(X_WT.position[2], abs=2e-3)
-    assert high[2] - low[2] == pytest.approx(wrist.tool.length, abs=5e-3)
-
-
-def test_an_object_is_where_it_was_put_and_can_be_put_elsewhere(build: Build, overhead: CellConfig) -> None:
-    world = build(overhead)
-    first, second = Pose(rotate_about_z(0.7), np.array([0.5, 0.1, 0.2])), Pose.of([0.4, 0, 0.3])
-    body = world.add_object("duck", first, (1, 1, 1))
-    assert world.get_object_pose(body).to_rounded_list() == pytest.approx(first.to_rounded_list(), abs=1e-6)
-    world.place_object(body, second)
-    assert world.get_object_pose(body).to_rounded_list() == pytest.approx(second.to_rounded_list(), abs=1e-6)
-    world.remove_object(body)
-    assert world.labels == {}
 
 
 def test_a_ray_ends_at_the_first_thing_but_the_arm(build: Build, overhead: CellConfig) -> None:
