@@ -20,7 +20,7 @@ from executive.cell.frame import Box
 from executive.errors import MAX_QUOTATION_LENGTH, InputError
 from executive.geometry import Array
 from executive.training import dataset_layout
-from executive.training.labelled_image import LabelledImage
+from executive.training.dataset import LabelledImage
 
 MAX_OBJECT_COUNT = 1_000
 """Maximum number of labelled objects in an image; RF-DETR detects at most 300 (its number of queries)."""

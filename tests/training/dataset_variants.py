@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 from PIL import Image
 
-from executive.training.labelled_image import LabelledImage
+from executive.training.dataset import LabelledImage
 
 CLASSES = ("cube", "duck", "sphere")
 TURNS = {1: 0, 3: 2, 6: 1, 8: 3}

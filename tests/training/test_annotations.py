@@ -14,7 +14,7 @@ from PIL import Image
 from executive.cli.main import main
 from executive.errors import InputError
 from executive.training import train
-from executive.training.labelled_image import LabelledImage
+from executive.training.dataset import LabelledImage
 from executive.training.samples import LabelledDataset
 from tests.training.dataset_variants import (
     CLASSES,

@@ -9,7 +9,7 @@ import pytest
 from executive.cells.sim.scene_file import DECLARED_SCENE
 from executive.errors import InputError
 from executive.mission.parse.cell_file import load_cell
-from executive.training.scene_renderer import MAX_ATTEMPTS, SceneRenderer
+from executive.training.rendering import MAX_ATTEMPTS, SceneRenderer
 
 
 @pytest.mark.parametrize(

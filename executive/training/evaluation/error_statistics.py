@@ -13,9 +13,9 @@ from executive.cell.frame import Frame
 from executive.cell.protocols import Localizer
 from executive.errors import NoDepth
 from executive.perception.camera_model import intersect_plane
+from executive.training.dataset import LabelledImage
 from executive.training.evaluation.matching import MIN_IOU, BoxMatch, compute_ious, is_occluded, split_matches
 from executive.training.evaluation.metrics import NO_OBJECT, ClassMetrics, CountedRate, MeasuredErrorRates
-from executive.training.labelled_image import LabelledImage
 
 
 class ErrorStatistics:

@@ -17,12 +17,12 @@ from executive.cell.frame import Box
 from executive.cell.protocols import Localizer
 from executive.errors import Unavailable
 from executive.perception.envelope.frame_statistics import FrameRange, compute_frame_statistics
+from executive.training.dataset import LabelledImage
 from executive.training.evaluation.cell_detector import CellDetector
 from executive.training.evaluation.error_statistics import ErrorStatistics, RepeatedErrors
 from executive.training.evaluation.matching import BoxMatch, is_ignored, match_detections
 from executive.training.evaluation.metrics import Distribution, Evaluation
 from executive.training.evaluation.worst_mistakes import WorstMistakes
-from executive.training.labelled_image import LabelledImage
 
 MIN_CONFIDENCE = 0.01
 """Minimum confidence of the detections of a model file; the average precision needs low confidences."""

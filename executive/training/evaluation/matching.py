@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from executive.cell.detection import Detection
 from executive.cell.frame import Box
 from executive.geometry import Array
-from executive.training.labelled_image import LabelledImage
+from executive.training.dataset import LabelledImage
 
 MIN_OCCLUDING_IOU = 0.2
 """Minimum intersection over union (IoU) of the boxes of two objects that occlude each other."""

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from executive.cell.detection import Detection
 from executive.cell.frame import Box
+from executive.training.dataset import LabelledImage
 from executive.training.evaluation.matching import BoxMatch
-from executive.training.labelled_image import LabelledImage
 
 MAX_COLUMN_COUNT = 6
 """Maximum number of tiles in a row of the sheet."""

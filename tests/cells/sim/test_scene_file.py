@@ -32,7 +32,7 @@ from executive.geometry import Pose
 from executive.mission.findings import MissionError
 from executive.perception.camera_model import compute_calibration, project
 from executive.testing.oracle import TrueFrame, make_oracle_kind
-from executive.training.scene_renderer import SceneRenderer
+from executive.training.rendering import SceneRenderer
 
 Build = Callable[..., World]
 SEED = 3
