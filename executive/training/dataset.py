@@ -187,7 +187,7 @@ def _to_coco(entries: Sequence[DatasetEntry], classes: Sequence[str]) -> dict[st
             area = round((right - left) * (bottom - top), 3)
             ids = {"id": len(objects) + 1, "image_id": image_id, "category_id": classes.index(label)}
             objects.append({**ids, "bbox": box, "area": area, "iscrowd": 0, "segmentation": []})
-    categories = [{"id": i, "name": name, "supercategory": "object"} for i, name in enumerate(classes)]
+    categories = [{"id": i, "name": name, "supercategory": name} for i, name in enumerate(classes)]
     return {"info": {}, "licenses": [], "categories": categories, "images": images, "annotations": objects}
 
 
