@@ -22,7 +22,7 @@ from executive.perception.localization import CellLocalizer
 from executive.record.atomic_file import write_atomically
 from executive.training.dataset import LabelledImage
 from executive.training.evaluation import evaluate
-from executive.training.evaluation.cell_detector import CellDetector
+from executive.training.evaluation.evaluate import CellDetector
 from executive.training.evaluation.metrics import NO_OBJECT, ClassMetrics, Evaluation
 from executive.training.evaluation.worst_mistakes import WorstMistakes
 from executive.training.rendering import generate_dataset, render_run_frames

@@ -12,7 +12,7 @@ import pytest
 from executive.errors import InputError
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.evaluation.metrics import Distribution, Evaluation
-from executive.training.model_card import read_epochs, render_card
+from executive.training.train import read_epochs, render_card
 from executive.training.train import Settings, choose_learning_rate, load_dataset, train
 
 

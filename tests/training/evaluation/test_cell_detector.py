@@ -12,7 +12,7 @@ from executive.cell.detection import Answer, Detection
 from executive.errors import Unavailable
 from executive.perception.detectors.views import list_regions
 from executive.training.evaluation import cell_detector
-from executive.training.evaluation.cell_detector import WHOLE_IMAGE_CAMERA, CellDetector
+from executive.training.evaluation.evaluate import WHOLE_IMAGE_CAMERA, CellDetector
 
 CONFIGS = {"eye": DetectorConfig(kind="embedded", threshold=0.6)}
 FOUND = tuple(Detection(label, 0.9, (1.0, 2.0, 3.0, 4.0)) for label in ("cube", "boat"))

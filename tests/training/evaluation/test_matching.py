@@ -11,7 +11,7 @@ import pytest
 from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.training.dataset import save_image
-from executive.training.evaluation.matching import is_ignored, match_detections
+from executive.training.evaluation.error_statistics import is_ignored, match_detections
 from executive.training.evaluation.worst_mistakes import (
     DETECTED_COLOUR,
     TRUE_COLOUR,
