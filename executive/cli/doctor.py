@@ -163,8 +163,8 @@ def check_renderer() -> Iterator[CheckResult]:
 
 def check_roboflow() -> Iterator[CheckResult]:
     """Check whether an API key is set, without showing the key, and whether Roboflow's server answers."""
-    from executive.perception.detectors.roboflow.key import KEY_VARIABLE, ApiKey
-    from executive.perception.detectors.roboflow.server_options import HOSTED_URL
+    from executive.perception.detectors.roboflow.detector import HOSTED_URL
+    from executive.perception.detectors.roboflow.inference_process import KEY_VARIABLE, ApiKey
 
     fix, is_set = "set it to use models that Roboflow hosts", ApiKey(os.environ).is_set
     yield _make_result(is_set, "key", f"{KEY_VARIABLE} is set", "note", f"{KEY_VARIABLE} is not set", fix)

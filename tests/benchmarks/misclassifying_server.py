@@ -18,7 +18,7 @@ from executive.cell.protocols import Clock, Request
 from executive.cli.options import runs_option, workers_option
 from executive.cli.progress import print_halt, show_progress
 from executive.perception.detectors.requests import ClosableDetector
-from executive.perception.envelope.rated_detectors import build_rated_detectors
+from executive.perception.envelope import build_rated_detectors
 from tests.benchmarks.ground_truth import FAULT, AuditedRun, FoundObject, run_audited
 from tests.benchmarks.report import Figures, limit_option, run_command, write_json
 

@@ -205,7 +205,7 @@ def test_everything_is_examined_whatever_fails(monkeypatch):
         raise InputError("the skill is broken; correct it")
 
     monkeypatch.setattr("executive.plugins.load_skills", fail)
-    monkeypatch.setitem(sys.modules, "executive.perception.detectors.roboflow.key", None)
+    monkeypatch.setitem(sys.modules, "executive.perception.detectors.roboflow.inference_process", None)
     found = shown(doctor.run_checks())
     assert [line.split(": ")[0].split(" ")[1] for line in found] == [
         "python", "display", "packages", "opencv", "view", "cluster", "train", "film",

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from executive.cli.main import main
 from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
-from executive.perception.envelope.measurement import StoredErrorRates, read_measurements
+from executive.perception.envelope import StoredErrorRates, read_measurements
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 
 

@@ -16,9 +16,8 @@ from executive.cell.protocols import Clock
 from executive.cells.fake.world import FakeWorld
 from executive.errors import Unavailable
 from executive.geometry import Pose
-from executive.perception.camera_model import compute_hull_mask
+from executive.perception.camera_model import MountedCamera, compute_hull_mask
 from executive.perception.detectors.requests import PendingSearch
-from executive.perception.mounted_camera import MountedCamera
 
 DEFAULT_CONFIDENCE = 0.9
 """Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""

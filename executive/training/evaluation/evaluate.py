@@ -19,7 +19,7 @@ from executive.cell.frame import Box, Frame
 from executive.cell.protocols import Localizer
 from executive.errors import Unavailable
 from executive.perception.detectors.detector_registry import build_detectors
-from executive.perception.envelope.frame_statistics import FrameRange, compute_frame_statistics
+from executive.perception.envelope import FrameRange, compute_frame_statistics
 from executive.training.dataset import LabelledImage
 from executive.training.evaluation.error_statistics import (
     BoxMatch,

@@ -10,7 +10,7 @@ import pytest
 from plain_frames import frame_of
 
 from executive.cell.config import TableConfig
-from executive.perception.envelope.frame_statistics import (
+from executive.perception.envelope import (
     FrameRange,
     compute_frame_statistics,
 )

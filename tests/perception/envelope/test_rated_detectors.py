@@ -8,20 +8,18 @@ from plain_frames import frame_of
 from executive.cell.detection import ErrorRates, assume_rates
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.detectors.requests import PendingSearch
-from executive.perception.envelope.frame_statistics import FrameRange
-from executive.perception.envelope.measurement import (
+from executive.perception.envelope import (
+    DetectorEnvelope,
+    FrameRange,
     Measurement,
+    RatedDetector,
     StoredErrorRates,
     compute_fingerprint,
+    find_envelopes,
+    find_unmeasured_detectors,
     format_measurements,
     list_changes,
     read_measurements,
-)
-from executive.perception.envelope.rated_detectors import (
-    DetectorEnvelope,
-    RatedDetector,
-    find_envelopes,
-    find_unmeasured_detectors,
 )
 
 RATES = StoredErrorRates(

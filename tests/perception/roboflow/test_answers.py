@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 
 from executive.cell.detection import Detection
 from executive.perception.detectors.roboflow.answers import read_answer, read_output
-from executive.perception.detectors.roboflow.failure_messages import (
+from executive.perception.detectors.roboflow.detector import (
+    RoboflowOptions,
     describe_failure,
     describe_invalid_answer,
     describe_missed_deadline,
     shorten_to_line,
 )
-from executive.perception.detectors.roboflow.server_options import RoboflowOptions
 
 CUBE = {"x": 50.0, "y": 40.0, "width": 20, "height": 10.0, "confidence": 0.9, "class": "cube", "class_id": 0}
 

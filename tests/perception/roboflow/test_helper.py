@@ -19,8 +19,7 @@ import pytest
 
 from executive.errors import Fault, Unavailable
 from executive.perception.detectors.roboflow import inference_process as module
-from executive.perception.detectors.roboflow.inference_process import InferenceProcess, NoAnswer
-from executive.perception.detectors.roboflow.key import ApiKey
+from executive.perception.detectors.roboflow.inference_process import ApiKey, InferenceProcess, NoAnswer
 
 HERE = Path(__file__).parent
 SECRET = "SECRET1234567890"
@@ -164,7 +163,7 @@ ORPHANING = """
 import sys, time
 import numpy as np
 from executive.perception.detectors.roboflow.inference_process import InferenceProcess
-from executive.perception.detectors.roboflow.key import ApiKey
+from executive.perception.detectors.roboflow.inference_process import ApiKey
 
 helper = InferenceProcess({"url": sys.argv[1], "model_id": "a/1", "api": "v1", "confidence": 0.5}, ApiKey())
 print(helper._process.pid, flush=True)

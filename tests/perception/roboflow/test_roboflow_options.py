@@ -6,9 +6,8 @@ import pytest
 
 from executive.cell.config import DetectorConfig
 from executive.errors import InputError
-from executive.perception.detectors.roboflow.detector import RoboflowDetector
-from executive.perception.detectors.roboflow.key import ApiKey
-from executive.perception.detectors.roboflow.server_options import RoboflowOptions
+from executive.perception.detectors.roboflow.detector import RoboflowDetector, RoboflowOptions
+from executive.perception.detectors.roboflow.inference_process import ApiKey
 
 SECRET = "SECRET1234567890"
 

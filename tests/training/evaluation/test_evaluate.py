@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.errors import NoDepth
-from executive.perception.envelope.measurement import StoredErrorRates
+from executive.perception.envelope import StoredErrorRates
 from executive.training.evaluation.evaluate import evaluate
 from executive.training.evaluation.metrics import (
     ClassMetrics,
