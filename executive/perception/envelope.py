@@ -37,16 +37,12 @@ RELATIVE_TOLERANCE = 0.08
 """Minimum tolerance below and above the measured range of a statistic, as a fraction of the range limit."""
 
 
-FrameStatistics = Mapping[str, float]
-"""Statistics of the workspace in one frame by name (a field of `FrameRange`) [grey level, 0 to 255]."""
 MEASUREMENT_SUFFIX = ".measured.json"
 """Suffix of a measurement file, after the name of the cell."""
 MAX_FILE_SIZE = 1_000_000
 """Maximum size of a measurement file [byte]."""
 
 
-Fingerprint = Mapping[str, str]
-"""Declared properties of detector and cell that affect the error rates: text by name of the property."""
 FAKE_KIND = "fake"
 """Kind of cell whose detectors are not measured, because they read the true positions of the objects."""
 MEASUREMENT_MINUTES = 2
@@ -71,7 +67,7 @@ class FrameRange(Section):
     blue: tuple[float, float]
 
     @staticmethod
-    def compute(samples: Sequence[FrameStatistics]) -> FrameRange | None:
+    def compute(samples: Sequence[Mapping[str, float]]) -> FrameRange | None:
         """Return the ranges of the statistics of several frames; None if there are no frames."""
         if not samples:
             return None
@@ -79,7 +75,7 @@ class FrameRange(Section):
         ranges = {name: (round(min(column), 1), round(max(column), 1)) for name, column in values.items()}
         return FrameRange.model_validate(ranges)
 
-    def describe_difference(self, statistics: FrameStatistics) -> str:
+    def describe_difference(self, statistics: Mapping[str, float]) -> str:
         """Return a text with name, value and range of each statistic outside its range; "" if none."""
         differences = []
         for name, value in statistics.items():
@@ -89,7 +85,7 @@ class FrameRange(Section):
         return "; ".join(differences)
 
 
-def compute_frame_statistics(frame: Frame, cell: CellConfig) -> FrameStatistics | None:
+def compute_frame_statistics(frame: Frame, cell: CellConfig) -> Mapping[str, float] | None:
     """Return the statistics of the workspace; None if a corner is not in view or few pixels are visible.
 
     The corners may be out of the partial view of a camera, but a larger part of the image must then show the
@@ -215,7 +211,7 @@ def format_measurements(measurements: Iterable[Measurement], new: Measurement) -
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
 
 
-def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Fingerprint:
+def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Mapping[str, str]:
     """Return the fingerprint of a detector in its cell.
 
     The fingerprint contains weights and settings of the detector, the localization method, the classes and
@@ -239,7 +235,7 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Finger
     }
 
 
-def list_changes(measured: Fingerprint, current: Fingerprint) -> str:
+def list_changes(measured: Mapping[str, str], current: Mapping[str, str]) -> str:
     """Return the names of the properties that differ between two fingerprints; "" if none."""
     names = dict.fromkeys([*measured, *current])
     return ", ".join(name for name in names if measured.get(name) != current.get(name))

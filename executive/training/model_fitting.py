@@ -1,6 +1,6 @@
 """Fitting of the small RF-DETR with the trainer of RF-DETR.
 
-The training images are augmented by symmetries; CPUs with bfloat16 train in mixed precision.
+The training images are augmented by symmetries of the square.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import torch
 from lightning_utilities import apply_to_collection
 from pytorch_lightning.callbacks import LambdaCallback
 from rfdetr.training import RFDETRDataModule, RFDETRModelModule, build_trainer
-from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from executive.training.model import create_model, restore_model
 
@@ -77,7 +76,11 @@ def fit_model(
         tensorboard=False,
         seed=seed,
     )
-    model = MixedPrecisionModel(detector.model_config, config, is_mixed=not has_gpu and _has_bfloat16())
+    model = RFDETRModelModule(detector.model_config, config)
+    # Reference boxes have the data type of the encoder's features; bfloat16 would round them to whole pixels.
+    model.model.backbone[0].projector.register_forward_hook(
+        lambda _module, _inputs, output: apply_to_collection(output, torch.Tensor, torch.Tensor.float)
+    )
     data = SymmetryAugmentedData(detector.model_config, config)
     trainer = build_trainer(config, detector.model_config, accelerator="gpu" if has_gpu else "cpu")
     trainer.callbacks.append(
@@ -85,12 +88,6 @@ def fit_model(
     )
     trainer.fit(model, data)
     (out / "labels.txt").write_text("".join(f"{label}\n" for label in labels), encoding="utf-8")
-
-
-def _has_bfloat16() -> bool:
-    """Return True if this CPU multiplies bfloat16 matrices in hardware; an emulation would be slow."""
-    capabilities = torch.cpu.get_capabilities()
-    return bool(capabilities.get("avx512_bf16") or capabilities.get("amx_bf16"))
 
 
 class SymmetryAugmentedData(RFDETRDataModule):
@@ -111,40 +108,6 @@ class SymmetryAugmentedData(RFDETRDataModule):
         return samples, targets
 
 
-class MixedPrecisionModel(RFDETRModelModule):
-    """RF-DETR's training module with mixed precision on CPUs.
-
-    On CPUs with bfloat16, matrix products are 2.5 times as fast as in float32. Losses, matching and reference
-    boxes stay in float32, because the mantissa of bfloat16, eight bits, would round boxes to whole pixels.
-
-    Args:
-        model_config: RF-DETR's configuration of the model.
-        train_config: RF-DETR's configuration of the training.
-        is_mixed: True to train in mixed precision on the CPU, False for the training step of RF-DETR.
-    """
-
-    def __init__(self, model_config: Any, train_config: Any, is_mixed: bool) -> None:
-        super().__init__(model_config, train_config)
-        self._is_mixed = is_mixed
-        # Reference boxes have the data type of the encoder's features, and must stay in float32.
-        projector = self.model.backbone[0].projector
-        projector.register_forward_hook(lambda _module, _inputs, output: _to_float32(output))
-
-    def training_step(self, batch: tuple[Any, Any], batch_idx: int) -> Any:
-        """Return the loss of a batch."""
-        if not self._is_mixed:
-            return super().training_step(batch, batch_idx)
-        samples, targets = batch
-        # In bfloat16, the backward pass of the fused attention kernel is slower than plain matrix products.
-        with torch.autocast("cpu", torch.bfloat16), sdpa_kernel(SDPBackend.MATH):
-            outputs = self.model(samples, targets)
-        losses = self.criterion(_to_float32(outputs), targets)
-        weights = self.criterion.weight_dict
-        loss = torch.stack([losses[name] * weights[name] for name in losses if name in weights]).sum()
-        self.log("train/loss", loss, on_epoch=True, on_step=False, batch_size=len(targets))
-        return loss
-
-
 def transform_image(image: torch.Tensor, symmetry: int) -> torch.Tensor:
     """Return `image` `(..., N, N)`, transformed by the symmetry with the number `symmetry`, 0 to 7."""
     mirrored = image.flip(-1) if symmetry % 2 else image
@@ -160,10 +123,3 @@ def transform_boxes(boxes: torch.Tensor, symmetry: int) -> torch.Tensor:
         # A quarter turn anticlockwise moves the right edge of the image to the top.
         x, y, width, height = y, 1 - x, height, width
     return torch.stack((x, y, width, height), dim=-1)
-
-
-def _to_float32(value: Any) -> Any:
-    """Return a tensor, or a nested list or mapping of tensors, with all floating-point tensors as float32."""
-    return apply_to_collection(
-        value, torch.Tensor, lambda tensor: tensor.float() if tensor.is_floating_point() else tensor
-    )

@@ -9,7 +9,6 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
-from itertools import chain
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Annotated, Any, TypeVar
 
@@ -158,11 +157,6 @@ class Split:
         if path := _find_path([self.file.parent, *(self.root / folder for folder in folders)], name):
             return path
         raise InputError(f'{location}: "{name}" is not a file in {self.file.parent}')
-
-    def check_image(self, path: Path) -> None:
-        """Raise `InputError` if an image is not a regular file in the dataset."""
-        if not os.path.isfile(path) or has_outside_link(self.root, str(path.relative_to(self.root))):
-            raise InputError(f"{path} is not a file in {self.root}, or is a link to another folder")
 
 
 @dataclass
@@ -315,18 +309,18 @@ class LabelledDataset:
 
         content = read_class_file(self._source.file)
         names = dict(enumerate(content.names)) if isinstance(content.names, list) else content.names
-        rows_of_images: dict[Path, list[list[str]]] = {}
+        labels_of_images: dict[Path, tuple[Path | None, list[list[str]]]] = {}
         for path in sorted(set(self._source.images)):
             file = find_label_file(path)
             self.notes["images without a label file"] += file is None
             text = read_text(file, MAX_LABEL_FILE_SIZE) if file else ""
-            rows_of_images[path] = [words for line in text.splitlines() if (words := line.split())]
-        if content.kpt_shape is None and _may_have_keypoints(chain(*rows_of_images.values())):
+            labels_of_images[path] = file, [words for line in text.splitlines() if (words := line.split())]
+        all_rows = [words for _, rows in labels_of_images.values() for words in rows]
+        if content.kpt_shape is None and _may_have_keypoints(all_rows):
             remedy = "state kpt_shape in data.yaml: [number of keypoints, 2 or 3], or [0, 0] for polygons"
             raise InputError(f"{self._source.file}: the labels may be boxes with keypoints; {remedy}")
         pose_word_count = 5 + math.prod(content.kpt_shape or (0, 0))
-        for path, rows in rows_of_images.items():
-            file = find_label_file(path)
+        for path, (file, rows) in labels_of_images.items():
             lines = [" ".join(words[:5] if len(words) == pose_word_count else words) for words in rows]
             try:
                 detections = yolo_annotations_to_detections(lines, (1, 1), with_masks=False)
@@ -350,7 +344,9 @@ class LabelledDataset:
             corners: Left, top, right and bottom of each object `(N, 4)`, in an image with the stated size.
             stated_size: Width and height; (1, 1) for normalized boxes, 0 for the size of the image.
         """
-        self._source.check_image(path)
+        root = self._source.root
+        if not os.path.isfile(path) or has_outside_link(root, str(path.relative_to(root))):
+            raise InputError(f"{path} is not a file in {root}, or is a link to another folder")
         if len(labels) > MAX_OBJECT_COUNT:
             raise InputError(f"{path} has more than {MAX_OBJECT_COUNT} objects; divide the image")
         size, _ = read_image_header(path)

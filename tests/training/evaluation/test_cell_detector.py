@@ -11,7 +11,7 @@ from executive.cell.config import DetectorConfig
 from executive.cell.detection import Answer, Detection
 from executive.errors import Unavailable
 from executive.perception.detectors.views import list_regions
-from executive.training.evaluation import cell_detector
+from executive.training.evaluation import evaluate
 from executive.training.evaluation.evaluate import WHOLE_IMAGE_CAMERA, CellDetector
 
 CONFIGS = {"eye": DetectorConfig(kind="embedded", threshold=0.6)}
@@ -55,7 +55,7 @@ def build(monkeypatch):
             behind.eye = Delayed(camera, clock, answer)
             return vars(behind)
 
-        monkeypatch.setattr(cell_detector, "build_detectors", build_detectors)
+        monkeypatch.setattr(evaluate, "build_detectors", build_detectors)
         return CellDetector(CONFIGS, "eye", base=Path(), **options), behind.eye
 
     return build
