@@ -26,7 +26,7 @@ HEADER_HEIGHT = 34
 """Height of the header of the sheet [pixel]."""
 GAP = 10
 """Distance between two tiles [pixel]."""
-MAX_TEXT_LENGTH = 32
+MAX_TEXT_LENGTH = 36
 """Maximum number of characters of a line of a caption."""
 CROP_SCALE = 2.2
 """Side of the crop of the image, as a multiple of the longer side of the mistake's box."""

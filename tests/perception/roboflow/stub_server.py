@@ -7,7 +7,7 @@ import contextlib
 import json
 import socket
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
@@ -179,13 +179,3 @@ SPOILT: Mapping[str, Spoil] = {
     "strangers": lambda found, answer: [*found, *_all(**{"class": "banana"})(found, answer)],
 }
 """Faults of an answer that can be read."""
-
-
-def predictions(found: Sequence[Any]) -> Iterator[dict[str, Any]]:
-    """Yield `Detection`s in the server's form."""
-    for detection in found:
-        left, top, right, bottom = detection.box
-        yield {
-            "x": (left + right) / 2, "y": (top + bottom) / 2, "width": right - left, "height": bottom - top,
-            "confidence": detection.confidence, "class": detection.label, "class_id": 0, "detection_id": "1",
-        }  # fmt: skip
