@@ -70,13 +70,3 @@ def test_the_images_that_no_training_used_are_read_as_they_were_written(root):
 def test_what_cannot_be_written_or_read_is_explained(tmp_path):
     with pytest.raises(InputError, match='"voc" is unknown; use coco or yolo'):
         write_annotations(tmp_path, "voc", ENTRIES, CLASSES)
-    with pytest.raises(InputError, match="no labelled images"):
-        LabelledDataset(tmp_path)
-
-
-def test_a_damaged_image_is_named(root):
-    (damaged,) = (root / "valid").rglob("a.jpg")
-    dataset = LabelledDataset(root)
-    damaged.write_bytes(b"no picture")
-    with pytest.raises(InputError, match=r"a\.jpg"):
-        list(dataset)
