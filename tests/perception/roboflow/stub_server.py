@@ -17,8 +17,6 @@ import numpy as np
 MODEL = "shapes/1"
 WORKFLOW = "/acme/workflows/sorting"
 """Path of a workflow with the input `photo` and the output `boxes`."""
-DRIP = 0.05
-"""Time between two bytes of a slow answer [s]."""
 
 Spoil = Callable[[list[dict[str, Any]], dict[str, Any]], Any]
 """From what is there, and the answer around it, to the predictions that it says instead."""
@@ -104,8 +102,6 @@ class _Handler(BaseHTTPRequestHandler):
         elif fault == "stop":
             threading.Thread(target=self.stub.stop).start()
             self.stub.over.wait()
-        elif fault == "drip":
-            self._drip(json.dumps(self._messages({**answer, "predictions": found})).encode())
         elif fault.isdecimal():
             # A server may say anything: this one tells the key that it was given.
             key = self.headers.get("Authorization", "").removeprefix("Bearer ")
@@ -126,15 +122,6 @@ class _Handler(BaseHTTPRequestHandler):
         # A picture is larger than anything that the detector hands on.
         picture = {"type": "base64", "value": "A" * (2 << 20)}
         return {"outputs": [{"picture": picture, "boxes": boxes}], "profiler_trace": []}
-
-    def _drip(self, body: bytes) -> None:
-        self.send_response(200)
-        self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        for byte in body:
-            self.wfile.write(bytes([byte]))
-            if self.stub.over.wait(DRIP):
-                return
 
     def _json(self, answer: Any, status: int = 200) -> None:
         self._send(json.dumps(answer).encode(), "application/json", status)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from executive.cell.detection import Detection
 from executive.perception.detectors.roboflow.answers import read_answer, read_output
@@ -90,28 +88,6 @@ def test_the_output_of_a_workflow_is_read_in_every_form_also_of_crops(output):
 def test_an_oriented_box_becomes_the_box_around_it(angle, x, y):
     (found,) = read_answer(answer({**CUBE, "angle": angle}), (100, 80))
     assert found.box == pytest.approx((50 - x, 40 - y, 50 + x, 40 + y), abs=1e-2)
-
-
-NUMBERS = st.one_of(st.integers(), st.floats(), st.floats(-20, 120))
-SCALARS = st.one_of(st.none(), st.booleans(), st.text(max_size=3), NUMBERS)
-PREDICTIONS = st.fixed_dictionaries(
-    {key: st.one_of(NUMBERS, SCALARS) for key in ("x", "y", "width", "height")},
-    optional={"confidence": st.one_of(st.floats(0, 1), SCALARS), "class": st.one_of(st.text(), SCALARS)},
-)
-
-
-@settings(max_examples=30)
-@given(st.fixed_dictionaries({"predictions": st.one_of(st.lists(PREDICTIONS, max_size=3), SCALARS)}))
-def test_whatever_a_server_says_only_sound_boxes_get_in(said):
-    try:
-        found = read_output(said, (100, 80))
-    except ValueError:
-        return
-    for detection in found:
-        left, top, right, bottom = detection.box
-        assert 0 <= left <= right <= 100
-        assert 0 <= top <= bottom <= 80
-        assert 0 <= detection.confidence <= 1 <= len(detection.label)
 
 
 @pytest.mark.parametrize(
