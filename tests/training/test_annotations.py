@@ -105,12 +105,6 @@ def test_a_missing_split_is_not_replaced_by_other_images(tmp_path, samples, spli
         LabelledDataset(tmp_path, split)
 
 
-def test_images_of_equal_names_in_two_folders_are_different(tmp_path, samples):
-    for folder, part in (("cam1", samples[:1]), ("cam2", samples[1:])):
-        write_yolo(tmp_path, part, folder=f"images/val/{folder}", labels=f"labels/val/{folder}")
-    check_equal(LabelledDataset(tmp_path), samples)
-
-
 def test_boxes_are_clipped_and_ignored_boxes_are_resized_with_the_image(tmp_path, samples):
     write_coco(tmp_path, samples, factors=(2, 1), change=add([140, 100, 40, 40]))
     (tmp_path / "test/ignored.json").write_text(json.dumps({"a0.png": [[10, 10, 20, 20]]}))
