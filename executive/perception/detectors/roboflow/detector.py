@@ -1,7 +1,4 @@
-"""Detector that sends images to a Roboflow inference server: options, answers, and messages about failures.
-
-Each message about a failure names server, failure, and advice.
-"""
+"""Detector that sends images to a Roboflow inference server."""
 
 from __future__ import annotations
 
