@@ -22,7 +22,7 @@ from executive.mission.schema.types import Schema, make_type_schema
 from executive.mission.text.file_search import list_shipped_missions
 from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.perception.detectors.rfdetr import RfdetrOptions
-from executive.perception.detectors.roboflow.server_options import RoboflowOptions
+from executive.perception.detectors.roboflow.detector import RoboflowOptions
 from executive.plugins import load_skills
 from executive.tree.keys import KeyKind, KeySection
 from executive.tree.node import ControlNode

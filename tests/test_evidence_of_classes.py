@@ -10,7 +10,6 @@ import pytest
 from executive.cell.detection import Detection, Detections, ErrorRates
 from executive.cell.frame import Box, Frame
 from executive.cell.objects import ObjectClass
-from executive.geometry import Array
 from executive.perception.evidence import (
     describe_size_contradiction,
     describe_top_contradiction,
@@ -39,15 +38,10 @@ AREA: Box = (192.0, 100.0, 448.0, 356.0)
         ("cube", 0.0504, ""),
         ("cube", 0.1004, ""),  # on another cube
         ("cube", 0.06, "it was touched 60 mm above the table, and a cube is 50 mm high"),
-        ("sphere", 0.05, "it was touched 50 mm above the table, and a sphere is 60 mm high"),
         ("sphere", 0.056, "it was touched 56 mm above the table, and a sphere is 60 mm high"),
-        ("sphere", 0.04, "it was touched 40 mm above the table, and a sphere is 60 mm high"),
-        ("duck", 0.08, "it was touched 80 mm above the table, and a duck is 56 mm high"),
     ],
 )
-def test_the_height_of_a_touch_has_to_be_that_of_the_class(
-    label: str, height: float, contradiction: str
-) -> None:
+def test_the_height_of_a_touch_has_to_be_that_of_the_class(label, height, contradiction):
     assert describe_touch_contradiction(label, height, CLASSES) == contradiction
 
 
@@ -55,9 +49,7 @@ def test_the_height_of_a_touch_has_to_be_that_of_the_class(
     ("label", "height", "is_possible"),
     [("sphere", 0.04, True), ("sphere", 0.05, False), ("sphere", 0.065, False), ("cube", 0.035, True)],
 )
-def test_a_touch_that_is_too_low_for_all_classes_may_have_missed_the_top(
-    label: str, height: float, is_possible: bool
-) -> None:
+def test_a_touch_that_is_too_low_for_all_classes_may_have_missed_the_top(label, height, is_possible):
     assert may_have_missed_top(label, height, CLASSES) is is_possible
 
 
@@ -69,7 +61,7 @@ def test_a_touch_that_is_too_low_for_all_classes_may_have_missed_the_top(
         (10.0, "its box is 25 mm long, and the box of a sphere is 31 to 76 mm long"),
     ],
 )
-def test_the_size_of_a_box_has_to_be_that_of_the_class(side: float, contradiction: str) -> None:
+def test_the_size_of_a_box_has_to_be_that_of_the_class(side, contradiction):
     box = (319.5 - side / 2, 239.5 - side / 2, 319.5 + side / 2, 239.5 + side / 2)
     place = np.array([0.5, 0.0, 0.03])
     assert describe_size_contradiction(Detection("sphere", 0.9, box), place, FRAME, SPHERE) == contradiction
@@ -87,12 +79,9 @@ def observe_sphere(box: Box, frame: Frame) -> str:
 LARGE = (299.5, 219.5, 339.5, 259.5)
 
 
-def test_a_box_at_the_border_of_the_searched_area_may_be_cut_off() -> None:
+def test_a_box_that_the_searched_area_or_the_arm_cuts_off_is_not_compared():
     assert observe_sphere((192.5, 230.0, 200.0, 240.0), FRAME) == ""
     assert observe_sphere((192.5, 230.0, 200.0, 240.0), show_top(0.3)) == ""
-
-
-def test_a_box_that_the_arm_hides_in_part_is_not_compared() -> None:
     behind = np.ones((480, 640), bool)
     behind[230:235] = False
     assert observe_sphere(LARGE, FRAME).startswith("its box is 102 mm long")
@@ -125,43 +114,33 @@ def describe_top(label: str, frame: Frame) -> str:
             "its top is 80 mm above the table, and the top of a cube is at 50, 100, 106 or 110 mm",
         ),
         (
-            "cube",
-            0.16,
-            "its top is 160 mm above the table, and the top of a cube is at 50, 100, 106 or 110 mm",
-        ),
-        (
             "duck",
             0.02,
             "its top is 20 mm above the table, and the top of a duck is at 56, 106, 112 or 116 mm",
         ),
     ],
 )
-def test_the_height_of_a_top_in_the_depth_image_has_to_be_that_of_the_class(
-    label: str, height: float, contradiction: str
-) -> None:
+def test_the_height_of_a_top_in_the_depth_image_has_to_be_that_of_the_class(label, height, contradiction):
     assert describe_top(label, show_top(height)) == contradiction
 
 
-@pytest.mark.parametrize("upper", CLASSES)
-@pytest.mark.parametrize("lower", CLASSES)
-def test_the_top_of_two_stacked_objects_contradicts_the_class_of_neither(upper: str, lower: str) -> None:
-    frame = show_top(CLASSES[upper].height + CLASSES[lower].height)
-    for label in (upper, lower):
-        assert describe_top(label, frame) == ""
+def test_the_top_of_two_stacked_objects_contradicts_the_class_of_neither():
+    frame = show_top(CLASSES["duck"].height + CLASSES["sphere"].height)
+    assert describe_top("duck", frame) == describe_top("sphere", frame) == ""
 
 
-@pytest.mark.parametrize("depth", [None, np.full((480, 640), np.nan)], ids=["no sensor", "no pixel"])
-def test_without_depth_no_top_is_compared(depth: Array | None) -> None:
+@pytest.mark.parametrize("depth", [None, np.full((480, 640), np.nan)])
+def test_without_depth_no_top_is_compared(depth):
     assert describe_top("cube", replace(FRAME, depth=depth)) == ""
 
 
-def test_the_tolerance_of_a_top_grows_with_the_square_of_the_distance() -> None:
+def test_the_tolerance_of_a_top_grows_with_the_square_of_the_distance():
     assert describe_top("cube", show_top(0.075, camera=1.225))
     assert describe_top("cube", show_top(0.075, camera=1.825)) == ""
     assert describe_top("cube", show_top(0.02, camera=1.825))
 
 
-def test_unknown_labels_are_listed_with_their_counts() -> None:
+def test_unknown_labels_are_listed_with_their_counts():
     expected = "unknown: rubber-duck ×2, mug ×1"  # noqa: RUF001
     assert describe_unknown_labels({"rubber-duck": 2, "mug": 1}) == expected
     assert describe_unknown_labels({}) == ""

@@ -16,15 +16,15 @@ from executive.cells.sim.object_positions import find_max_object_count
 from executive.cells.sim.scene_file import load_scene
 from executive.errors import InputError, explain_os_errors
 from executive.mission.findings import suggest_choice
+from executive.perception import envelope
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
-from executive.perception.envelope import measurement
 from executive.perception.localization import CellLocalizer
 from executive.record.atomic_file import write_atomically
+from executive.training.dataset import LabelledImage
 from executive.training.evaluation import evaluate
-from executive.training.evaluation.cell_detector import CellDetector
+from executive.training.evaluation.evaluate import CellDetector
 from executive.training.evaluation.metrics import NO_OBJECT, ClassMetrics, Evaluation
 from executive.training.evaluation.worst_mistakes import WorstMistakes
-from executive.training.labelled_image import LabelledImage
 from executive.training.rendering import generate_dataset, render_run_frames
 from executive.training.samples import LabelledDataset
 
@@ -239,16 +239,16 @@ def store_evaluation(
     """
     assert detector.cell is not None
     assert evaluation.reliability is not None
-    path = out or detector.base_folder / f"{detector.cell.cell}{measurement.MEASUREMENT_SUFFIX}"
-    new_measurement = measurement.Measurement(
+    path = out or detector.base_folder / f"{detector.cell.cell}{envelope.MEASUREMENT_SUFFIX}"
+    new_measurement = envelope.Measurement(
         detector=detector.name,
-        fingerprint=dict(measurement.compute_fingerprint(detector.cell, detector.name, detector.base_folder)),
+        fingerprint=dict(envelope.compute_fingerprint(detector.cell, detector.name, detector.base_folder)),
         command=command,
         seconds=round(duration, 1),
         images=evaluation.images,
         rates=evaluation.reliability.rates,
         classes={
-            label: measurement.ErrorCounts(
+            label: envelope.ErrorCounts(
                 objects=sum(row.values()),
                 missed=row.get(NO_OBJECT, 0),
                 confused=sum(row.values()) - row.get(NO_OBJECT, 0) - row.get(label, 0),
@@ -258,8 +258,8 @@ def store_evaluation(
             if label != NO_OBJECT
         },
         counts={
-            str(count): measurement.ErrorCounts(
-                **{name: errors.get(name, 0) for name in measurement.ErrorCounts.model_fields}
+            str(count): envelope.ErrorCounts(
+                **{name: errors.get(name, 0) for name in envelope.ErrorCounts.model_fields}
             )
             for count, errors in sorted(evaluation.by_count.items())
         },
@@ -267,6 +267,6 @@ def store_evaluation(
     )
     advice = "name another file with --out, and copy it into the folder of your cell file"
     with explain_os_errors(InputError, f"the measurement {path} cannot be written", advice):
-        old_measurements = measurement.read_measurements(path)
-        write_atomically(path, measurement.format_measurements(old_measurements, new_measurement))
+        old_measurements = envelope.read_measurements(path)
+        write_atomically(path, envelope.format_measurements(old_measurements, new_measurement))
     return path

@@ -13,8 +13,7 @@ from executive.cell.frame import Box
 from executive.cell.workcell import KeyPath
 from executive.geometry import Array, Pose
 from executive.motion.arms import build_kinematics
-from executive.perception.camera_model import compute_calibration, project
-from executive.perception.mounted_camera import BORDER_FRACTION
+from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, project
 
 MAX_GRID_SPACING = 0.02
 """Maximum spacing of the points at which the views must show the workspace [m]."""

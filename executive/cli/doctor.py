@@ -61,7 +61,7 @@ def run_checks() -> Iterator[CheckResult]:
 
 def check_system() -> Iterator[CheckResult]:
     """State the version of Python, and check the environment variables; the API key is not shown."""
-    from executive.perception.detectors.roboflow.key import KEY_VARIABLE
+    from executive.perception.detectors.roboflow.inference_process import KEY_VARIABLE
 
     yield CheckResult("ok", "python", f"{platform.python_version()} on {platform.platform()}")
     for variable, purpose in (("DISPLAY", "--gui"), (KEY_VARIABLE, "models that Roboflow hosts")):

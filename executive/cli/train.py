@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import click
@@ -41,7 +40,7 @@ def command(dataset: Path, out: Path, model: Path | None, rate: float | None, ep
         for images in splits.values():
             click.echo(images.summary, err=True)
         with show_progress("training") as progress:
-            train(splits, out, Settings(model, rate, epochs, seed), _make_epoch_printer(epochs), progress)
+            train(splits, out, Settings(model, rate, epochs, seed), partial(_print_epoch, epochs), progress)
         click.echo(
             "add these lines to the cell file, with paths relative to the folder of the cell file:\n\n"
             "detectors:\n  trained:\n    kind: rfdetr\n"
@@ -50,14 +49,6 @@ def command(dataset: Path, out: Path, model: Path | None, rate: float | None, ep
         )
 
 
-def _make_epoch_printer(epochs: int) -> Callable[[int, dict[str, float]], None]:
-    """Return a function that prints the metrics of an epoch and the estimated remaining time."""
-    start_time = time.monotonic()
-
-    def print_epoch(epoch: int, metrics: dict[str, float]) -> None:
-        values = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
-        minutes = (time.monotonic() - start_time) / epoch * (epochs - epoch) / 60
-        remaining = f"; about {minutes:.0f} min left" if epoch < epochs else ""
-        click.echo(f"epoch {epoch} of {epochs}: {values}{remaining}", err=True)
-
-    return print_epoch
+def _print_epoch(epoch_count: int, epoch: int, metrics: dict[str, float]) -> None:
+    values = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
+    click.echo(f"epoch {epoch} of {epoch_count}: {values}", err=True)

@@ -27,7 +27,7 @@ from executive.mission.parse.cell_file import CellFile
 from executive.mission.parse.read_mission import read_mission
 from executive.mission.text.file_search import find_mission, get_shipped_folder
 from executive.perception.camera_model import find_calibration_doubts
-from executive.perception.envelope.rated_detectors import find_unmeasured_detectors
+from executive.perception.envelope import find_unmeasured_detectors
 from executive.skill import Skill
 from executive.tree.node_registry import load_control_nodes
 

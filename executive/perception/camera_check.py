@@ -1,18 +1,27 @@
-"""Check of the declared pose of a camera against the outlines of the bins in a frame."""
+"""Check of the declared pose of a camera against the outlines of the bins in a frame.
+
+The outlines of a bin are the silhouette of the outer box and the outer edges of the rim. The fit searches
+image edges along the normals of the projected outlines; robust least squares estimates the pose. A pose
+offset `(6,)` is the rotation vector [rad] and the translation [m] of a camera from its declared pose. The
+support of a pose is the fraction of the outlines (0 to 1) at which the image has an edge.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from executive.cell.bins import Bin
+from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.frame import Frame
-from executive.geometry import Array
-from executive.perception.camera_model import project
-from executive.perception.outline_fit import OutlineFitter, PoseFit
+from executive.geometry import Array, Pose
+from executive.perception.camera_model import NEAR_PLANE, project
 
 MAX_OUTLINE_DISTANCE = 0.005
 """Maximum mean distance between the outlines of the bins and their expected positions [m].
@@ -31,6 +40,41 @@ displaced by 12 to 60 mm, edges of other objects gave poses near the declared po
 """
 MIN_SUPPORT_GAIN = 0.15
 """Minimum difference between the support of an accepted pose and the support of the declared pose."""
+MIN_SAMPLES = 60
+"""Minimum number of visible samples for an estimate of the pose."""
+MIN_NORMAL_EIGENVALUE = 0.12
+"""Minimum of the smaller eigenvalue (0 to 0.5) of the mean outer product of the normals; 0 if all normals are
+parallel, so that the image does not determine the pose."""
+SAMPLE_SPACING = 6.0
+"""Distance between neighbouring samples of an outline [pixel]."""
+BORDER_WIDTH = 4.0
+"""Width of the border of the image in which samples are ignored [pixel]."""
+SMOOTHING_STD = 1.0
+"""Standard deviation of the Gaussian filter that smooths the image before the search for edges [pixel]."""
+MIN_CONTRAST = 4.0
+"""Minimum difference between neighbouring pixels of the smoothed image at an edge [grey level]."""
+FIT_EDGE_DISTANCES = (8, 4, 3)
+"""Maximum distances between outline and edge in the iterations of a fit from the declared pose [pixel]."""
+SEARCH_EDGE_DISTANCES = (16, 8, 4, 3)
+"""Maximum distances between outline and edge in the iterations of a fit from the search grid [pixel]."""
+SUPPORT_EDGE_DISTANCE = 2
+"""Maximum distance between outline and edge for the support of a pose [pixel]."""
+EDGE_STD = 2.0
+"""Standard deviation of an edge position [pixel]; large, because errors of neighbouring edges correlate."""
+MIN_OUTLIER_RESIDUAL = 0.5
+"""Minimum residual of an edge that is treated as an outlier [pixel]."""
+PRIOR_STD = np.full(6, 0.1)
+"""Prior standard deviations of the rotation vector [rad] and the translation [m]."""
+REWEIGHTING_ITERATIONS = 8
+"""Number of iterations of iteratively reweighted least squares."""
+TILTS_DEG, ROLLS_DEG = np.arange(-10.0, 11.0), np.arange(-8.0, 9.0, 4.0)
+"""Rotations of the search grid about the axes x and y of the camera, and about the optical axis [degree]."""
+AXIAL_SHIFTS = np.linspace(-0.21, 0.21, 7)
+"""Translations of the search grid along the optical axis, as fractions of the mean distance of the bins."""
+MAX_REFINED_POSES = 6
+"""Maximum number of poses of the search grid that are refined."""
+IMAGE_REDUCTION, SAMPLE_REDUCTION = 4, 4
+"""Factors that reduce the size of the image and the number of samples for the search grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,3 +146,211 @@ def _make_camera_offset(fit: PoseFit, frame: Frame, bins: Sequence[Bin]) -> Came
         support=fit.support,
         bins=tuple(bins[index].name for index in np.unique(samples.bin_indices)),
     )
+
+
+class EdgeSamples(NamedTuple):
+    """Visible samples of the outlines.
+
+    Attributes:
+        world_points: Positions in the world frame `(N, 3)` [m].
+        camera_points: Positions in the camera frame `(N, 3)` [m].
+        pixels: Positions in the image `(N, 2)` [pixel].
+        normals: Unit normals of the outlines in the image `(N, 2)`.
+        bin_indices: Index of the bin of each sample `(N,)`.
+    """
+
+    world_points: Array
+    camera_points: Array
+    pixels: Array
+    normals: Array
+    bin_indices: NDArray[np.intp]
+
+
+class PoseFit(NamedTuple):
+    """A camera pose fitted to the edges of an image.
+
+    Attributes:
+        offset: Pose offset `(6,)`.
+        covariance: Covariance of the pose offset `(6, 6)`.
+        samples: Visible samples of the outlines at the fitted pose.
+        support: Support of the fitted pose.
+    """
+
+    offset: Array
+    covariance: Array
+    samples: EdgeSamples
+    support: float
+
+
+class OutlineFitter:
+    """Fits camera poses to the edges of one frame."""
+
+    def __init__(self, frame: Frame, bins: Sequence[Bin]) -> None:
+        self._frame, self._bins = frame, bins
+        self._image = cv2.GaussianBlur(frame.image, (0, 0), SMOOTHING_STD)
+
+    def refine(self, offset: Array, max_distances: Sequence[int] = FIT_EDGE_DISTANCES) -> PoseFit | None:
+        """Return the fit that starts at a pose offset; None if too few samples or edges are visible.
+
+        `max_distances` are the maximum distances between outline and edge in the iterations [pixel].
+        """
+        covariance = np.diag(PRIOR_STD**2)
+        for max_distance in max_distances:
+            samples = self._find_visible_samples(offset)
+            distances, has_edge = self._find_edges(samples, max_distance)
+            if not _is_sufficient(samples) or has_edge.sum() < MIN_SAMPLES / 2:
+                return None
+            jacobian = _compute_jacobian(samples, self._frame.matrix)[has_edge]
+            offset, covariance = _solve_robustly(jacobian, distances[has_edge], offset, max_distance / 2)
+        samples = self._find_visible_samples(offset)
+        if not _is_sufficient(samples):
+            return None
+        return PoseFit(offset, covariance, samples, self.compute_support(offset))
+
+    def compute_support(self, offset: Array) -> float:
+        """Return the support of the pose with the given offset."""
+        _, has_edge = self._find_edges(self._find_visible_samples(offset), SUPPORT_EDGE_DISTANCE)
+        return float(has_edge.mean()) if len(has_edge) else 0.0
+
+    def search(self) -> Iterator[PoseFit]:
+        """Yield fits that start at the poses of the search grid with the strongest edges at the outlines."""
+        scale = 1 / IMAGE_REDUCTION
+        small_image = cv2.resize(self._image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        small_image = cv2.GaussianBlur(small_image, (0, 0), SMOOTHING_STD).astype(np.float32)
+        derivatives = [cv2.Sobel(small_image, cv2.CV_32F, *orders) for orders in ((1, 0), (0, 1))]
+        gradients = np.stack(derivatives, axis=-1)
+        matrix, X_CW = self._frame.matrix, self._frame.X_WC.inverse()
+        last_pixel = np.array(small_image.shape[1::-1]) - 1
+        samples = self._find_visible_samples(np.zeros(6))
+        if not _is_sufficient(samples) or np.abs(gradients).max() < MIN_CONTRAST:
+            return
+        *world_points, _ = _sample_outlines(self._bins, self._frame.X_WC, matrix)
+        points, next_points = (X_CW.apply(values[::SAMPLE_REDUCTION]) for values in world_points)
+        scored_offsets: list[tuple[float, Array]] = []
+        for roll, axial_shift in itertools.product(ROLLS_DEG, AXIAL_SHIFTS):
+            shift = np.array([0.0, 0.0, axial_shift * points[:, 2].mean()])
+            rotation_vectors = np.radians([(x, y, roll) for x in TILTS_DEG for y in TILTS_DEG])
+            rotations = np.stack([cv2.Rodrigues(vector)[0] for vector in rotation_vectors])
+            pixels = _project((points - shift) @ rotations, matrix)
+            normals = _compute_normals(_project((next_points - shift) @ rotations, matrix) - pixels)
+            small_pixels = np.floor(pixels / IMAGE_REDUCTION).astype(int)
+            is_inside = ((small_pixels >= 0) & (small_pixels <= last_pixel)).all(axis=-1)
+            columns, rows = np.moveaxis(small_pixels.clip(0, last_pixel), -1, 0)
+            contrast = np.abs((gradients[rows, columns] * normals[:, :, None]).sum(axis=-1)).sum(axis=-1)
+            # The square root gives many weak edges a higher score than a few strong edges.
+            inside_count = np.maximum(is_inside.sum(axis=1), len(points) / 2)
+            scores = (np.sqrt(contrast) * is_inside).sum(axis=1) / inside_count
+            best = int(scores.argmax())
+            scored_offsets.append((float(scores[best]), np.concatenate([rotation_vectors[best], shift])))
+        for _, offset in sorted(scored_offsets, key=lambda pair: -pair[0])[:MAX_REFINED_POSES]:
+            if fit := self.refine(offset, SEARCH_EDGE_DISTANCES):
+                yield fit
+
+    def _find_visible_samples(self, offset: Array) -> EdgeSamples:
+        """Return the samples of the outlines that are visible from the pose with the given offset."""
+        rotation = np.asarray(cv2.Rodrigues(offset[:3])[0], dtype=float)
+        X_WC, is_unoccluded = self._frame.X_WC @ Pose(rotation, offset[3:]), self._frame.visible
+        world_points, next_points, bin_indices = _sample_outlines(self._bins, X_WC, self._frame.matrix)
+        camera_points = X_WC.inverse().apply(world_points)
+        pixels = _project(camera_points, self._frame.matrix)
+        normals = _compute_normals(_project(X_WC.inverse().apply(next_points), self._frame.matrix) - pixels)
+        size = np.array(is_unoccluded.shape[::-1])
+        is_visible = ((pixels >= BORDER_WIDTH) & (pixels < size - BORDER_WIDTH)).all(axis=1)
+        columns, rows = pixels.clip(0, size - 1).astype(int).T
+        is_visible &= is_unoccluded[rows, columns]
+        samples = EdgeSamples(world_points, camera_points, pixels, normals, bin_indices)
+        return EdgeSamples(*(values[is_visible] for values in samples))
+
+    def _find_edges(self, samples: EdgeSamples, max_distance: int) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the distances `(N,)` [pixel] along the normals to edges; True for samples with an edge."""
+        if not len(samples.pixels):
+            return np.zeros(0), np.zeros(0, dtype=bool)
+        normals = samples.normals[:, None, None]
+        normal_steps = np.arange(-max_distance - 1.5, max_distance + 2)[:, None, None] * normals
+        tangent_steps = np.array([-2.0, 0.0, 2.0])[:, None] * normals[..., ::-1] * (-1, 1)
+        # Pixel centres have integer coordinates in OpenCV.
+        positions = (samples.pixels[:, None, None] + normal_steps + tangent_steps - 0.5).astype(np.float32)
+        count, length, width, _ = positions.shape
+        x, y = positions.reshape(count, length * width, 2).transpose(2, 0, 1)
+        colours = cv2.remap(self._image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        profiles = colours.reshape(count, length, width, 3).astype(float).mean(axis=2)
+        contrast = np.linalg.norm(np.diff(profiles, axis=1), axis=2)
+        previous, current, following = contrast[:, :-2], contrast[:, 1:-1], contrast[:, 2:]
+        is_edge = (current >= previous) & (current > following) & (current > MIN_CONTRAST)
+        strongest = np.where(is_edge, current, 0.0).argmax(axis=1)
+        edge_index = np.arange(count), strongest
+        # The vertex of the parabola through three contrasts is the edge position with subpixel accuracy.
+        curvature = np.minimum(previous - 2 * current + following, -1e-6)[edge_index]
+        vertex = 0.5 * (previous - following)[edge_index] / curvature
+        return strongest - max_distance + vertex.clip(-0.5, 0.5), is_edge[edge_index]
+
+
+def _sample_outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Return points `(N, 3)` [m] on the outlines, neighbouring points for the tangents, and bin indices."""
+    points, next_points, bin_indices = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, dtype=np.intp)]
+    for index, bin in enumerate(bins):
+        half_size = np.array([*(bin.size[:2] / 2 + BIN_THICKNESS), bin.size[2] / 2])
+        # The first four corners belong to the rim.
+        signs = [(*xy, z) for z in (1, -1) for xy in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
+        corners = bin.position + (0.0, 0.0, half_size[2]) + half_size * signs
+        corners_C = X_WC.inverse().apply(corners)
+        if np.any(corners_C[:, 2] < NEAR_PLANE):
+            continue
+        pixels = _project(corners_C, matrix)
+        silhouette = cv2.convexHull(pixels.astype(np.float32), returnPoints=False)[:, 0].tolist()
+        closed_polygons: tuple[list[int], ...] = ([*silhouette, silhouette[0]], [0, 1, 2, 3, 0])
+        edges = {frozenset(edge) for polygon in closed_polygons for edge in itertools.pairwise(polygon)}
+        for start, end in sorted(sorted(edge) for edge in edges):
+            count = int(np.linalg.norm(pixels[end] - pixels[start]) / SAMPLE_SPACING)
+            fractions = ((np.arange(count) + 0.5) / max(count, 1))[:, None]
+            points.append(corners[start] + fractions * (corners[end] - corners[start]))
+            next_points.append(corners[start] + (fractions + 0.01) * (corners[end] - corners[start]))
+            bin_indices.append(np.full(count, index, dtype=np.intp))
+    return np.concatenate(points), np.concatenate(next_points), np.concatenate(bin_indices)
+
+
+def _project(camera_points: Array, matrix: Array) -> Array:
+    """Return the image positions `(..., 2)` [pixel] of points `(..., 3)` [m] in the camera frame."""
+    p = camera_points @ matrix.T
+    return np.asarray(p[..., :2] / np.maximum(p[..., 2:], NEAR_PLANE))
+
+
+def _compute_normals(directions: Array) -> Array:
+    """Return unit vectors `(..., 2)` perpendicular to directions in the image."""
+    normals = directions[..., ::-1] * (-1.0, 1.0)
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-9))
+
+
+def _is_sufficient(samples: EdgeSamples) -> bool:
+    """Return True if there are enough samples with normals in different directions."""
+    count = len(samples.pixels)
+    if count < MIN_SAMPLES:
+        return False
+    return bool(np.linalg.eigvalsh(samples.normals.T @ samples.normals / count)[0] >= MIN_NORMAL_EIGENVALUE)
+
+
+def _compute_jacobian(samples: EdgeSamples, matrix: Array) -> Array:
+    """Return the derivatives `(N, 6)` of image positions along the normals by the pose offset."""
+    x, y, z = samples.camera_points.T
+    u, v = (samples.normals * matrix.diagonal()[:2]).T
+    # Derivative of n·f·(x/z, y/z) by the point (x, y, z), with the normal n and the focal length f.
+    gradient = np.column_stack([u / z, v / z, -(u * x + v * y) / z**2])
+    # A camera that moves by (w, t) moves the point by -(w × p + t) in the camera frame.
+    return np.column_stack([np.cross(gradient, samples.camera_points), -gradient])
+
+
+def _solve_robustly(jacobian: Array, distances: Array, offset: Array, scale: float) -> tuple[Array, Array]:
+    """Return the pose offset that fits edges at `distances` `(N,)` [pixel], and its covariance `(6, 6)`.
+
+    Maximum a posteriori estimate with Geman-McClure weights: edges with residuals above `scale` [pixel], or
+    above 1.5 times the median residual, get a low weight.
+    """
+    correction, covariance = np.zeros(6), np.zeros((6, 6))
+    for _ in range(REWEIGHTING_ITERATIONS):
+        residuals = distances - jacobian @ correction
+        scale = max(MIN_OUTLIER_RESIDUAL, min(scale, 1.5 * float(np.median(np.abs(residuals)))))
+        weights = (1 + (residuals / scale) ** 2) ** -2
+        weighted = jacobian * weights[:, None] / EDGE_STD**2
+        covariance = np.asarray(np.linalg.inv(weighted.T @ jacobian + np.diag(PRIOR_STD**-2.0)), dtype=float)
+        correction = covariance @ (weighted.T @ distances - offset / PRIOR_STD**2)
+    return offset + correction, covariance

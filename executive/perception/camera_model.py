@@ -1,4 +1,4 @@
-"""Pinhole camera model: projection of points into an image, and rays through its pixels.
+"""Pinhole camera model (projection of points, rays through pixels), and base class of the cameras of cells.
 
 Camera frames follow OpenCV: z along the optical axis, x to the right, y down. Image coordinates are
 continuous: pixel i covers [i, i + 1), so that the centre of an image is (W / 2, H / 2).
@@ -7,14 +7,15 @@ continuous: pixel i covers [i, i + 1), so that the centre of an image is (W / 2,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from executive.cell.config import CameraConfig
-from executive.cell.frame import Box
+from executive.cell.frame import Box, Frame
+from executive.cell.protocols import Clock
 from executive.geometry import Array, Pose
 
 NEAR_PLANE, FAR_PLANE = 0.02, 5.0
@@ -22,6 +23,11 @@ NEAR_PLANE, FAR_PLANE = 0.02, 5.0
 
 MAX_CENTRE_ERROR = 0.2
 """Maximum distance of the principal point from the centre of the image, as a fraction of half the image."""
+BORDER_FRACTION = 0.05
+"""Width of the ignored border of an image with a partial view, as a fraction of the height of the image.
+
+If the image cuts an object that spans at most a sixth of the height, over 30 % of its box lie in the border.
+"""
 
 
 def compute_camera_matrix(width: int, height: int, fov_deg: float) -> Array:
@@ -167,3 +173,82 @@ def compute_depths(depth_buffer: NDArray[np.float32]) -> Array:
     near, far = NEAR_PLANE, FAR_PLANE
     with np.errstate(divide="ignore"):
         return far * near / (far - (far - near) * depth_buffer.astype(np.float64))
+
+
+class MountedCamera:
+    """Base class of cameras, with frames numbered from 1; implements part of `cell.protocols.Camera`.
+
+    Args:
+        name: Name of the camera in the cell file.
+        config: Section of the camera in the cell file.
+        get_flange_pose: Function that returns the pose `X_WF` of the flange, the mount of a wrist camera.
+        clock: Clock of the run, for the capture times of frames.
+        get_change_count: Function that returns how often the robot has changed the objects on the table.
+
+    Attributes:
+        name: Name of the camera in the cell file.
+        config: Section of the camera in the cell file.
+        matrix: Camera matrix `(3, 3)` [pixel].
+        scan_poses: Names of the arm poses from which the camera sees the table; the first has the best view.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        config: CameraConfig,
+        get_flange_pose: Callable[[], Pose],
+        clock: Clock,
+        get_change_count: Callable[[], int] = lambda: 0,
+    ) -> None:
+        self.name, self.config, self._clock, self._get_change_count = name, config, clock, get_change_count
+        self.matrix, self._X_MC = compute_calibration(config)
+        self._get_flange_pose = get_flange_pose
+        self.scan_poses, self._size = config.scan_poses, (config.width, config.height)
+        self._frame_count = self._pose_count = 0
+        self._content_mask = np.ones((config.height, config.width), dtype=bool)
+        """Mask `(H, W)` of the pixels that are not in the ignored border of an image with a partial view."""
+        if config.partial_views:
+            width = round(BORDER_FRACTION * config.height)
+            self._content_mask = np.pad(self._content_mask[width:-width, width:-width], width)
+
+    def next_pose(self) -> str:
+        """Advance to the next scan pose, cyclically, and return its name."""
+        self._pose_count += 1
+        return self.scan_poses[self._pose_count % len(self.scan_poses)]
+
+    def get_view_box(self, view: str) -> Box:
+        """Return the region of interest in the image [pixel] for a view: `table` or `full`."""
+        return self.config.get_view_box(view)
+
+    def capture(self) -> Frame:
+        """Capture and return a frame."""
+        self._frame_count += 1
+        X_WC = self._compute_pose()
+        image, depth = self._capture_images()
+        return Frame(
+            id=self._frame_count,
+            camera=self.name,
+            image=image,
+            depth=depth,
+            matrix=self.matrix,
+            X_WC=X_WC,
+            stamp=self._clock.now,
+            visible=self._compute_visibility_mask(X_WC) & self._content_mask,
+            change_count=self._get_change_count(),
+        )
+
+    def _capture_images(self) -> tuple[NDArray[np.uint8], Array | None]:
+        """Return the image `(H, W, 3)` and the depth `(H, W)` [m] of a new frame."""
+        raise NotImplementedError
+
+    def _compute_visibility_mask(self, X_WC: Pose) -> NDArray[np.bool_]:
+        """Return the mask `(H, W)` of the pixels that the arm does not occlude."""
+        raise NotImplementedError
+
+    def set_counts(self, frame_count: int, pose_count: int) -> None:
+        """Set the counters of captured frames and of calls of `next_pose` when a run is resumed."""
+        self._frame_count, self._pose_count = frame_count, pose_count
+
+    def _compute_pose(self) -> Pose:
+        """Return the current pose `X_WC` of the camera."""
+        return self._X_MC if self.config.mount == "fixed" else self._get_flange_pose() @ self._X_MC

@@ -1,31 +1,67 @@
-"""Parallel rendering of labelled images; the images do not depend on the number of processes."""
+"""Rendering of labelled images of random scenes, for the training and the evaluation of detectors.
+
+An image depends only on its seed and on the arguments of `SceneRenderer`, not on the number of processes that
+render images. Labels are amodal with subpixel accuracy: the box of an object contains the whole silhouette of
+the mesh, including occluded parts.
+"""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig
-from executive.cells.sim.models import find_model_errors
+from executive.cell.frame import Box
+from executive.cells.ground_truth import UNKNOWN_LABEL
+from executive.cells.sim import arrangements, variations
+from executive.cells.sim.arrangements import SceneObject
+from executive.cells.sim.camera import add_depth_noise, add_noise, get_camera_pose
+from executive.cells.sim.models import find_model_errors, load_mesh
+from executive.cells.sim.renderer import CELL_LIGHT, Image, RenderedImage, render
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
+from executive.cells.sim.scene_world import build_world
+from executive.cells.sim.silhouette import compute_bounding_box, compute_silhouette_area
+from executive.cells.sim.spawn import spawn_objects
+from executive.cells.sim.table_top import WOOD_TEXTURE
 from executive.errors import InputError
+from executive.perception.camera_model import compute_calibration, intersect_plane, project
 from executive.processes import WorkerPool
-from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
-from executive.training.labelled_image import LabelledImage
-from executive.training.scene_renderer import IMAGE_SIZE, SceneRenderer
+from executive.training.dataset import (
+    DatasetEntry,
+    LabelledImage,
+    build_image_path,
+    save_image,
+    write_annotations,
+)
 
 ResultT = TypeVar("ResultT")
 ReportProgress = Callable[[int, int], None]
 """Callback with the number of finished images and the number of all images."""
 BLOCK_SIZE = 40
 """Number of images per task of a worker process; each task builds a simulated world for each cell."""
+IMAGE_SIZE = 256
+"""Side of the image of a random scene, as a detector gets it [pixel]."""
+MIN_VISIBLE_FRACTION = 0.15
+"""An object of which a smaller fraction is visible is treated as background."""
+MIN_LABELLED_VISIBLE_FRACTION = 0.5
+"""An object of which a smaller fraction is visible is heavily occluded: it is ignored, not labelled."""
+MAX_HEAVILY_OCCLUDED_FRACTION = 1 / 6
+"""Maximum fraction of heavily occluded objects in a scene; one such object is always allowed."""
+MAX_ATTEMPTS = 50
+"""Maximum number of random scenes that are sampled for an image before an error is raised."""
+NOMINAL_SCENE_FRACTION = 0.2
+"""Fraction of the random scenes with table, light, camera and noise as in the cell file."""
+MIN_CONTRAST = 5
+"""Minimum contrast between a labelled object and its surroundings, in standard deviations of the noise."""
 
 
 def generate_dataset(
@@ -133,3 +169,202 @@ def _render_frames(
 ) -> dict[int, LabelledImage]:
     """Render frames in a worker process, and return them by image number."""
     return dict(_render_images([config], seed, image_numbers, scene))
+
+
+class SceneRenderer:
+    """Renders labelled images of the camera of a cell.
+
+    Without `scene`, an image shows a part of a random scene. Random scenes serve for training; they vary more
+    than the initial scenes of runs. With `scene`, an image is a complete camera image of the initial scene of
+    a run; only the objects in the view `table` (the workspace) are labelled.
+
+    Args:
+        config: The cell file.
+        scene: Scene file for the initial scene of a run, in which the arm is in a random scan pose; None for
+            random scenes.
+    """
+
+    def __init__(self, config: CellConfig, scene: SceneConfig | None = None) -> None:
+        self._scene = scene
+        self._camera_name, self._nominal_camera = next(iter(config.cameras.items()))
+        self._world = build_world(config, scene or DECLARED_SCENE)
+        self._config = self._world.config
+        self._camera = self._config.cameras[self._camera_name]
+        self._camera_matrix, _ = compute_calibration(self._camera)
+
+    def render_image(self, seed: int, number: int) -> LabelledImage:
+        """Sample scenes from `seed` until few objects are heavily occluded, and return the labelled image.
+
+        Its file name contains the name of the camera and `number`, and has no suffix. Its `truth` contains:
+
+        * `camera`, `matrix`, `X_WC`: name, matrix and pose of the camera; for an initial scene, matrix and
+          pose as declared in the cell file, without calibration errors
+        * `part`: the region of the camera image that the image shows [pixel]
+        * `labels`, `visible_fraction`: class and visible fraction (0 to 1) of each labelled object
+        * `centres`: centres of the bounding boxes of the labelled objects in the world `(N, 3)` [m]
+        * `positions`: result of a localization without errors `(N, 3)` [m]: intersection of the ray through
+          the centre of each unclipped box with the horizontal plane through the object centre
+
+        Raises:
+            InputError: In all `MAX_ATTEMPTS` scenes, the workspace has no room for the objects, or too many
+                objects are heavily occluded.
+        """
+        problem = InputError(
+            f"too many objects are heavily occluded in {MAX_ATTEMPTS} scenes of cell {self._config.cell}; "
+            "ask for fewer objects or widen table.x and table.y"
+        )
+        for attempt in range(MAX_ATTEMPTS):
+            rng = np.random.default_rng([seed, attempt])
+            for body in tuple(self._world.labels):
+                self._world.remove_object(body)
+            try:
+                image = self._render_initial(self._scene, rng) if self._scene else self._render_random(rng)
+                if image is not None:
+                    return replace(image, file=f"{self._camera_name}_{number:06d}")
+            except InputError as error:
+                # Whether the objects of a random scene find room in the workspace depends on chance.
+                problem = error
+        raise problem
+
+    def close(self) -> None:
+        """Close the world; the renderer cannot be used afterwards."""
+        self._world.close()
+
+    def _render_random(self, rng: np.random.Generator) -> LabelledImage | None:
+        """Return the image of a random scene, or None if too many objects are heavily occluded."""
+        world = self._world
+        is_holding = arrangements.move_arm_randomly(world, self._camera, rng)
+        matrix, X_WC = self._camera_matrix, get_camera_pose(world, self._camera)
+        (colour, texture), light, noise = ((1.0, 1.0, 1.0), WOOD_TEXTURE), CELL_LIGHT, self._camera.noise
+        if rng.random() >= NOMINAL_SCENE_FRACTION:
+            matrix, X_WC = variations.draw_camera(self._camera, matrix, X_WC, rng)
+            (colour, texture), light = variations.draw_table_appearance(rng), variations.draw_light(rng)
+            noise = variations.draw_noise(noise, rng)
+        region = arrangements.draw_region(self._camera, rng)
+        wood_colour = tuple(np.multiply(colour, variations.WOOD_COLOUR).tolist())
+        table_colour = wood_colour if texture == WOOD_TEXTURE else colour
+        corners = [(x, y) for x in region[::2] for y in region[1::2]]
+        footprint = np.array([intersect_plane(matrix, X_WC, corner, 0.0)[:2] for corner in corners])
+        shows_table = region == self._camera.table_view
+        objects = arrangements.draw_arrangement(self._config, footprint, shows_table, table_colour, rng)
+        if is_holding:
+            objects.append(arrangements.draw_held_object(world.get_tool_pose(), self._config, rng))
+        objects_by_body = {world.add_object(o.label, o.X_WO, o.colour, o.model): o for o in objects}
+        world.table_top.paint(colour, texture)
+        rendered = render(world, matrix, X_WC, region, light)
+        scale = IMAGE_SIZE / (region[2] - region[0])
+        labelled = self._label_image(rendered, MIN_CONTRAST * noise.read, objects_by_body, region[:2], scale)
+        return labelled and replace(labelled, image=_resize(add_noise(rendered.image, noise, rng)))
+
+    def _render_initial(self, scene: SceneConfig, rng: np.random.Generator) -> LabelledImage | None:
+        """Return the image of an initial scene, or None if too many objects are heavily occluded."""
+        world, camera = self._world, self._camera
+        pose = np.radians(self._config.arm.poses_deg[str(rng.choice(camera.scan_poses))])
+        world.set_joint_positions(pose)
+        spawn_objects(world, int(rng.integers(2**32)), scene.unknown)
+        world.set_joint_positions(pose)  # the arm may have sagged during the physics steps
+        X_WC = get_camera_pose(world, camera)
+        # A run uses the declared matrix and pose, even if the scene has calibration errors.
+        whole_image = (0, 0, camera.width, camera.height)
+        declared_X_WC = get_camera_pose(world, self._nominal_camera).to_rounded_list(9)
+        declared_matrix, _ = compute_calibration(self._nominal_camera)
+        declared_calibration = {"part": whole_image, "matrix": declared_matrix, "X_WC": declared_X_WC}
+        objects = {
+            body: SceneObject(label, world.models[body], world.get_object_pose(body))
+            for body, label in world.labels.items()
+        }
+        rendered = render(world, self._camera_matrix, X_WC, whole_image, scene.light)
+        image = add_noise(rendered.image, camera.noise, rng)
+        depth = None if camera.depth is None else add_depth_noise(rendered.depth, camera.depth, rng)
+        repeated_image = add_noise(rendered.image, camera.noise, rng)
+        left, top, right, bottom = region = camera.table_view
+        pixels = np.s_[top:bottom, left:right]
+        view_image, segmentation = rendered.image[pixels], rendered.segmentation[pixels]
+        view = replace(rendered, image=view_image, segmentation=segmentation, region=region)
+        # The minimum contrast depends on the declared noise, so that more noise does not reduce the labels.
+        labelled = self._label_image(view, MIN_CONTRAST * self._nominal_camera.noise.read, objects)
+        return labelled and replace(
+            labelled, image=image, truth={**labelled.truth, **declared_calibration}, region=region,
+            depth=depth, repeated_image=repeated_image,
+        )  # fmt: skip
+
+    def _label_image(
+        self,
+        rendered: RenderedImage,
+        min_contrast: float,
+        objects: Mapping[int, SceneObject],
+        origin: Sequence[int] = (0, 0),
+        scale: float = 1.0,
+    ) -> LabelledImage | None:
+        """Return a labelled image without noise, or None if too many objects are heavily occluded.
+
+        Args:
+            rendered: The rendered image.
+            min_contrast: Contrast below which objects are ignored [grey level].
+            objects: The objects by body.
+            origin: Position in the camera image at which the boxes have the coordinates (0, 0) [pixel].
+            scale: Factor from pixels of the camera image to pixels of the boxes.
+        """
+        labels, boxes, fractions, positions, centres = [], list[Box](), [], [], []
+        ignored_boxes, heavily_occluded_count = list[Box](), 0
+        for body, scene_object in objects.items():
+            mask = rendered.segmentation == body
+            if scene_object.label == UNKNOWN_LABEL or not mask.any():
+                continue
+            mesh = load_mesh(scene_object.model)
+            vertices = scene_object.X_WO.apply(mesh.vertices)
+            pixels = project(rendered.matrix, rendered.X_WC, vertices)
+            fraction = min(1.0, float(mask.sum()) / max(compute_silhouette_area(mesh, pixels), 1.0))
+            if fraction < MIN_VISIBLE_FRACTION:
+                continue
+            corners = np.array(compute_bounding_box(pixels)).reshape(2, 2)
+            visible_corners = corners.clip(rendered.region[:2], rendered.region[2:])
+            left, top, right, bottom = ((visible_corners - origin) * scale).ravel().tolist()
+            is_heavily_occluded = fraction < MIN_LABELLED_VISIBLE_FRACTION
+            heavily_occluded_count += is_heavily_occluded
+            if is_heavily_occluded or _measure_contrast(rendered.image, mask) < min_contrast:
+                ignored_boxes.append((left, top, right, bottom))
+                continue
+            centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+            labels.append(scene_object.label)
+            boxes.append((left, top, right, bottom))
+            fractions.append(fraction)
+            pixel = corners.mean(axis=0)
+            positions.append(intersect_plane(rendered.matrix, rendered.X_WC, pixel, float(centre[2])))
+            centres.append(centre)
+        if heavily_occluded_count > max(1, len(objects) * MAX_HEAVILY_OCCLUDED_FRACTION):
+            return None
+        truth = {
+            "camera": self._camera_name,
+            "part": rendered.region,
+            "matrix": rendered.matrix,
+            "X_WC": rendered.X_WC.to_rounded_list(9),
+            "labels": tuple(labels),
+            "positions": np.array(positions).reshape(-1, 3),
+            "centres": np.array(centres).reshape(-1, 3),
+            "visible_fraction": np.array(fractions),
+        }
+        return LabelledImage("", rendered.image, tuple(labels), tuple(boxes), tuple(ignored_boxes), truth)
+
+
+def _measure_contrast(image: Image, mask: NDArray[np.bool_]) -> float:
+    """Return the contrast between an object and a ring of two pixels around the object [grey level].
+
+    The contrast of a pixel is the maximum, over the three channels, of the difference from the median of
+    the ring.
+    The result is the median contrast of the object's pixels, or 0 if the ring is empty.
+
+    Args:
+        image: Image `(H, W, 3)`.
+        mask: Mask of the pixels that show the object `(H, W)`.
+    """
+    ring = cv2.dilate(mask.astype(np.uint8), np.ones((5, 5), np.uint8)).astype(bool) & ~mask
+    if not ring.any():
+        return 0.0
+    background = np.median(image[ring], axis=0)
+    return float(np.median(np.abs(image[mask] - background).max(axis=1)))
+
+
+def _resize(image: Image) -> Image:
+    """Return a square image in the size that a detector gets."""
+    return np.asarray(cv2.resize(image, (IMAGE_SIZE, IMAGE_SIZE), interpolation=cv2.INTER_AREA), np.uint8)

@@ -1,17 +1,20 @@
-"""Training of the small RF-DETR on a COCO or YOLO dataset, from random weights or from a trained model."""
+"""Training of the small RF-DETR on a COCO or YOLO dataset, and the card of the trained model."""
 
 from __future__ import annotations
 
+import csv
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from jinja2 import Environment, StrictUndefined
 
 from executive.errors import InputError
 from executive.perception.detectors.onnx_model import read_labels
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.evaluation.evaluate import evaluate_model, find_label_file
-from executive.training.model_card import read_epochs, render_card
+from executive.training.evaluation.metrics import Evaluation
 from executive.training.samples import LabelledDataset, read_image, read_image_header
 
 ReportEpoch = Callable[[int, dict[str, float]], None]
@@ -25,6 +28,15 @@ NEW_MODEL_LEARNING_RATE = 3e-4
 """Default learning rate of random weights, and of a start model with other classes."""
 FINE_TUNING_LEARNING_RATE = 1e-4
 """Default learning rate of a start model with equal classes, small enough to preserve the weights."""
+
+EPOCH_COLUMNS = {
+    "train/loss": "loss",
+    "val/mAP_50": "mAP50",
+    "val/mAP_50_95": "mAP50-95",
+    "val/precision": "precision",
+    "val/recall": "recall",
+}
+"""Headings in a model card, by column of the trainer's `metrics.csv`."""
 
 
 @dataclass(frozen=True)
@@ -67,28 +79,30 @@ def train(
         InputError: An image is damaged, `start_model` does not exist, or the training packages are not
             installed.
     """
-    start_model, learning_rate = settings.start_model, settings.learning_rate
+    start_model = settings.start_model
     if start_model is not None and not start_model.is_file():
         raise InputError(f"there is no model {start_model} to start from; train one first, or omit --from")
     try:
-        from executive.training.architecture import declare_missing_operators, describe_architecture
-
-        declare_missing_operators()
-        from executive.training.compress import export_onnx
+        from executive.training.model import describe_architecture, export_onnx
         from executive.training.model_fitting import fit_model
     except ImportError as error:
         advice = "install the extra, about 3 GB to download on Linux: uv sync --extra train"
         raise InputError(f'training needs the package "{error.name}"; {advice}') from error
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=out) as folder:
-        write_coco_dataset(splits, Path(folder))
-        fit_model(Path(folder), out, settings, report_epoch, report_batch)
-    model, labels = out / "model.onnx", out / "labels.txt"
-    export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model)
-    accuracy = evaluate_model(model, labels, splits["valid"], CARD_THRESHOLD)
+        labels = write_coco_dataset(splits, Path(folder))
+        fit_model(
+            Path(folder), out, labels, start_model=start_model, epochs=settings.epochs, seed=settings.seed,
+            learning_rate=settings.learning_rate or choose_learning_rate(start_model, labels),
+            report_epoch=report_epoch, report_batch=report_batch,
+        )  # fmt: skip
+    model = out / "model.onnx"
+    export_onnx(out / "checkpoint_best_total.pth", len(labels), model)
+    accuracy = evaluate_model(model, out / "labels.txt", splits["valid"], CARD_THRESHOLD)
+    learning_rate = settings.learning_rate
     card = render_card(
         title=f"Small RF-DETR trained on {splits['train'].folder.name}",
-        summary=f"Detects {', '.join(read_labels(labels))} in square images.",
+        summary=f"Detects {', '.join(labels)} in square images.",
         settings={
             **describe_architecture(),
             "start": "random weights" if start_model is None else start_model.name,
@@ -123,14 +137,14 @@ def load_dataset(folder: Path) -> dict[str, LabelledDataset]:
     return dataset
 
 
-def write_coco_dataset(dataset: Mapping[str, LabelledDataset], folder: Path) -> None:
-    """Write splits as a COCO dataset with the boxes and pixels that an evaluation sees.
+def write_coco_dataset(dataset: Mapping[str, LabelledDataset], folder: Path) -> list[str]:
+    """Write splits as a COCO dataset with the boxes and pixels that an evaluation sees; return the classes.
 
     The COCO files contain absolute paths of the images that RF-DETR decodes like `read_image`. Other images
     are converted, for instance because RF-DETR ignores the EXIF orientation.
     """
     entries = []
-    classes = dict.fromkeys([*dataset["train"].classes, *dataset["valid"].object_counts])
+    classes = list(dict.fromkeys([*dataset["train"].classes, *dataset["valid"].object_counts]))
     for split, images in dataset.items():
         for index, (path, annotation) in enumerate(images.annotations.items()):
             size, is_plain = read_image_header(path)
@@ -138,4 +152,36 @@ def write_coco_dataset(dataset: Mapping[str, LabelledDataset], folder: Path) -> 
             if not is_plain:
                 save_image(file, read_image(path))
             entries.append(DatasetEntry(split, str(file), size, annotation.labels, annotation.boxes))
-    write_annotations(folder, "coco", entries, list(classes))
+    write_annotations(folder, "coco", entries, classes)
+    return classes
+
+
+def render_card(
+    title: str, summary: str, settings: Mapping[str, str], epochs: Sequence[Mapping[str, float]],
+    accuracy: Evaluation,
+) -> str:  # fmt: skip
+    """Return the card of a model as Markdown; its template is `model_card.md.jinja`.
+
+    Args:
+        title: Name of the model.
+        summary: Purpose of the model, one or two sentences.
+        settings: Settings of the training by name.
+        epochs: Metrics of each epoch, by the keys of `EPOCH_COLUMNS`.
+        accuracy: Evaluation of the model on the validation images.
+    """
+    template = Path(__file__).with_name("model_card.md.jinja").read_text(encoding="utf-8")
+    environment = Environment(
+        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=StrictUndefined
+    )
+    values = {"title": title, "summary": summary, "settings": settings, "epochs": epochs}
+    return environment.from_string(template).render(values, accuracy=accuracy, columns=EPOCH_COLUMNS)
+
+
+def read_epochs(metrics_file: Path) -> list[dict[str, float]]:
+    """Return the metrics of every epoch from a `metrics.csv`, which has several rows per epoch."""
+    epochs: dict[int, dict[str, float]] = {}
+    with metrics_file.open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            epoch = epochs.setdefault(int(row["epoch"]), {})
+            epoch.update({name: float(row[name]) for name in EPOCH_COLUMNS if row.get(name)})
+    return [epochs[number] for number in sorted(epochs)]

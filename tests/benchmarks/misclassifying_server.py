@@ -12,7 +12,7 @@ from typing import Any
 from executive.cell.detection import Answer
 from executive.cell.frame import Frame
 from executive.perception.detectors.requests import ChangedRequest, ClosableDetector
-from executive.perception.envelope.rated_detectors import build_rated_detectors
+from executive.perception.envelope import build_rated_detectors
 from executive.processes import WorkerPool
 from tests.benchmarks.ground_truth import WALL_TIME_LIMIT, AuditedRun, FoundObject, run_audited
 from tests.benchmarks.report import Figures, run_command, show_progress, write_json

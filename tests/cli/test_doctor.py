@@ -93,7 +93,7 @@ def test_all_checks_run_although_one_fails(monkeypatch: pytest.MonkeyPatch) -> N
         raise InputError("the skill is broken; correct it")
 
     monkeypatch.setattr("executive.plugins.load_skills", fail)
-    monkeypatch.setitem(sys.modules, "executive.perception.detectors.roboflow.key", None)
+    monkeypatch.setitem(sys.modules, "executive.perception.detectors.roboflow.inference_process", None)
     statuses = find_statuses(doctor.run_checks())
     assert {name: statuses[name] for name in ("system", "plugins", "simulator")} == {
         "system": "problem", "plugins": "problem", "simulator": "ok"

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from executive.cli.main import main
 from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
-from executive.perception.envelope.measurement import StoredErrorRates, read_measurements
+from executive.perception.envelope import read_measurements
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 
 
@@ -43,35 +43,39 @@ def test_a_cells_detector_is_measured_as_in_a_run_with_a_sheet_of_its_worst_miss
     assert (measured["detector"], measured["kind"], measured["images"]) == ("embedded", "embedded", 1)
     assert (measured["recall"], measured["localized"]["median"] < 5) == (1, True)
     (measurement,) = read_measurements(stored)
-    assert (measurement.detector, measurement.rates) == (
-        "embedded",
-        StoredErrorRates(**measured["reliability"]["rates"]),
-    )
+    assert measurement.detector == "embedded"
+    assert measurement.rates.model_dump() == measured["reliability"]["rates"]
     assert measurement.command == "executive evaluate --cell overhead --detector embedded --images 1 --seed 2"
     assert measurement.frames is not None
-    assert f"stored in {stored}" in said
-    assert "overhead, detector embedded" in said
-    assert "miss_rate 0." in said
-    assert f"{sheet}: the " in said
+    for text in (f"stored in {stored}", "overhead, detector embedded", "miss_rate 0.", f"{sheet}: the "):
+        assert text in said
     assert cv2.imread(str(sheet)) is not None
 
 
 @pytest.mark.slow
-def test_a_detector_is_measured_in_the_world_of_a_scene_file(tmp_path):
+def test_only_a_measurement_under_the_conditions_of_a_run_is_stored(missions, tmp_path):
+    before = sorted((missions / "cells").iterdir())
     scene = tmp_path / "moved.yaml"
     scene.write_text("scene: moved\ncamera: {shift: [0.0, 0.03, 0.0]}\ntable: {objects: [4, 4]}\n")
-    options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--scene", scene)
-    _, printed = evaluate(*options)
+    options = ("--cell", "overhead", "--images", 1, "--workers", 1)
+    _, printed = evaluate(*options, "--scene", scene, "--out", tmp_path / "o.json")
     measured = printed["measured"]["overhead"]
     assert (printed["scene"], measured["objects"]) == (str(scene), 4)
     # The detector does not know the shift, so its objects are localized beside their true positions.
     assert measured["localized"]["median"] == pytest.approx(30, abs=5)
+    evaluate(*options, "--threshold", 0, "--out", tmp_path / "o.json")
+    assert not (tmp_path / "o.json").exists()
+    changed = ("--set", "cell.detectors.embedded.threshold=0.7")
+    _, printed = evaluate(*options, *changed)
+    assert printed["measured"]["overhead"]["threshold"] == 0.7
+    assert sorted((missions / "cells").iterdir()) == before
+    evaluate(*options, *changed, "--out", tmp_path / "o.json", "--force")
+    assert read_measurements(tmp_path / "o.json")[0].fingerprint["threshold"] == "0.7"
 
 
 @pytest.mark.parametrize(
     ("arguments", "where", "detector"),
     [
-        ((), "grey", "embedded"),
         (
             ("--cell", "wrist", "--detector", "embedded", "--out", "w.json", "--force"),
             "wrist on grey",
@@ -92,70 +96,29 @@ def test_a_dataset_is_measured_on_with_or_without_a_cell_or_a_model_file(dataset
 def test_a_weak_measurement_is_printed_but_stored_by_force_only(dataset, tmp_path):
     options = ("--dataset", dataset, "--cell", "overhead", "--out", tmp_path / "o.json")
     said, printed = evaluate(*options, code=2)
-    assert (
-        "is not stored: 1 cube objects, 0 sphere objects, 0 duck objects, precision 0.00, recall 0.00" in said
-    )
+    assert "is not stored: 1 cube objects, 0 sphere objects, 0 duck objects, precision 0.00" in said
     assert printed["measured"]["overhead on grey"]["recall"] == 0
     assert not (tmp_path / "o.json").exists()
     evaluate(*options, "--force")
     assert len(read_measurements(tmp_path / "o.json")) == 1
 
 
-@pytest.mark.slow
-def test_a_cell_with_other_values_is_measured_and_stored_in_a_named_file_only(missions, tmp_path):
-    options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--seed", 2)
-    changed = ("--set", "cell.detectors.embedded.threshold=0.7")
-    before = sorted((missions / "cells").iterdir())
-    said, printed = evaluate(*options, *changed)
-    assert (printed["measured"]["overhead"]["threshold"], "stored" in said) == (0.7, False)
-    assert sorted((missions / "cells").iterdir()) == before
-    evaluate(*options, *changed, "--out", tmp_path / "o.json", "--force")
-    assert read_measurements(tmp_path / "o.json")[0].fingerprint["threshold"] == "0.7"
-
-
-@pytest.mark.slow
-def test_a_measurement_with_a_threshold_of_zero_is_not_stored(tmp_path):
-    stored = tmp_path / "overhead.measured.json"
-    options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--out", stored)
-    evaluate(*options, "--threshold", 0)
-    assert not stored.exists()
-
-
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (
-            ("--cell", "overhead", "--detector", "embeded"),
-            'the cell overhead has no detector "embeded". Did you mean "embedded"? Its detectors: embedded.',
-        ),
+        (("--cell", "overhead", "--detector", "embeded"), 'no detector "embeded". Did you mean "embedded"?'),
         (("--cell", "overhead", "--detector", "embedded", "--weights", "m.onnx"), "; give one of them"),
         (("--detector", "eye", "--dataset", "."), "--detector eye needs --cell"),
         (("--labels", "names.txt"), "--labels needs a model file; name it with --weights"),
-        (("--varied", "--dataset", "."), "--varied and --dataset exclude each other; give one"),
         (("--varied", "--view", "full"), "--view full and --varied exclude each other; give one of them"),
-        (("--varied", "--scene", "dim.yaml"), "--scene and --varied exclude each other; give one of them"),
         (("--scene", "dim.yaml"), "there is no file dim.yaml"),
         (("--out", "o.json"), "--out o.json needs exactly one --cell"),
         (("--set", "attempts=3"), "--set attempts is not a key of a cell; write cell.KEY.KEY=VALUE"),
-        (
-            ("--cell", "fruit"),
-            "fruit is of kind fake; measure its detector on your own images",
-        ),
-        (("--dataset", "."), ". contains no labelled images"),
+        (("--cell", "fruit"), "fruit is of kind fake; measure its detector on your own images"),
         (("--dataset", "grey", "--cell", "fasteners"), "is a class of detector fasteners"),
         (("--weights", "no.onnx", "--labels", LABELS_PATH, "--dataset", "grey"), "there is no model file"),
-        (("--sheet", "sheet.gif"), 'the name of --sheet "sheet.gif" must end in .png, .jpg, .jpeg'),
+        (("--sheet", "sheet.gif"), "must end in .png, .jpg, .jpeg"),
     ],
 )
 def test_options_that_make_no_sense_are_explained(dataset, arguments, sentence):
     assert sentence in evaluate(*arguments, code=2)[0]
-
-
-def test_a_detector_that_cannot_be_built_is_reported_before_anything_is_rendered(missions, tmp_path):
-    text = (missions / "cells" / "overhead.yaml").read_text(encoding="utf-8")
-    cell = tmp_path / "mine.yaml"
-    options = "kind: rfdetr\n    model_path: none.onnx\n    labels: [cube]"
-    cell.write_text(text.replace("kind: embedded", options), encoding="utf-8")
-    said, _ = evaluate("--cell", cell, code=2)
-    assert "detector embedded: there is no model file" in said
-    assert "rendering" not in said

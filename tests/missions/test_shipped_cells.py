@@ -10,7 +10,7 @@ import yaml
 from executive.cell.config import CellConfig
 from executive.cells.fake.cell import FakeCell
 from executive.mission.parse.cell_file import load_cell
-from executive.perception.envelope.rated_detectors import find_unmeasured_detectors
+from executive.perception.envelope import find_unmeasured_detectors
 from executive.plugins import load_cell_kind
 
 CELLS = sorted((Path(__file__).parents[2] / "missions" / "cells").glob("*.yaml"))

@@ -36,11 +36,11 @@ def draw(X_WC: Pose, *, light: float = 1.0, bins: list[Bin] = BINS, matrix: Arra
         base = np.array([(-x, -y, 0), (-x, y, 0), (x, y, 0), (x, -y, 0)])
         rim, height = base + np.array([0, 0, bin.size[2]]), bin.size[2]
         inner = np.array([1 - 2 * BIN_THICKNESS / bin.size[0], 1 - 2 * BIN_THICKNESS / bin.size[1], 1])
-        hull = cv2.convexHull(on_image(X_WC, bin, np.concatenate([base, rim]), matrix))[:, 0]
-        opening = on_image(X_WC, bin, rim * inner, matrix)
-        floor = on_image(X_WC, bin, rim * inner - (0, 0, height - BIN_THICKNESS), matrix)
+        hull = cv2.convexHull(find_pixels(X_WC, bin, np.concatenate([base, rim]), matrix))[:, 0]
+        opening = find_pixels(X_WC, bin, rim * inner, matrix)
+        floor = find_pixels(X_WC, bin, rim * inner - (0, 0, height - BIN_THICKNESS), matrix)
         fill(image, hull, 0.6 * colour)
-        fill(image, on_image(X_WC, bin, rim, matrix), 0.95 * colour)
+        fill(image, find_pixels(X_WC, bin, rim, matrix), 0.95 * colour)
         fill(image, opening, 0.7 * colour)
         # The walls hide the rest of the floor.
         fill(image, cv2.intersectConvexConvex(opening, floor)[1][:, 0], 0.95 * colour)
@@ -49,8 +49,8 @@ def draw(X_WC: Pose, *, light: float = 1.0, bins: list[Bin] = BINS, matrix: Arra
     return Frame(1, "top", shown, None, MATRIX, DECLARED, 0.0, np.ones((480, 640), np.bool_), 0)
 
 
-def on_image(X_WC: Pose, bin: Bin, corners: Array, matrix: Array) -> np.ndarray:
-    """Return corners in the frame of a bin `(N, 3)` [m] as OpenCV's pixels."""
+def find_pixels(X_WC: Pose, bin: Bin, corners: Array, matrix: Array) -> np.ndarray:
+    """Return OpenCV's pixels of corners `(N, 3)` [m] in the frame of a bin."""
     return (project(matrix, X_WC, corners + bin.position) - 0.5).astype(np.float32)
 
 
@@ -59,7 +59,7 @@ def fill(image: np.ndarray, polygon: np.ndarray, colour: Array) -> None:
     cv2.fillConvexPoly(image, np.round(16 * polygon).astype(np.int32), colour.tolist(), cv2.LINE_8, 4)
 
 
-def moved(
+def move(
     shift: tuple[float, float, float] = (0, 0, 0), turn_deg: tuple[float, float, float] = (0, 0, 0)
 ) -> Pose:
     """Return the declared pose, shifted in the world [m] and turned about the camera's axes [degree]."""
@@ -78,67 +78,39 @@ def test_a_camera_in_its_place_is_believed_to_be_there(light: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "shift",
-    [(0.01, 0.0, 0.0), (0.0, -0.03, 0.0), (0.03, 0.04, 0.0), (0.0, 0.0, 0.12), (0.0, 0.0, -0.12)],
-)
-def test_a_shift_is_measured(shift: tuple[float, float, float]) -> None:
-    offset = estimate_offset(draw(moved(shift)), BINS)
-    assert offset is not None and offset.outline_distance > MAX_OUTLINE_DISTANCE
-    assert offset.shift == pytest.approx(shift, abs=0.015)
-    assert np.all(np.abs(offset.shift - shift) < 3 * offset.shift_std + 0.001)
-    assert offset.rotation_deg < 1.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("turn_deg", [(2, 0, 0), (0, -6, 0), (0, 0, 2), (0, 0, -10), (5, 5, 3)])
-def test_a_rotation_is_measured(turn_deg: tuple[float, float, float]) -> None:
-    offset = estimate_offset(draw(moved(turn_deg=turn_deg)), BINS)
+    ("shift", "turn_deg"),
+    [
+        ((0.01, 0.0, 0.0), (0, 0, 0)), ((0.03, 0.04, 0.0), (0, 0, 0)), ((0.0, 0.0, -0.12), (0, 0, 0)),
+        ((0, 0, 0), (2, 0, 0)), ((0, 0, 0), (0, -6, 0)), ((0, 0, 0), (0, 0, -10)), ((0, 0, 0), (5, 5, 3)),
+    ],
+)  # fmt: skip
+def test_a_shift_and_a_rotation_are_measured(shift, turn_deg) -> None:
+    offset = estimate_offset(draw(move(shift, turn_deg)), BINS)
     assert offset is not None and offset.outline_distance > MAX_OUTLINE_DISTANCE
     assert offset.rotation_deg == pytest.approx(np.linalg.norm(turn_deg), abs=1.0)
-
-
-@pytest.mark.parametrize("fov", [0.85 * 55, 1.15 * 55])
-def test_another_lens_is_found(fov: float) -> None:
-    assert describe_displacement(draw(DECLARED, matrix=compute_camera_matrix(640, 480, fov)), BINS)
+    if turn_deg == (0, 0, 0):
+        assert offset.shift == pytest.approx(shift, abs=0.015)
+        assert np.all(np.abs(offset.shift - shift) < 3 * offset.shift_std + 0.001)
 
 
 def test_the_words_say_where_the_bins_are_and_how_the_camera_has_moved() -> None:
-    words = describe_displacement(draw(moved((0.0, -0.03, 0.0))), BINS)
-    assert re.fullmatch(
-        r"camera top is not at its declared pose: the outlines of red, blue, yellow appear 12 pixels "
-        r"\((29|30|31) mm\) away from their expected positions, as if the camera had moved by "
-        r"\(\S+, -\d+, \S+\) mm "
-        r"\(standard deviation \d+ mm\) and turned by \S+ degrees; limit 5 mm; mount camera and bins as "
-        r"declared, or measure the pose again",
+    words = describe_displacement(draw(move((0.0, -0.03, 0.0))), BINS)
+    assert re.search(
+        r"camera top .* outlines of red, blue, yellow appear 12 pixels \((29|30|31) mm\) away.* had moved by "
+        r"\(\S+, -[23]\d, \S+\) mm \(standard deviation \d+ mm\) and turned by 0\.\d degrees; limit 5 mm",
         words,
     )
 
 
 def test_a_bin_that_somebody_moved_is_no_moved_camera() -> None:
-    away = [
-        *BINS[:2],
-        Bin("yellow", BINS[2].position + np.array([0.05, -0.04, 0.0]), BINS[2].size, BINS[2].slots),
-    ]
-    assert describe_displacement(draw(DECLARED, bins=away), BINS) == ""
+    away = Bin("yellow", BINS[2].position + np.array([0.05, -0.04, 0.0]), BINS[2].size, BINS[2].slots)
+    assert describe_displacement(draw(DECLARED, bins=[*BINS[:2], away]), BINS) == ""
 
 
-@pytest.mark.parametrize("light", [0.0, 0.005])
-def test_a_dark_image_shows_nothing(light: float) -> None:
-    assert estimate_offset(draw(moved((0.03, 0.0, 0.0)), light=light), BINS) is None
-
-
-def test_bins_out_of_view_or_behind_the_arm_show_nothing() -> None:
-    frame = draw(moved((0.03, 0.0, 0.0)))
-    assert estimate_offset(frame, []) is None
-    frame.visible[:] = False
+@pytest.mark.parametrize(("light", "hidden_width"), [(0.0, 0), (0.005, 0), (1.0, 560), (1.0, 640)])
+def test_darkness_a_straight_line_and_an_arm_do_not_say_where_a_camera_is(
+    light: float, hidden_width: int
+) -> None:
+    frame = draw(move((0.03, 0.0, 0.0)), light=light)
+    frame.visible[:, :hidden_width] = False
     assert estimate_offset(frame, BINS) is None
-
-
-def test_one_straight_line_does_not_say_where_a_camera_is() -> None:
-    frame = draw(moved((0.03, 0.0, 0.0)))
-    frame.visible[:, :560] = False
-    assert estimate_offset(frame, BINS) is None
-
-
-def test_an_empty_table_shows_nothing() -> None:
-    assert estimate_offset(draw(DECLARED, bins=[]), BINS) is None

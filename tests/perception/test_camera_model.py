@@ -48,11 +48,6 @@ def test_the_field_of_view_is_vertical_and_the_principal_point_in_the_middle():
     assert project(K, X_WC, [0, -edge, 0])[0] > 480
 
 
-def test_looking_straight_down_agrees_with_looking_at_a_point_below():
-    down = compute_look_at_pose([0.5, 0.1, 1.2], [0.5, 0.1, 0.0], [1, 0, 0])
-    assert down.rotation == pytest.approx(looking_down([0.5, 0.1, 1.2]).rotation)
-
-
 @given(cameras, points)
 def test_a_point_is_found_again_on_the_plane_it_lies_in(X_WC, point):
     pixel = project(K, X_WC, point)
@@ -94,28 +89,13 @@ def test_opencv_projects_where_we_do_half_a_pixel_aside_and_its_camera_is_ours(m
     assert X_WB.position == pytest.approx(X_WC.position, abs=1e-9)
 
 
-PLAIN = {
-    "mount": "fixed", "position": (0.5, 0.1, 1.2), "look_at": (0.45, 0, 0), "up": (1, 0, 0), "fov_deg": 55,
-    "table_view": (192, 100, 448, 356), "scan_poses": ("home",),
-}  # fmt: skip
+KEPT = {"mount": "fixed", "table_view": (192, 100, 448, 356), "scan_poses": ("home",)}
+PLAIN = {**KEPT, "position": (0.5, 0.1, 1.2), "look_at": (0.45, 0, 0), "up": (1, 0, 0), "fov_deg": 55}
 
 
 def by_calibration(**calibration):
-    """Return the camera with a calibration instead of what says where it is."""
-    kept = {key: PLAIN[key] for key in ("mount", "table_view", "scan_poses")}
-    return CameraConfig(**kept, calibration=calibration)
-
-
-def test_solve_pnp_finds_the_calibration_of_a_camera():
-    _, X_WC = compute_calibration(CameraConfig(**PLAIN))
-    marks = np.random.default_rng(1).uniform((0.3, -0.3, 0.0), (0.7, 0.3, 0.2), (20, 3))
-    seen = project(np.reshape(GIVEN, (3, 3)), X_WC, marks)
-    _, rvec, tvec = cv2.solvePnP(marks, seen, np.reshape(GIVEN, (3, 3)), None)
-    measured = {"rotation": rvec.ravel().tolist(), "translation": tvec.ravel().tolist()}
-    found_matrix, found = compute_calibration(by_calibration(matrix=GIVEN, mount_to_camera=measured))
-    assert found.rotation == pytest.approx(X_WC.rotation, abs=1e-5)
-    assert found.position == pytest.approx(X_WC.position, abs=1e-5)
-    assert project(found_matrix, found, marks) == pytest.approx(seen + 0.5, abs=1e-3)
+    """Return a camera with a calibration."""
+    return CameraConfig(**KEPT, calibration=calibration)
 
 
 def test_a_hand_eye_calibration_is_the_way_back():
@@ -141,10 +121,10 @@ HALF = {key: value for key, value in PLAIN.items() if key not in ("up", "fov_deg
         (
             by_calibration,
             {"matrix": [400, 2, 320, 0, 400, 240, 0, 0, 1], "mount_to_camera": TURN},
-            r"with fx and fy above 0, and neither transposed nor P, not \[400.0, 2.0, 320.0",
+            "transposed",
         ),
         (CameraConfig, BOTH, "must not have position, look_at, up, fov_deg besides"),
-        (CameraConfig, HALF, "needs up, fov_deg, or a calibration instead of position, look_at, up, fov_deg"),
+        (CameraConfig, HALF, "needs up, fov_deg, or a calibration"),
     ],
 )
 def test_a_camera_that_says_too_little_or_too_much_of_where_it_is_is_refused(build, options, expected):

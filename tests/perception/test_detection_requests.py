@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from executive.cell.detection import Answer, Detection, ErrorRates
-from executive.errors import DeadlinePassed, Unavailable
+from executive.errors import DeadlinePassed
 from executive.perception.detectors.requests import PendingSearch
 
 FOUND = [Detection("cube", 0.9, (0.0, 0.0, 1.0, 1.0))]
@@ -25,12 +25,12 @@ def clock():
 def ended(clock):
     """Returns a request, due at 0.05 s, whose search has ended with detections or an error."""
 
-    def ended(result, **options):
+    def end(result, **options):
         work = Future()
         (work.set_exception if isinstance(result, Exception) else work.set_result)(result)
         return PendingSearch(work, 0.05, clock, "eye", ERROR_RATES, **options)
 
-    return ended
+    return end
 
 
 def test_an_answer_that_is_in_early_shows_only_when_it_is_due(ended, clock):
@@ -53,14 +53,12 @@ def test_the_clock_waits_for_an_answer_that_is_late(clock):
         assert release.is_set()
 
 
-@pytest.mark.parametrize("error", [Unavailable("the model is gone"), ZeroDivisionError("a bug")])
-def test_what_the_search_raises_comes_out_of_the_result_as_it_is(ended, clock, error):
-    request = ended(error, expiry_time=1.0)
+def test_what_the_search_raises_comes_out_of_the_result_as_it_is(ended, clock):
+    request = ended(ZeroDivisionError("a bug"), expiry_time=1.0)
     clock.now = 0.05
     assert request.ready
-    with pytest.raises(type(error)) as raised:
+    with pytest.raises(ZeroDivisionError):
         request.result()
-    assert raised.value is error
 
 
 def test_that_a_deadline_has_passed_shows_when_it_has_passed_on_the_runs_clock_too(ended, clock):

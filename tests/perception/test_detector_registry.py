@@ -60,41 +60,28 @@ def test_a_kind_that_is_not_installed_is_found_before_and_at_the_start(tmp_path)
     configs = {"first": DetectorConfig(kind="embedded"), "second": DetectorConfig(kind="yolo")}
     sentence = f'detector "second" is of kind "yolo", which is not installed; installed: {INSTALLED}'
     assert list(find_detector_errors(configs, tmp_path)) == [(("detectors", "second", "kind"), sentence)]
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError, match='"yolo", which is not installed'):
         build(second=configs["second"])
-    assert str(caught.value) == sentence
 
 
 def test_a_wrong_option_is_found_at_its_key(tmp_path):
     configs = {"mine": DetectorConfig(kind="rfdetr", model_path="m.onnx", labels=["cube"])}
-    ((keys, sentence),) = find_detector_errors(configs, tmp_path)
-    assert keys == ("detectors", "mine", "model_path")
-    assert sentence.startswith(f"there is no model file {tmp_path / 'm.onnx'}; check the path")
+    assert [keys for keys, _ in find_detector_errors(configs, tmp_path)] == [
+        ("detectors", "mine", "model_path")
+    ]
 
 
 def test_the_labels_of_a_kind_that_does_not_say_them_are_not_known(tmp_path, oracle_installed):
     configs = {kind: DetectorConfig(kind=kind) for kind in ("embedded", "oracle", "yolo")}
     known = find_detectable_labels(configs, tmp_path)
     assert known == {"embedded": ("cube", "sphere", "duck"), "oracle": None, "yolo": None}
-    assert [keys for keys, _ in find_detector_errors(configs, tmp_path)] == [("detectors", "yolo", "kind")]
 
 
-def test_a_kind_of_somebody_elses_is_found_by_its_entry_point(tmp_path, monkeypatch):
-    info = tmp_path / "theirs-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(
-        f"[{detector_registry.DETECTOR_GROUP}]\noracle = {__name__}:Oracle\n"
-    )
-    monkeypatch.syspath_prepend(tmp_path)
-    mine = build(tmp_path, mine=oracle(wish=3))["mine"]
-    assert mine.config.options == {"wish": 3}
-    assert (mine.context.name, mine.context.cell_folder, mine.context.seed) == ("mine", tmp_path, 7)
-
-
-def test_detectors_are_built_once_in_the_order_of_the_file(oracle_installed):
-    built = build(first=oracle(beside="second"), second=oracle())
+def test_detectors_are_built_once_in_the_order_of_the_file(oracle_installed, tmp_path):
+    built = build(tmp_path, first=oracle(beside="second"), second=oracle())
     assert list(built) == ["first", "second"]
+    context = built["first"].context
+    assert (context.name, context.cell_folder, context.seed) == ("first", tmp_path, 7)
     assert built["first"].other is built["second"]
     assert len(Oracle.made) == 2
 

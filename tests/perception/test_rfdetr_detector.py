@@ -28,123 +28,96 @@ class BrightSpots:
         return [Detection("spot", 0.9, box)]
 
 
-def frame_with_spot(left, top):
+def show_spot(left, top):
     image = np.zeros((480, 640, 3), np.uint8)
     image[top : top + 20, left : left + 20] = 255
     return SimpleNamespace(image=image)
 
 
-def context(base=None):
+CLOCK = SimpleNamespace(now=0.0)
+
+
+def make_context(base=None):
     camera = SimpleNamespace(table_view=(192, 100, 448, 356))
-    return DetectorContext("eye", camera, SimpleNamespace(now=0.0), base, seed=0, get_detector=None)
+    return DetectorContext("eye", camera, CLOCK, base, seed=0, get_detector=None)
 
 
-def found_by(detector, frame, view):
+def search(detector, frame, view):
     """Return what the detector finds, waited for on its clock."""
     request = detector.request(frame, view)
-    detector._context.clock.now += 0.05
+    assert not request.ready
+    CLOCK.now += 0.05
     assert request.ready
     detector.close()
     return request.result().confident
 
 
-def spots(left, top, view):
+def find_spots(left, top, view):
     """Return the spots that a model finds."""
-    detector = RfdetrDetector(BrightSpots(), DetectorConfig(kind="rfdetr"), context(), {})
-    return found_by(detector, frame_with_spot(left, top), view)
+    detector = RfdetrDetector(BrightSpots(), DetectorConfig(kind="rfdetr"), make_context(), {})
+    return search(detector, show_spot(left, top), view)
 
 
 def test_a_box_in_the_table_view_is_in_the_frames_pixels():
-    (found,) = spots(300, 200, "table")
+    (found,) = find_spots(300, 200, "table")
     assert found.box == pytest.approx((300, 200, 320, 220), abs=1.0)
+    assert find_spots(20, 20, "table") == ()
 
 
-def test_the_table_view_does_not_show_what_lies_beside_it():
-    assert spots(20, 20, "table") == ()
-
-
-@pytest.mark.parametrize(("left", "top"), [(0, 0), (250, 100), (620, 460), (180, 240)])
+@pytest.mark.parametrize(("left", "top"), [(0, 0), (620, 460), (180, 240)])
 def test_the_full_view_finds_an_object_anywhere_exactly_once(left, top):
-    (found,) = spots(left, top, "full")
+    (found,) = find_spots(left, top, "full")
     assert found.box == pytest.approx((left, top, left + 20, top + 20))
 
 
-def configured(kind, **options):
+def configure(kind, **options):
     return DetectorConfig(kind=kind.__name__, **options)
 
 
 def test_any_exported_model_can_be_used_by_path_and_the_embedded_one_needs_no_options(tmp_path):
     (tmp_path / "model.onnx").symlink_to(MODEL_PATH)
     (tmp_path / "names.txt").write_text("one\ntwo\nthree\n")
-    mine = configured(RfdetrDetector, model_path="model.onnx", labels="names.txt", threshold=0.6)
-    for kind, config in ((RfdetrDetector, mine), (EmbeddedDetector, configured(EmbeddedDetector))):
-        detector = kind.from_config(config, context(tmp_path))
-        assert found_by(detector, frame_with_spot(640, 480), "table") == ()
-
-
-def test_an_answer_shows_after_the_latency_with_its_detector_and_the_cells_names():
-    config = DetectorConfig(kind="rfdetr", threshold=0.6, miss_rate=0.2)
-    detector = RfdetrDetector(BrightSpots(), config, context(), {"spot": "cube"})
-    clock = detector._context.clock
-    clock.now = 1.0
-    request = detector.request(frame_with_spot(300, 200), "table")
-    clock.now = 1.04
-    assert not request.ready
-    clock.now = 1.05
-    answer = request.result()
-    detector.close()
-    assert (answer.detector, answer.error_rates) == ("eye", config.error_rates)
-    assert [found.label for found in answer.confident] == ["cube"]
+    mine = configure(RfdetrDetector, model_path="model.onnx", labels="names.txt", threshold=0.6)
+    for kind, config in ((RfdetrDetector, mine), (EmbeddedDetector, configure(EmbeddedDetector))):
+        detector = kind.from_config(config, make_context(tmp_path))
+        assert search(detector, show_spot(640, 480), "table") == ()
 
 
 WRONG = [
     (RfdetrDetector, {"labels": ["a"]}, "model_path", 'option "model_path".*field required'),
-    (RfdetrDetector, {"model_path": ONNX, "labels": 3}, "labels", 'option "labels.*" .* valid'),
-    (RfdetrDetector, {"model_path": ONNX, "labels": ["a"], "c": 1}, "c", 'option "c".*not permitted'),
     (RfdetrDetector, {"model_path": "m.onnx", "labels": ["a"]}, "model_path", "no model file .*m.onnx"),
     (RfdetrDetector, {"model_path": ONNX, "labels": ["a"]}, "model_path", "3 classes, but .* 1 labels: a"),
     (RfdetrDetector, {"model_path": ONNX, "labels": "no.txt"}, "labels", "no label file .*no.txt"),
     (RfdetrDetector, {"model_path": ONNX, "labels": "empty.txt"}, "labels", "empty.txt is empty"),
     (RfdetrDetector, {"model_path": ONNX, "labels": ONNX}, "labels", "embedded.onnx cannot be read: .*utf-8"),
-    (
-        RfdetrDetector,
-        {"model_path": ONNX, "labels": ["a"], "class_map": {"b": "cube"}},
-        "class_map",
-        "class_map .* contains b, which the model cannot find; the classes of the model are a",
-    ),
+    (RfdetrDetector, {"model_path": ONNX, "labels": ["a"], "class_map": {"b": "cube"}}, "class_map",
+     "contains b, which the model cannot find; the classes of the model are a"),
     (EmbeddedDetector, {"model_path": ONNX}, "model_path", 'option "model_path".*the options are none'),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("kind", "options", "option", "text"), WRONG)
 def test_a_wrong_option_is_said_in_a_sentence_before_and_at_the_start(tmp_path, kind, options, option, text):
     (tmp_path / "empty.txt").touch()
-    ((found, sentence),) = kind.check(configured(kind, **options), tmp_path, {})
+    ((found, sentence),) = kind.check(configure(kind, **options), tmp_path, {})
     assert found == option
     with pytest.raises(InputError, match=text) as caught:
-        kind.from_config(configured(kind, **options), context(tmp_path))
+        kind.from_config(configure(kind, **options), make_context(tmp_path))
     assert str(caught.value) == sentence
 
 
-@pytest.mark.parametrize(
-    ("options", "wrong"),
-    [
-        ({"colour": 1, "threads": 0, "labels": ["a"]}, ["threads", "colour"]),
-        ({"labels": "no.txt"}, ["model_path", "labels"]),
-    ],
-)
-def test_every_wrong_option_is_found_at_once(tmp_path, options, wrong):
-    config = configured(RfdetrDetector, model_path="m.onnx", **options)
-    assert [option for option, _ in RfdetrDetector.check(config, tmp_path, {})] == wrong
+def test_every_wrong_option_is_found_at_once(tmp_path):
+    config = configure(RfdetrDetector, model_path="m.onnx", colour=1, threads=0, labels=["a"])
+    assert [option for option, _ in RfdetrDetector.check(config, tmp_path, {})] == ["threads", "colour"]
 
 
 def test_the_labels_are_the_cells_names_and_no_model_is_read_for_them(tmp_path):
     (tmp_path / "names.txt").write_text("one\ntwo\n")
 
     def labels(**options):
-        return RfdetrDetector.labels(configured(RfdetrDetector, **options), tmp_path)
+        return RfdetrDetector.labels(configure(RfdetrDetector, **options), tmp_path)
 
     assert labels(model_path="m.onnx", labels="names.txt", class_map={"one": "cube"}) == ("cube", "two")
     assert labels() is labels(model_path="m.onnx", labels="no.txt") is None
-    shipped = EmbeddedDetector.labels(configured(EmbeddedDetector), tmp_path)
+    shipped = EmbeddedDetector.labels(configure(EmbeddedDetector), tmp_path)
     assert shipped == tuple(LABELS_PATH.read_text().split())

@@ -64,14 +64,12 @@ def raise_unavailable() -> Answer:
         (
             lambda: Answer("eye", (detect(confidence=1.5),), RATES),
             Unavailable,
-            "detector eye returned an invalid box: 'cube' 1.5 at (0.0, 0.0, 9.0, 9.0) "
-            "in an image of 20 x 20 pixels",
+            r"detector eye returned an invalid box: 'cube' 1.5 at \(0.0, 0.0, 9.0, 9.0\) .* 20 x 20",
         ),
         (
             lambda: Answer("eye", (detect(),) * (MAX_BOXES + 1), RATES),
             Crowded,
-            "detector eye found 61 boxes in the view full, which cannot all be objects; at most 60 are "
-            "allowed: raise `floor` of the detector in the cell file, or use another detector",
+            "detector eye found 61 boxes in the view full, .* at most 60",
         ),
     ],
 )
@@ -80,6 +78,5 @@ def test_an_unusable_answer_names_the_detector(result: Any, error: type[Exceptio
     request = screen_detectors({"eye": eye}, {"cube": ObjectClass("cube", 0.05, 0.0354)})["eye"].request(
         FRAME, "full"
     )
-    with pytest.raises(error) as raised:
+    with pytest.raises(error, match=message):
         request.result()
-    assert str(raised.value) == message

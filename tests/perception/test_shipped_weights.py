@@ -8,9 +8,8 @@ from executive.cells.sim.scene_file import DECLARED_SCENE
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
 from executive.perception.detectors.onnx_model import read_labels
-from executive.training.evaluation.cell_detector import CellDetector
-from executive.training.evaluation.evaluate import evaluate
-from executive.training.scene_renderer import SceneRenderer
+from executive.training.evaluation.evaluate import CellDetector, evaluate
+from executive.training.rendering import SceneRenderer
 
 
 def test_the_weights_fit_into_a_package_and_a_card_goes_with_them(missions):

@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from PIL import Image
 
-from executive.cli.main import main
 from executive.errors import InputError
 from executive.training import train
-from executive.training.labelled_image import LabelledImage
+from executive.training.dataset import LabelledImage
 from executive.training.samples import LabelledDataset
 from tests.training.dataset_variants import (
     CLASSES,
@@ -68,9 +66,7 @@ def test_an_ambiguous_or_damaged_dataset_is_refused(tmp_path, samples, word):
         LabelledDataset(tmp_path).match_classes(CLASSES, "detector eye")
 
 
-@pytest.mark.parametrize(
-    "options", [{}, {"turn": 6}, {"mode": "CMYK", "suffixes": (".jpg",)}, {"factors": (1.25, 1)}]
-)
+@pytest.mark.parametrize("options", [{}, {"turn": 6}, {"mode": "CMYK", "suffixes": (".jpg",)}])
 def test_a_training_sees_the_pixels_and_boxes_of_an_evaluation(tmp_path, samples, options):
     for split in ("train", "valid"):
         file = f"{split}/_annotations.coco.json"
@@ -94,11 +90,6 @@ def test_the_summary_states_objects_and_dropped_boxes(tmp_path, samples):
     assert LabelledDataset(tmp_path).summary == f"{tmp_path}, split test: {counts}"
 
 
-def test_a_folder_that_starts_like_a_split_is_none(tmp_path, samples):
-    write_yolo(tmp_path, samples, folder="test_tubes", labels="test_tubes")
-    assert f"{tmp_path}: 2 images" in LabelledDataset(tmp_path).summary
-
-
 def test_a_lost_label_file_is_counted_and_an_upper_case_one_is_read(tmp_path, samples):
     write_yolo(tmp_path, samples)
     (tmp_path / "labels/val/a0.txt").rename(tmp_path / "labels/val/a0.TXT")
@@ -112,12 +103,6 @@ def test_a_missing_split_is_not_replaced_by_other_images(tmp_path, samples, spli
     write_yolo(tmp_path, samples, folder="images/train", labels="labels/train", data=data)
     with pytest.raises(InputError, match=f"split {split} contains no labelled images"):
         LabelledDataset(tmp_path, split)
-
-
-def test_images_of_equal_names_in_two_folders_are_different(tmp_path, samples):
-    for folder, part in (("cam1", samples[:1]), ("cam2", samples[1:])):
-        write_yolo(tmp_path, part, folder=f"images/val/{folder}", labels=f"labels/val/{folder}")
-    check_equal(LabelledDataset(tmp_path), samples)
 
 
 def test_boxes_are_clipped_and_ignored_boxes_are_resized_with_the_image(tmp_path, samples):
@@ -148,14 +133,12 @@ NAME, BOX = ("images", 0, "file_name"), ("annotations", 0, "bbox")
         (set_value("images", value=[{}]), "images[0].id: Field required"),
         (set_value("annotations", 0, "image_id", value=9), "annotations[0].image_id: no id 9; ids: 0"),
         (set_value(*BOX, value=[1, 2, 3, float("nan")]), "bbox[3]: Input should be a finite number"),
-        (set_value(*BOX, value=[-1e308, 2, 1e308, 4]), "bbox[0]: Input should be greater than or equal to"),
         (set_value("images", 0, "width", value=10**400), "images[0].width: Input should be less than"),
         (set_value(*BOX, value=[1, 2, -3, 4]), "bbox[2]: Input should be greater than or equal to 0"),
         (set_value("images", 1, "id", value=0), "have the same id"),
         (set_value(*NAME, value="./a1.png"), "two images have the same file_name"),
         (add(*[[1, 2, 30, 40]] * 1000), "has more than 1000 objects; divide the image"),
         (set_value(*NAME, value="../../b.jpg"), 'images[0].file_name: "../../b.jpg" is not a file in '),
-        (set_value(*NAME, value="/etc/passwd"), 'images[0].file_name: "/etc/passwd" is not a file in '),
         (set_value(*NAME, value="link.jpg"), "link.jpg is not a file in "),
         (set_value(*NAME, value="pipe.jpg"), "pipe.jpg is not a file in "),
         (set_value(*NAME, value="text.png"), "text.png cannot be read; write a sound JPEG or PNG file"),
@@ -176,15 +159,12 @@ def test_a_damaged_coco_dataset_is_one_error(tmp_path, samples, change, error):
     ("file", "content", "error"),
     [
         ("test/_annotations.coco.json", "{", "content: Invalid JSON: EOF"),
-        ("test/_annotations.coco.json", "[" * 100_000, "content: Invalid JSON: recursion limit"),
         ("test/annotations.json", "{}", "are COCO files of one split"),
         ("labels/val/a0.txt", " " * 10_000_001, "labels/val/a0.txt has more than 10 MB"),
         ("labels/val/a0.txt", "\udcff", "labels/val/a0.txt cannot be read"),
         ("labels/val/a0.txt", "0 0.5 0.5 nan 0.4", "labels/val/a0.txt: a label is invalid"),
-        ("labels/val/a0.txt", "0 0.5 0.5 0.1 0.1\n" * 1001, "has more than 1000 objects"),
         ("data.yaml", " " * 100_001, "data.yaml has more than 0.1 MB"),
         ("data.yaml", "names: [duck\n", "data.yaml:2: invalid YAML: "),
-        ("data.yaml", "names: !!python/name:os.system ''\n", "data.yaml: names.dict[int,str]"),
     ],
 )
 def test_a_damaged_file_is_one_error(tmp_path, samples, file, content, error):
@@ -195,36 +175,8 @@ def test_a_damaged_file_is_one_error(tmp_path, samples, file, content, error):
     assert error in str(raised.value)
 
 
-@pytest.mark.parametrize(
-    "tag", ["!!bool foo", "!!timestamp foo", "!!int ''", "!!python/name:os.system ''", "yes"]
-)
+@pytest.mark.parametrize("tag", ["!!timestamp foo", "!!python/name:os.system ''", "yes"])
 def test_names_of_classes_are_text_whatever_their_tag(tmp_path, samples, tag):
     write_yolo(tmp_path, samples)
     (tmp_path / "data.yaml").write_text(f"names: [{tag}, duck, sphere]\n")
     assert all(isinstance(label, str) for label in LabelledDataset(tmp_path).object_counts)
-
-
-def evaluate(folder):
-    """Return the figures of `executive evaluate`."""
-    result = CliRunner().invoke(main, ["evaluate", "--json", "--dataset", str(folder)])
-    (figures,) = json.loads(result.stdout)["measured"].values()
-    return [figures[name] for name in ("images", "objects", "precision", "recall", "map50")]
-
-
-@pytest.fixture(scope="module")
-def rendered(tmp_path_factory):
-    """Forty rendered images of a cell, and the figures of its detector."""
-    folder = tmp_path_factory.mktemp("rendered")
-    arguments = ["dataset", "overhead", "--out", str(folder), "--images", "40", "--valid", "1"]
-    CliRunner().invoke(main, arguments, catch_exceptions=False)
-    samples = list(LabelledDataset(folder))
-    write_coco(folder / "clean", samples)
-    return samples, evaluate(folder / "clean")
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("name", VARIANTS)
-def test_a_dataset_of_another_tool_gives_the_figures_of_the_clean_one(tmp_path, rendered, name):
-    samples, figures = rendered
-    VARIANTS[name](tmp_path, samples)
-    assert evaluate(tmp_path) == pytest.approx(figures, rel=0.01)

@@ -41,7 +41,9 @@ def test_coco_boxes_are_corner_and_size_and_splits_have_files_of_their_own(tmp_p
     first, second = valid["annotations"]
     assert (first["id"], first["bbox"], first["area"], first["category_id"]) == (1, [10, 20, 20, 40], 800, 1)
     assert (second["id"], second["category_id"]) == (2, 0)
-    assert [category["name"] for category in valid["categories"]] == list(CLASSES)
+    # RF-DETR drops a class without objects if another class names it as its parent.
+    categories = [(category["name"], category["supercategory"]) for category in valid["categories"]]
+    assert categories == [(name, name) for name in CLASSES]
     assert (len(train["annotations"]), (tmp_path / "test").exists()) == (1, False)
 
 
@@ -70,13 +72,3 @@ def test_the_images_that_no_training_used_are_read_as_they_were_written(root):
 def test_what_cannot_be_written_or_read_is_explained(tmp_path):
     with pytest.raises(InputError, match='"voc" is unknown; use coco or yolo'):
         write_annotations(tmp_path, "voc", ENTRIES, CLASSES)
-    with pytest.raises(InputError, match="no labelled images"):
-        LabelledDataset(tmp_path)
-
-
-def test_a_damaged_image_is_named(root):
-    (damaged,) = (root / "valid").rglob("a.jpg")
-    dataset = LabelledDataset(root)
-    damaged.write_bytes(b"no picture")
-    with pytest.raises(InputError, match=r"a\.jpg"):
-        list(dataset)

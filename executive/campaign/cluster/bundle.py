@@ -17,7 +17,7 @@ from executive.campaign.sweep_job import SweepJob
 from executive.errors import InputError
 from executive.mission.text.file_search import find_mission
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
-from executive.perception.envelope.measurement import MEASUREMENT_SUFFIX
+from executive.perception.envelope import MEASUREMENT_SUFFIX
 from executive.plugins import CELL_KIND_GROUP, SKILL_GROUP, find_project, list_entries
 from executive.run.versions import DISTRIBUTION
 from executive.tree.node_registry import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP

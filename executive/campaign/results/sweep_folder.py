@@ -19,8 +19,7 @@ from executive.cells.sim.scene_file import load_scene
 from executive.errors import InputError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.text.file_search import read_source
-from executive.perception.envelope.measurement import compute_fingerprint
-from executive.perception.envelope.rated_detectors import FAKE_KIND
+from executive.perception.envelope import FAKE_KIND, compute_fingerprint
 from executive.plugins import load_cell_kind, load_skills
 from executive.record.run_directory import make_dated_folder
 from executive.run.versions import list_versions

@@ -31,11 +31,10 @@ from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.file_search import get_shipped_folder
 from executive.motion.arms import find_arm_errors, find_places_out_of_reach
-from executive.perception.camera_model import compute_hull_mask
+from executive.perception.camera_model import MountedCamera, compute_hull_mask
 from executive.perception.detectors.requests import PendingSearch
 from executive.perception.detectors.screening import screen_detectors
 from executive.perception.localization import CellLocalizer
-from executive.perception.mounted_camera import MountedCamera
 
 SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
 """Permitted bins of each class of the shipped cells."""

@@ -12,7 +12,7 @@ from executive.cell.config import DetectorConfig
 from executive.cell.detection import Answer, Detection
 from executive.cell.frame import Frame
 from executive.cell.protocols import Detector
-from executive.perception.detectors.options import DetectorOptions, OptionErrors
+from executive.perception.detectors.detector_registry import DetectorOptions, OptionErrors
 from executive.perception.detectors.requests import ChangedRequest, DetectorContext
 
 MAX_CONFUSED_CONFIDENCE = 0.75

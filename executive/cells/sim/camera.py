@@ -18,8 +18,7 @@ from executive.cells.sim.renderer import CELL_LIGHT, FixedViewRenderer, Image, L
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 from executive.perception.camera_check import describe_displacement
-from executive.perception.camera_model import FAR_PLANE, compute_calibration
-from executive.perception.mounted_camera import MountedCamera
+from executive.perception.camera_model import FAR_PLANE, MountedCamera, compute_calibration
 
 Mask = NDArray[np.bool_]
 """Mask `(H, W)` of pixels."""

@@ -31,7 +31,7 @@ from executive.mission.text.file_search import get_shipped_folder
 from executive.motion.arms import build_planner
 from executive.perception.detectors.requests import ClosableDetector
 from executive.perception.detectors.screening import screen_detectors
-from executive.perception.envelope.rated_detectors import build_rated_detectors
+from executive.perception.envelope import build_rated_detectors
 from executive.perception.localization import CellLocalizer
 
 MIN_CENTRE_HEIGHT = -0.05

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from executive.cell.config import DetectorConfig
-from executive.perception.detectors.options import DetectorOptions, OptionErrors
+from executive.perception.detectors.detector_registry import DetectorOptions, OptionErrors
 from executive.perception.detectors.rfdetr import RfdetrDetector, RfdetrOptions
 
 MODEL_PATH = Path(__file__).parent.parent / "weights" / "embedded.onnx"

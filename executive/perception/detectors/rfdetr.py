@@ -14,11 +14,15 @@ from executive.cell.config import DetectorConfig
 from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.perception.detectors import onnx_model
+from executive.perception.detectors.detector_registry import (
+    DetectorOptions,
+    OptionErrors,
+    find_class_map_errors,
+)
 from executive.perception.detectors.onnx_model import OnnxModel, describe_missing_model, read_labels
-from executive.perception.detectors.options import DetectorOptions, OptionErrors, find_class_map_errors
 from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
 from executive.perception.detectors.views import Region, search_regions
-from executive.perception.envelope.measurement import is_measured
+from executive.perception.envelope import is_measured
 
 
 class RfdetrOptions(DetectorOptions):

@@ -3,31 +3,47 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from executive.cell.config import CellConfig, DetectorConfig
+from executive.cell.clock import STEP, StepClock
+from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
 from executive.cell.detection import Answer, Detection
-from executive.cell.frame import Box
+from executive.cell.frame import Box, Frame
 from executive.cell.protocols import Localizer
 from executive.errors import Unavailable
-from executive.perception.envelope.frame_statistics import FrameRange, compute_frame_statistics
-from executive.training.evaluation.cell_detector import CellDetector
-from executive.training.evaluation.error_statistics import ErrorStatistics, RepeatedErrors
-from executive.training.evaluation.matching import BoxMatch, is_ignored, match_detections
+from executive.perception.detectors.detector_registry import build_detectors
+from executive.perception.envelope import FrameRange, compute_frame_statistics
+from executive.training.dataset import LabelledImage
+from executive.training.evaluation.error_statistics import (
+    BoxMatch,
+    ErrorStatistics,
+    RepeatedErrors,
+    is_ignored,
+    match_detections,
+)
 from executive.training.evaluation.metrics import Distribution, Evaluation
 from executive.training.evaluation.worst_mistakes import WorstMistakes
-from executive.training.labelled_image import LabelledImage
 
 MIN_CONFIDENCE = 0.01
 """Minimum confidence of the detections of a model file; the average precision needs low confidences."""
 MODEL_NAME = "model"
 """Name of the detector that is built from a model file."""
+REQUEST_INTERVAL = 1.0
+"""Simulated time between two requests [s], similar to the time between two frames in a run."""
+ANSWER_TIMEOUT = 60.0
+"""Maximum simulated time from a request to its answer [s]."""
+WHOLE_IMAGE_CAMERA = CameraConfig(
+    mount="fixed", position=(0, 0, 1), look_at=(0, 0, 0), up=(1, 0, 0), fov_deg=60,
+    table_view=(0, 0, 64, 64), scan_poses=("none",),
+).model_copy(update={"table_view": (0, 0, 1 << 20, 1 << 20)})  # fmt: skip
+"""Camera for images of any size; `model_copy` does not validate the size of `table_view`."""
 
 
 def evaluate(
@@ -102,6 +118,62 @@ def _match_confident(answer: Answer, sample: LabelledImage, min_confidence: floa
     return match_detections([entry for entry in confident if not is_ignored(entry, sample)], sample)
 
 
+class CellDetector:
+    """Detector of a cell file for the evaluation of its accuracy.
+
+    Args:
+        configs: Detectors of the cell file by name; the evaluated detector may call other detectors.
+        name: Name of the detector to evaluate.
+        base: Folder to which paths in the options of detectors are relative.
+        camera: Camera of the frames; None: the detector searches whole images.
+        view: Searched view of `camera`, `table` or `full`.
+        classes: Classes of the cell; detections of other classes are dropped, as in a run. None: all classes.
+
+    Raises:
+        InputError: A detector cannot be built.
+    """
+
+    def __init__(
+        self,
+        configs: Mapping[str, DetectorConfig], name: str, *, base: Path, camera: CameraConfig | None = None,
+        view: str = "table", classes: Collection[str] | None = None,
+    ) -> None:  # fmt: skip
+        self.threshold = configs[name].threshold
+        self._name = name
+        self._view = view if camera else "full"
+        self._classes = classes
+        self._now = 0.0
+        camera, clock = camera or WHOLE_IMAGE_CAMERA, StepClock(lambda: self._now)
+        self._detectors = build_detectors(configs, camera=camera, clock=clock, base=base, seed=0)
+
+    def detect(self, frame: Frame) -> tuple[Answer, float]:
+        """Return the answer of the detector to a frame, and its latency in wall time [ms].
+
+        Raises:
+            Unavailable: The detector gave no usable answer.
+        """
+        start_time, request_time = time.perf_counter(), self._now
+        try:
+            request = self._detectors[self._name].request(replace(frame, stamp=request_time), self._view)
+            while not request.ready:
+                if self._now - request_time > ANSWER_TIMEOUT:
+                    raise Unavailable(f"no answer within {ANSWER_TIMEOUT:g} s of simulated time")
+                self._now += STEP
+            answer = request.result()
+        finally:
+            self._now += REQUEST_INTERVAL
+        latency = (time.perf_counter() - start_time) * 1000
+        if self._classes is not None:
+            detections = tuple(entry for entry in answer.confident if entry.label in self._classes)
+            answer = replace(answer, confident=detections)
+        return answer, latency
+
+    def close(self) -> None:
+        """Release the resources of the detectors."""
+        for detector in self._detectors.values():
+            detector.close()
+
+
 def find_label_file(model: Path) -> Path:
     """Return the label file of a model `NAME.onnx`: `NAME.labels.txt` if it exists, else `labels.txt`."""
     file = model.with_suffix(".labels.txt")
@@ -142,7 +214,6 @@ class AveragePrecision:
 
         self._metric = MeanAveragePrecision()
         self._class_ids: dict[str, int] = {}
-        self._has_objects = False
 
     def add(self, detections: Sequence[Detection], sample: LabelledImage) -> None:
         """Add the detections in one image; the detections may have any confidence."""
@@ -150,14 +221,11 @@ class AveragePrecision:
         predicted = self._to_detections(boxes, [detection.label for detection in detections])
         predicted.confidence = np.array([detection.confidence for detection in detections], dtype=float)
         self._metric.update([predicted], [self._to_detections(sample.boxes, sample.labels)])
-        self._has_objects |= bool(sample.labels)
 
     def compute(self) -> tuple[float, float]:
         """Return mAP at IoU 0.5, and the mean of mAP over IoUs from 0.5 to 0.95; zeros without objects."""
-        if not self._has_objects:
-            return 0.0, 0.0
         result = self._metric.compute()
-        return float(result.map50), float(result.map50_95)
+        return max(float(result.map50), 0.0), max(float(result.map50_95), 0.0)
 
     def _to_detections(self, boxes: Sequence[Box], labels: Sequence[str]) -> Any:
         """Return boxes and labels as `supervision.Detections`."""

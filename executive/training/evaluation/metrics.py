@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.special import betaincinv, gammaincinv
 
-from executive.perception.envelope.frame_statistics import FrameRange
-from executive.perception.envelope.measurement import StoredErrorRates
+from executive.perception.envelope import FrameRange, StoredErrorRates
 
 NO_OBJECT = "nothing"
 """Detected class of a missed object, and true class of a false detection, in a confusion matrix."""

@@ -13,36 +13,40 @@ from numpy.typing import NDArray
 
 from executive.cell.detection import Detection
 from executive.cell.frame import Box
-from executive.training.evaluation.matching import BoxMatch
-from executive.training.labelled_image import LabelledImage
+from executive.training.dataset import LabelledImage
+from executive.training.evaluation.error_statistics import BoxMatch
 
 MAX_COLUMN_COUNT = 6
 """Maximum number of tiles in a row of the sheet."""
-TILE_SIZE, CAPTION_HEIGHT, GAP, HEADER_HEIGHT = 240, 40, 10, 34
-"""Side of a tile, height of a caption, gap between tiles, height of the header of the sheet [pixel]."""
+TILE_SIZE = 240
+"""Side of a tile [pixel]."""
+CAPTION_HEIGHT = 40
+"""Height of a caption [pixel]."""
+HEADER_HEIGHT = 34
+"""Height of the header of the sheet [pixel]."""
+GAP = 10
+"""Distance between two tiles [pixel]."""
+MAX_TEXT_LENGTH = 36
+"""Maximum number of characters of a line of a caption."""
 CROP_SCALE = 2.2
 """Side of the crop of the image, as a multiple of the longer side of the mistake's box."""
 MIN_CROP_SIZE = 40.0
 """Minimum side of the crop [pixel of the image]."""
 LINE_THICKNESS = 2
-"""Thickness of the coloured lines [pixel]."""
+"""Thickness of the lines [pixel]."""
 LEGEND = "boxes: detected, corners: ground truth"
 """Text in the header that explains the lines."""
-
-BACKGROUND_COLOUR, TEXT_COLOUR, CAPTION_COLOUR = (32, 38, 43), (255, 255, 255), (169, 180, 188)
-"""Colours of the background, of titles, and of file names and legend, RGB."""
-TRUE_COLOUR, DETECTED_COLOUR, OUTLINE_COLOUR = "#56B4E9", "#E69F00", "#000000"
-"""Colours of true boxes, of detected boxes, and of the outline around their lines."""
-
-HEADER_BASELINE, TEXT_BASELINE, FILE_BASELINE = 21, 15, 32
-"""Baselines of the header text and of both caption lines, from the top of header and caption [pixel]."""
-FONT, FONT_SCALE = cv2.FONT_HERSHEY_SIMPLEX, 0.42
-"""Font of OpenCV, and scale factor of the base size of the font."""
+BACKGROUND_COLOUR = (32, 38, 43)
+"""Colour of the background, RGB."""
+TEXT_COLOUR = (255, 255, 255)
+"""Colour of texts, RGB."""
+TRUE_COLOUR = "#56B4E9"
+"""Colour of true boxes."""
+DETECTED_COLOUR = "#E69F00"
+"""Colour of detected boxes."""
 
 Picture = NDArray[np.uint8]
 """An image `(H, W, 3)`, RGB."""
-Colour = tuple[int, int, int]
-"""Red, green and blue, 0 to 255."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,23 +118,22 @@ def find_mistakes(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterato
 
 
 def draw_sheet(mistakes: Sequence[Mistake], title: str) -> Picture:
-    """Return a contact sheet `(H, W, 3)`, RGB, with a tile for each mistake and `title` in the header."""
-    columns = min(MAX_COLUMN_COUNT, max(len(mistakes), 3))
-    rows = max(math.ceil(len(mistakes) / columns), 1)
-    column_width, row_height = TILE_SIZE + GAP, TILE_SIZE + CAPTION_HEIGHT + GAP
-    width = GAP + columns * column_width
-    sheet = np.full((HEADER_HEIGHT + rows * row_height, width, 3), BACKGROUND_COLOUR, np.uint8)
-    legend_left = width - GAP - _measure_text(LEGEND)
-    _write_text(sheet, LEGEND, (legend_left, HEADER_BASELINE), CAPTION_COLOUR)
-    header = title if mistakes else f"{title}: no mistakes"
-    _write_text(sheet, header, (GAP, HEADER_BASELINE), TEXT_COLOUR, legend_left - 2 * GAP)
+    """Return a picture with one tile per mistake; title and legend are in the header."""
+    column_count = min(MAX_COLUMN_COUNT, max(len(mistakes), 3))
+    row_count = max(math.ceil(len(mistakes) / column_count), 1)
+    column_width = TILE_SIZE + GAP
+    row_height = TILE_SIZE + CAPTION_HEIGHT + GAP
+    size = (HEADER_HEIGHT + row_count * row_height, GAP + column_count * column_width, 3)
+    sheet = np.full(size, BACKGROUND_COLOUR, np.uint8)
+    _write_text(sheet, f"{title}: {LEGEND if mistakes else 'no mistakes'}", GAP, HEADER_HEIGHT - GAP)
     for index, mistake in enumerate(mistakes):
-        row, column = divmod(index, columns)
-        left, top = GAP + column * column_width, HEADER_HEIGHT + row * row_height
-        sheet[top : top + TILE_SIZE, left : left + TILE_SIZE] = _draw_tile(mistake)
+        row, column = divmod(index, column_count)
+        left = GAP + column * column_width
+        top = HEADER_HEIGHT + row * row_height
         bottom = top + TILE_SIZE
-        _write_text(sheet, f"{index + 1}. {mistake.text}", (left, bottom + TEXT_BASELINE), TEXT_COLOUR)
-        _write_text(sheet, mistake.sample.file, (left, bottom + FILE_BASELINE), CAPTION_COLOUR)
+        sheet[top:bottom, left : left + TILE_SIZE] = _draw_tile(mistake)
+        _write_text(sheet, f"{index + 1}. {mistake.text}"[:MAX_TEXT_LENGTH], left, bottom + 15)
+        _write_text(sheet, mistake.sample.file[:MAX_TEXT_LENGTH], left, bottom + 32)
     return sheet
 
 
@@ -146,29 +149,17 @@ def _draw_tile(mistake: Mistake) -> Picture:
     shift = zoom * (0.5 - crop_corner) - 0.5
     matrix = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
     image = mistake.sample.image[..., ::-1]  # The annotators expect BGR.
-    size, border = (TILE_SIZE, TILE_SIZE), BACKGROUND_COLOUR[::-1]
-    tile = cv2.warpAffine(image, matrix, size, flags=cv2.INTER_CUBIC, borderValue=border)
-    detected = sv.BoxAnnotator, [detection.box for detection in mistake.detections], DETECTED_COLOUR
-    layers: Any = (detected, (sv.BoxCornerAnnotator, mistake.sample.boxes, TRUE_COLOUR))
-    for annotator, boxes, colour in layers:
+    tile: Any = cv2.warpAffine(image, matrix, (TILE_SIZE, TILE_SIZE), flags=cv2.INTER_CUBIC)
+    detected_boxes = [detection.box for detection in mistake.detections]
+    for annotator, boxes, colour in (
+        (sv.BoxAnnotator, detected_boxes, DETECTED_COLOUR),
+        (sv.BoxCornerAnnotator, mistake.sample.boxes, TRUE_COLOUR),
+    ):
         tile_boxes = ((np.array(boxes).reshape(-1, 2, 2) - crop_corner) * zoom).reshape(-1, 4)
         detections = sv.Detections(tile_boxes, class_id=np.zeros(len(boxes), int))
-        for hex_colour, thickness in ((OUTLINE_COLOUR, 2 * LINE_THICKNESS), (colour, LINE_THICKNESS)):
-            tile = annotator(sv.Color.from_hex(hex_colour), thickness).annotate(tile, detections)
+        tile = annotator(sv.Color.from_hex(colour), LINE_THICKNESS).annotate(tile, detections)
     return np.asarray(tile[..., ::-1], dtype=np.uint8)
 
 
-def _write_text(
-    image: Picture, text: str, corner: tuple[int, int], colour: Colour, max_width: int = TILE_SIZE
-) -> None:
-    """Write a text with its lower left corner at `corner` [pixel], truncated to `max_width` [pixel]."""
-    written_text = text
-    while _measure_text(written_text) > max_width and len(text) > 1:
-        text = text[:-1]
-        written_text = f"{text}..."
-    cv2.putText(image, written_text, corner, FONT, FONT_SCALE, colour, 1, cv2.LINE_AA)
-
-
-def _measure_text(text: str) -> int:
-    """Return the width of a text [pixel]."""
-    return int(cv2.getTextSize(text, FONT, FONT_SCALE, 1)[0][0])
+def _write_text(picture: Picture, text: str, left: int, baseline: int) -> None:
+    cv2.putText(picture, text, (left, baseline), cv2.FONT_HERSHEY_SIMPLEX, 0.42, TEXT_COLOUR, 1, cv2.LINE_AA)

@@ -19,6 +19,7 @@ from executive.perception.localization import CellLocalizer
 SIDE = 0.05
 CLASSES = {"cube": ObjectClass("cube", SIDE, 0.0354)}
 PLANE, DEPTH = CellLocalizer("plane", CLASSES), CellLocalizer("depth", CLASSES)
+NO_HIT = CellLocalizer("ray", CLASSES, cast_ray=lambda origin, direction: None)
 K = compute_camera_matrix(640, 480, 55)
 ABOVE = compute_look_at_pose([0.5, 0.0, 1.2], [0.5, 0.0, 0.0], [1, 0, 0])
 ASKEW = compute_look_at_pose([0.3, 0.3, 1.0], [0.5, 0.0, 0.0], [1, 0, 0])
@@ -27,7 +28,7 @@ PIXELS = np.stack(np.meshgrid(np.arange(640) + 0.5, np.arange(480) + 0.5, [1.0])
 IN_THE_MIDDLE = np.array([0.5, 0.0, SIDE / 2])
 
 
-def showing_cube(centre, X_WC=ABOVE):
+def show_cube(centre, X_WC=ABOVE):
     """Return the view of a cube over a table: the depth of its top face and of the table."""
     rays = PIXELS @ np.linalg.inv(K).T @ X_WC.rotation.T
     drop = centre[2] + SIDE / 2 - X_WC.position[2]
@@ -42,11 +43,11 @@ def showing_cube(centre, X_WC=ABOVE):
     return Detection("cube", 0.9, (left, up, right, down)), frame
 
 
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.0, 0.15), st.sampled_from([ABOVE, ASKEW]))
 def test_depth_finds_an_object_at_any_height(x, y, below, X_WC):
     centre = np.array([x, y, below + SIDE / 2])
-    found = DEPTH.locate(*showing_cube(centre, X_WC))
+    found = DEPTH.locate(*show_cube(centre, X_WC))
     # A box around an oblique cube is not quite centred on it.
     assert found == pytest.approx(centre, abs=0.004)
     assert found[2] == pytest.approx(centre[2], abs=5e-4)
@@ -54,22 +55,16 @@ def test_depth_finds_an_object_at_any_height(x, y, below, X_WC):
 
 def test_plane_puts_everything_on_the_table():
     on_table, raised = np.array([0.6, 0.2, SIDE / 2]), np.array([0.6, 0.2, 0.05 + SIDE / 2])
-    assert PLANE.locate(*showing_cube(on_table)) == pytest.approx(on_table, abs=0.002)
-    found = PLANE.locate(*showing_cube(raised))
+    assert PLANE.locate(*show_cube(on_table)) == pytest.approx(on_table, abs=0.002)
+    found = PLANE.locate(*show_cube(raised))
     assert found[2] == pytest.approx(SIDE / 2)
     assert np.linalg.norm(found[:2] - raised[:2]) > 0.008
-
-
-def test_a_neighbour_at_the_side_of_the_box_does_not_count():
-    detection, frame = showing_cube(IN_THE_MIDDLE)
-    frame.depth[:, : round(detection.box[0]) + 3] = 1.0
-    assert DEPTH.locate(detection, frame) == pytest.approx(IN_THE_MIDDLE, abs=0.002)
 
 
 def test_noise_and_pixels_without_depth_move_it_by_millimetres():
     random = np.random.default_rng(3)
     centre = np.array([0.5, 0.1, 0.08])
-    detection, frame = showing_cube(centre)
+    detection, frame = show_cube(centre)
     frame.depth[:] += random.normal(0, 0.005, frame.depth.shape)
     frame.depth[random.random(frame.depth.shape) < 0.5] = np.nan
     assert DEPTH.locate(detection, frame) == pytest.approx(centre, abs=0.005)
@@ -78,15 +73,15 @@ def test_noise_and_pixels_without_depth_move_it_by_millimetres():
 def test_a_ray_is_cast_from_the_lens_through_the_middle_of_the_box():
     centre = np.array([0.6, 0.2, 0.05 + SIDE / 2])
 
-    def onto_the_top(origin, direction):
+    def hit_top(origin, direction):
         assert origin == pytest.approx(ABOVE.position)
         return origin + (centre[2] + SIDE / 2 - origin[2]) / direction[2] * direction
 
-    found = CellLocalizer("ray", CLASSES, cast_ray=onto_the_top).locate(*showing_cube(centre))
+    found = CellLocalizer("ray", CLASSES, cast_ray=hit_top).locate(*show_cube(centre))
     assert found == pytest.approx(centre, abs=0.002)
 
 
-def with_one_pixel(detection, frame):
+def keep_one_pixel(detection, frame):
     depth = np.full_like(frame.depth, np.nan)
     depth[240, 320] = 1.15
     return detection, replace(frame, depth=depth)
@@ -95,32 +90,18 @@ def with_one_pixel(detection, frame):
 @pytest.mark.parametrize(
     ("localizer", "spoil", "text"),
     [
-        (
-            DEPTH,
-            with_one_pixel,
-            "1 of 196 pixels in the middle of the box (310, 230, 330, 250) of frame 7 have a depth; "
-            "20 are required",
-        ),
-        (DEPTH, lambda one, frame: (one, replace(frame, visible=~frame.visible)), "0 of 196 pixels in the"),
-        (DEPTH, lambda one, frame: (replace(one, box=(700, 100, 720, 120)), frame), "0 of 0 pixels in the"),
-        (
-            DEPTH,
-            lambda one, frame: (one, replace(frame, depth=None)),
-            "frame 7 has no depth image; set `localization: plane` in the cell file, or `depth` of",
-        ),
-        (
-            CellLocalizer("ray", CLASSES, cast_ray=lambda origin, direction: None),
-            lambda one, frame: (one, frame),
-            "the ray through pixel (320, 240) of frame 7 hits nothing",
-        ),
+        (DEPTH, keep_one_pixel, r"^1 of 196 pixels in the middle of .*310, 230, 330, 250.* 20 are required"),
+        (DEPTH, lambda one, frame: (one, replace(frame, visible=~frame.visible)), "^0 of 196 pixels in the"),
+        (DEPTH, lambda one, frame: (replace(one, box=(700, 100, 720, 120)), frame), "^0 of 0 pixels in the"),
+        (DEPTH, lambda one, frame: (one, replace(frame, depth=None)), "frame 7 has no depth image; set"),
+        (NO_HIT, lambda one, frame: (one, frame), r"pixel \(320, 240\) of frame 7 hits nothing"),
         (
             PLANE,
             lambda one, frame: (one, replace(frame, X_WC=UPWARDS)),
-            "the ray through pixel (320, 240) of frame 7 does not intersect the plane 25 mm above the table",
+            "not intersect the plane 25 mm above",
         ),
     ],
 )
 def test_the_cause_of_a_failed_localization_is_reported(localizer, spoil, text):
-    with pytest.raises(NoDepth) as caught:
-        localizer.locate(*spoil(*showing_cube(IN_THE_MIDDLE)))
-    assert str(caught.value).startswith(text)
+    with pytest.raises(NoDepth, match=text):
+        localizer.locate(*spoil(*show_cube(IN_THE_MIDDLE)))

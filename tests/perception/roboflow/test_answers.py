@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from executive.cell.detection import Detection
 from executive.perception.detectors.roboflow.answers import read_answer, read_output
-from executive.perception.detectors.roboflow.failure_messages import (
+from executive.perception.detectors.roboflow.detector import (
+    RoboflowOptions,
     describe_failure,
     describe_invalid_answer,
     describe_missed_deadline,
     shorten_to_line,
 )
-from executive.perception.detectors.roboflow.server_options import RoboflowOptions
 
 CUBE = {"x": 50.0, "y": 40.0, "width": 20, "height": 10.0, "confidence": 0.9, "class": "cube", "class_id": 0}
 
@@ -30,27 +28,26 @@ def test_boxes_by_centre_and_size_become_boxes_by_corners_cut_off_where_they_sti
     assert read_answer({"predictions": []}, (100, 80)) == []
 
 
+UNKNOWN = answer(image={"width": None, "height": None})
+PLACE = {"offset_x": 40, "offset_y": 35, "width": 100, "height": 80}
+IN_CROP = {**CUBE, "x": 10, "y": 5, "parent_origin": PLACE}
+NESTED = {**IN_CROP, "parent_origin": {**PLACE, "offset_x": 9, "width": 60}}
+OF_CROP = answer(IN_CROP, image={"width": 30, "height": 20})
+
+
 @pytest.mark.parametrize(
     ("spoilt", "text"),
     [
         (None, "of type NoneType, not an object with the key"),
-        ([1, 2], "of type list, not an object with the key"),
         ({"foo": 1}, "predictions: field required"),
-        ({"predictions": None}, "predictions: input should be a valid list"),
         (answer(7), r"predictions\[0\]: input should be a valid dictionary$"),
         (answer(CUBE, {**CUBE, "x": float("nan")}), r"predictions\[1\].x: input should be a finite number"),
-        (answer({**CUBE, "y": None}), r"predictions\[0\].y: input should be a valid number"),
-        (answer({**CUBE, "x": "12"}), r"predictions\[0\].x: input should be a valid number"),
-        (answer({**CUBE, "x": True}), r"predictions\[0\].x: input should be a valid number"),
-        (answer({**CUBE, "x": 10**400}), r"predictions\[0\].x: .*number"),
-        (answer({**CUBE, "width": -5.0}), r"predictions\[0\].width: input should be greater than 0"),
+        (answer({**CUBE, "x": "SECRET"}), r"predictions\[0\].x: input should be a valid number$"),
         (answer({**CUBE, "width": 0.0}), r"predictions\[0\].width: input should be greater than 0"),
         (answer({**CUBE, "height": float("inf")}), r"predictions\[0\].height: input should be a finite"),
         (answer({**CUBE, "confidence": 1.1}), r"predictions\[0\].confidence: .* less than or equal to 1"),
-        (answer({**CUBE, "class": 3}), r"predictions\[0\].class: input should be a valid string"),
         (answer({**CUBE, "class": ""}), r"predictions\[0\].class: string should have at least 1"),
-        (answer({**CUBE, "width": 150.0}), r"box from \(-25, 35\) to \(125, 45\) in an image of 100 x 80"),
-        (answer({**CUBE, "x": 4.0, "width": 30.0}), r"box from \(-11, 35\) to \(19, 45\)"),
+        (answer({**CUBE, "x": 4.0, "width": 30.0}), r"box from \(-11, 35\) to \(19, 45\) in an image"),
         (answer({**CUBE, "x": 96.0, "width": 30.0}), r"box from \(81, 35\) to \(111, 45\)"),
         (answer({**CUBE, "y": 4.0, "height": 26.0}), r"box from \(40, -9\) to \(60, 17\)"),
         (answer({**CUBE, "y": 76.0, "height": 26.0}), r"box from \(40, 63\) to \(60, 89\)"),
@@ -58,19 +55,22 @@ def test_boxes_by_centre_and_size_become_boxes_by_corners_cut_off_where_they_sti
         (answer({**CUBE, "width": 0.1, "height": 0.2}), r"predictions\[0\] is a box of 0.1 x 0.2 pixels"),
         (answer(*[CUBE] * 301), "predictions: list should have at most 300 items"),
         (answer(CUBE, image={"width": 1, "height": 1}), "1 x 1 pixels, but the sent image has 100 x 80"),
-        (answer(CUBE, image={"width": None, "height": 1}), "image.width: input should be a valid number"),
+        # Outputs of workflows
+        ({"image": {"width": None, "height": 80}, "predictions": []}, r"image\.width: input should be"),
+        ([NESTED], "60 x 80 pixels, but the sent image has 100 x 80"),
+        ([[CUBE], []], "predictions per crop without the place of the crop"),
+        ([IN_CROP, CUBE], "predictions per crop without the place of the crop"),
+        (answer(IN_CROP, CUBE, image={"width": 50, "height": 40}), "50 x 40 pixels, but the sent image"),
+        ([answer(CUBE, image={"width": 50, "height": 40})], "50 x 40 pixels, but the sent image"),
+        ({"predictions": answer({**CUBE, "x": -30.0})}, r"box from \(-40, 35\) to \(-20, 45\)"),
     ],
 )
-def test_what_cannot_be_is_refused_with_its_place(spoilt, text):
-    with pytest.raises(ValueError, match=text):
-        read_answer(spoilt, (100, 80))
+def test_what_cannot_be_is_refused_with_its_place_and_without_values_that_may_be_secret(spoilt, text):
+    with pytest.raises(ValueError, match=text) as caught:
+        read_output(spoilt, (100, 80))
+    assert "SECRET" not in str(caught.value)
 
 
-UNKNOWN = answer(image={"width": None, "height": None})
-PLACE = {"offset_x": 40, "offset_y": 35, "width": 100, "height": 80}
-IN_CROP = {**CUBE, "x": 10, "y": 5, "parent_origin": PLACE}
-NESTED = {**IN_CROP, "parent_origin": {**PLACE, "offset_x": 9, "width": 60}}
-OF_CROP = answer(IN_CROP, image={"width": 30, "height": 20})
 OUTPUTS = [
     answer(CUBE), [CUBE], {"inference_id": "1", "predictions": answer(CUBE)},
     [IN_CROP], [[IN_CROP], [], None], [OF_CROP, UNKNOWN], [{"predictions": OF_CROP}], [answer(CUBE), UNKNOWN],
@@ -84,82 +84,17 @@ def test_the_output_of_a_workflow_is_read_in_every_form_also_of_crops(output):
     assert read_output(output, (100, 80)) == read_answer(answer(CUBE), (100, 80))
 
 
-@pytest.mark.parametrize(
-    ("angle", "x", "y"), [(None, 10, 5), (90, 5, 10), (45, 10.607, 10.607), (-30, 11.16, 9.33)]
-)
+@pytest.mark.parametrize(("angle", "x", "y"), [(90, 5, 10), (-30, 11.16, 9.33)])
 def test_an_oriented_box_becomes_the_box_around_it(angle, x, y):
     (found,) = read_answer(answer({**CUBE, "angle": angle}), (100, 80))
     assert found.box == pytest.approx((50 - x, 40 - y, 50 + x, 40 + y), abs=1e-2)
 
 
 @pytest.mark.parametrize(
-    ("output", "text"),
-    [
-        ("ball", "of type str, not an object with the key"),
-        (None, "of type NoneType, not an object with the key"),
-        ({"top": "ball"}, "predictions: field required"),
-        (
-            {"image": {"width": None, "height": 80}, "predictions": []},
-            r"image\.width: input should be a valid",
-        ),
-        ([NESTED], "60 x 80 pixels, but the sent image has 100 x 80"),
-        ([[CUBE], []], "predictions per crop without the place of the crop"),
-        ([IN_CROP, CUBE], "predictions per crop without the place of the crop"),
-        (answer(IN_CROP, CUBE, image={"width": 50, "height": 40}), "50 x 40 pixels, but the sent image"),
-        (
-            [answer(CUBE, image={"width": 50, "height": 40})],
-            "50 x 40 pixels, but the sent image has 100 x 80",
-        ),
-        (answer(answer(CUBE)), r"predictions\[0\].x: field required"),
-        ({"predictions": answer({**CUBE, "x": -30.0})}, r"box from \(-40, 35\) to \(-20, 45\)"),
-        (answer(CUBE, image={"width": 50, "height": 40}), "50 x 40 pixels, but the sent image has 100 x 80"),
-    ],
-)
-def test_an_output_that_holds_no_boxes_in_the_image_that_was_sent_is_refused(output, text):
-    with pytest.raises(ValueError, match=text):
-        read_output(output, (100, 80))
-
-
-def test_values_are_not_repeated_for_they_may_be_secret():
-    with pytest.raises(ValueError) as caught:
-        read_answer(answer({**CUBE, "x": "SECRET"}), (100, 80))
-    assert "SECRET" not in str(caught.value)
-
-
-NUMBERS = st.one_of(st.integers(), st.floats(), st.floats(-20, 120))
-SCALARS = st.one_of(st.none(), st.booleans(), st.text(max_size=3), NUMBERS)
-PREDICTIONS = st.fixed_dictionaries(
-    {key: st.one_of(NUMBERS, SCALARS) for key in ("x", "y", "width", "height")},
-    optional={"confidence": st.one_of(st.floats(0, 1), SCALARS), "class": st.one_of(st.text(), SCALARS)},
-)
-ANYTHING = st.recursive(
-    SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner)
-)
-
-
-@given(
-    st.one_of(
-        ANYTHING,
-        st.fixed_dictionaries({"predictions": st.one_of(st.lists(PREDICTIONS, max_size=3), ANYTHING)}),
-    )
-)
-def test_whatever_a_server_says_only_sound_boxes_get_in(said):
-    try:
-        found = read_output(said, (100, 80))
-    except ValueError:
-        return
-    for detection in found:
-        left, top, right, bottom = detection.box
-        assert 0 <= left <= right <= 100
-        assert 0 <= top <= bottom <= 80
-        assert 0 <= detection.confidence <= 1 <= len(detection.label)
-
-
-@pytest.mark.parametrize(
     ("host", "variable", "exempt", "is_named"),
     [
-        ("lab", "HTTP_PROXY", "", True), ("lab", "ALL_PROXY", "", True), ("lab", "HTTPS_PROXY", "", False),
-        ("localhost.lan", "HTTP_PROXY", "", True), ("127.lan", "HTTP_PROXY", "", True),
+        ("lab", "HTTP_PROXY", "", True), ("lab", "HTTPS_PROXY", "", False),
+        ("127.lan", "HTTP_PROXY", "", True),
         ("127.0.0.1", "HTTP_PROXY", "", False), ("10.0.0.5", "HTTP_PROXY", "10.0.0.0/8", False),
     ],
 )  # fmt: skip
@@ -180,58 +115,34 @@ def test_somebody_elses_words_become_one_short_line():
     assert shorten_to_line("a" * 1000) == "a" * 100 + "..."
 
 
-def test_a_sentence_says_what_where_and_what_to_look_at():
-    refused = {"failure": "status", "status": 404, "detail": "no such\nmodel"}
-    assert describe_failure(refused, OPTIONS) == (
-        f"{HOST} has no model shapes/1 (404: no such model); check model_id and url"
-    )
-    unknown = {"failure": "status", "status": 599, "detail": ""}
-    assert describe_failure(unknown, OPTIONS) == f"{HOST} reported an unexpected status (599); check its log"
-
-
 @pytest.mark.parametrize(
-    ("failure", "sentence"),
+    ("failure", "options", "sentence"),
     [
-        (
-            {"failure": "status", "status": 404, "detail": "no such workflow"},
-            "has no workflow acme/sorting (404: no such workflow); check workspace and workflow_id and url",
-        ),
-        (
-            {"failure": "status", "status": 400, "detail": ""},
-            "rejected the request (400); check workspace and workflow_id and api",
-        ),
-        (
-            {"failure": "no output", "detail": "the outputs are picture, top"},
-            'ran workflow acme/sorting, which has no output "boxes" (the outputs are picture, top); '
-            "check workflow_output",
-        ),
+        ({"status": 404, "detail": "no such\nmodel"}, OPTIONS,
+         "has no model shapes/1 (404: no such model); check model_id and url"),
+        ({"status": 599, "detail": ""}, OPTIONS, "reported an unexpected status (599); check its log"),
+        ({"status": 400, "detail": ""}, WORKFLOW,
+         "rejected the request (400); check workspace and workflow_id and api"),
+        ({"failure": "no output", "detail": "top"}, WORKFLOW,
+         'ran workflow acme/sorting, which has no output "boxes" (top); check workflow_output'),
     ],
-)
-def test_a_sentence_about_a_workflow_names_its_options(failure, sentence):
-    assert describe_failure(failure, WORKFLOW) == f"{HOST} {sentence}"
+)  # fmt: skip
+def test_a_sentence_says_what_where_and_what_to_look_at(failure, options, sentence):
+    assert describe_failure(failure, options) == f"{HOST} {sentence}"
 
 
 def test_an_impossible_answer_is_reported_with_the_advice_to_check():
-    beginning = f"{HOST} sent an invalid answer: no box; "
-    assert (
-        describe_invalid_answer("no box", OPTIONS) == f"{beginning}is shapes/1 a model that detects objects?"
-    )
-    question = 'is "boxes" the predictions of a model that detects objects?'
-    assert describe_invalid_answer("no box", WORKFLOW) == beginning + question
+    assert "sent an invalid answer: no box; is shapes/1 a" in describe_invalid_answer("no box", OPTIONS)
+    assert 'no box; is "boxes" the predictions' in describe_invalid_answer("no box", WORKFLOW)
 
 
-def test_a_passed_deadline_is_reported_with_the_answers_of_the_server():
-    for repeats, end in (
+@pytest.mark.parametrize(
+    ("repeats", "end"),
+    [
         ((), "; check its log and the network, or increase deadline"),
-        (
-            (None, 429),
-            ", which received too many requests (429); "
-            "reduce the request rate, or check the plan of the account",
-        ),
-        ((599,), ", which reported an unexpected status (599); check its log"),
-        (
-            (None,),
-            ", which is not reachable; check that the server is running, and check url",
-        ),
-    ):
-        assert describe_missed_deadline(repeats, OPTIONS) == f"no answer within 1.0 s from {HOST}{end}"
+        ((None, 429), ", which received too many requests (429); reduce the request rate"),
+        ((None,), ", which is not reachable; check that the server is running"),
+    ],
+)
+def test_a_passed_deadline_is_reported_with_the_answers_of_the_server(repeats, end):
+    assert describe_missed_deadline(repeats, OPTIONS).startswith(f"no answer within 1.0 s from {HOST}{end}")

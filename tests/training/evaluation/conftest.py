@@ -9,7 +9,7 @@ import pytest
 
 from executive.cell.detection import Answer, Detection, ErrorRates
 from executive.errors import Unavailable
-from executive.training.labelled_image import LabelledImage
+from executive.training.dataset import LabelledImage
 
 CUBE, DUCK, HALF_HIDDEN = (10.0, 10.0, 40.0, 40.0), (100.0, 100.0, 140.0, 130.0), (200.0, 20.0, 230.0, 50.0)
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.perception.detectors.roboflow.key import KEY_VARIABLE
+from executive.perception.detectors.roboflow.inference_process import KEY_VARIABLE
 
 if TYPE_CHECKING:
     from inference_sdk import InferenceHTTPClient

@@ -1,4 +1,4 @@
-"""Helper process that runs inference-sdk and is replaced after a missed deadline."""
+"""Helper process that runs inference-sdk and is replaced after a missed deadline; API key of the user."""
 
 from __future__ import annotations
 
@@ -19,9 +19,14 @@ from numpy.typing import NDArray
 
 import executive
 from executive.errors import Fault, Unavailable
-from executive.perception.detectors.roboflow.key import ApiKey
 from executive.processes import build_command
 
+KEY_VARIABLE = "ROBOFLOW_API_KEY"
+"""Environment variable with the API key, the only source of the key."""
+MIN_KEY_LENGTH = 8
+"""Minimum length of a secret key; shorter keys are placeholders for servers that accept any key."""
+REDACTED_KEY = "***"
+"""Text that replaces the key in messages."""
 PROGRAM = "executive.perception.detectors.roboflow"
 """Module that the helper process runs."""
 STARTUP_TIMEOUT = 30.0
@@ -30,6 +35,29 @@ EXIT_TIMEOUT = 1.0
 """Maximum time between the end of the program's output and the exit of the program [s]."""
 MAX_STDERR_SIZE = 2000
 """Maximum number of bytes at the end of the standard error that are read for an error message."""
+
+
+class ApiKey:
+    """API key from the environment; only the attribute `environment` contains the key as text."""
+
+    def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
+        self.environment = dict(environment)
+        """Environment variables of the process that uses the key."""
+        self._key = environment.get(KEY_VARIABLE, "").strip()
+
+    @property
+    def is_set(self) -> bool:
+        """True if the environment contains a key."""
+        return bool(self._key)
+
+    def redact(self, text: str) -> str:
+        """Return `text`, plain or JSON, without the key."""
+        if len(self._key) < MIN_KEY_LENGTH:
+            return text
+        return text.replace(self._key, REDACTED_KEY).replace(json.dumps(self._key)[1:-1], REDACTED_KEY)
+
+    def __repr__(self) -> str:
+        return f"ApiKey({REDACTED_KEY if self.is_set else ''})"
 
 
 class NoAnswer(Exception):

@@ -1,0 +1,383 @@
+"""Measured envelope of a detector: error rates, and the conditions under which they were measured.
+
+The error rates are stored in files `CELL.measured.json`. They apply to a detector with the fingerprint of the
+measurement, in frames whose workspace resembles the measured frames in brightness, contrast and colour.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+from pydantic import Field, ValidationError
+
+from executive.cell.config import CameraConfig, CellConfig, DetectorConfig, Section
+from executive.cell.detection import ErrorRates, assume_rates
+from executive.cell.frame import Frame
+from executive.cell.protocols import Clock
+from executive.errors import InputError
+from executive.perception.camera_model import compute_calibration, compute_hull_mask
+from executive.perception.detectors.detector_registry import build_detectors, find_detector_kinds
+from executive.perception.detectors.requests import ChangedRequest, ClosableDetector
+
+MIN_PIXELS = 400
+"""Minimum number of visible pixels of the workspace for the computation of statistics."""
+MIN_FRACTION_OF_PARTIAL_VIEW = 0.03
+"""Minimum fraction of an image that shows the workspace if the image may show only a part of it; objects then
+cover less than half of the pixels, and the medians are those of the table."""
+ABSOLUTE_TOLERANCE = 6.0
+"""Minimum tolerance below and above the measured range of a statistic [grey level]."""
+RELATIVE_TOLERANCE = 0.08
+"""Minimum tolerance below and above the measured range of a statistic, as a fraction of the range limit."""
+
+
+MEASUREMENT_SUFFIX = ".measured.json"
+"""Suffix of a measurement file, after the name of the cell."""
+MAX_FILE_SIZE = 1_000_000
+"""Maximum size of a measurement file [byte]."""
+
+
+FAKE_KIND = "fake"
+"""Kind of cell whose detectors are not measured, because they read the true positions of the objects."""
+MEASUREMENT_MINUTES = 2
+"""Typical duration of a measurement on two cores [min]."""
+
+
+class FrameRange(Section):
+    """Minimum and maximum of each statistic over the measured frames [grey level].
+
+    Medians describe the colour of the table even if objects cover a part of the table.
+
+    Attributes:
+        brightness: Median over the pixels of the mean of the three colours.
+        contrast: Median absolute deviation from the brightness.
+        red, green, blue: Median of each colour over the pixels.
+    """
+
+    brightness: tuple[float, float]
+    contrast: tuple[float, float]
+    red: tuple[float, float]
+    green: tuple[float, float]
+    blue: tuple[float, float]
+
+    @staticmethod
+    def compute(samples: Sequence[Mapping[str, float]]) -> FrameRange | None:
+        """Return the ranges of the statistics of several frames; None if there are no frames."""
+        if not samples:
+            return None
+        values = {name: [sample[name] for sample in samples] for name in FrameRange.model_fields}
+        ranges = {name: (round(min(column), 1), round(max(column), 1)) for name, column in values.items()}
+        return FrameRange.model_validate(ranges)
+
+    def describe_difference(self, statistics: Mapping[str, float]) -> str:
+        """Return a text with name, value and range of each statistic outside its range; "" if none."""
+        differences = []
+        for name, value in statistics.items():
+            lower, upper = getattr(self, name)
+            if not lower - _compute_tolerance(lower) <= value <= upper + _compute_tolerance(upper):
+                differences.append(f"{name} {value:.0f}, measured {lower:.0f} to {upper:.0f}")
+        return "; ".join(differences)
+
+
+def compute_frame_statistics(frame: Frame, cell: CellConfig) -> Mapping[str, float] | None:
+    """Return the statistics of the workspace; None if a corner is not in view or few pixels are visible.
+
+    The corners may be out of the partial view of a camera, but a larger part of the image must then show the
+    workspace.
+    """
+    is_partial = next(iter(cell.cameras.values())).partial_views
+    height, width = frame.image.shape[:2]
+    corners = np.array([(x, y, 0.0) for x in cell.table.x for y in cell.table.y])
+    mask = compute_hull_mask(corners, frame.matrix, frame.X_WC, (width, height), may_be_cut=is_partial)
+    min_pixels = MIN_FRACTION_OF_PARTIAL_VIEW * width * height if is_partial else MIN_PIXELS
+    if mask is None or np.count_nonzero(mask := mask & frame.visible) < min_pixels:
+        return None
+    # Image noise would increase the contrast; the mean of 3 x 3 pixels removes most of the noise.
+    colours = cv2.blur(frame.image, (3, 3))[mask].astype(float)
+    grey = colours.mean(axis=1)
+    brightness = float(np.median(grey))
+    contrast = float(np.median(np.abs(grey - brightness)))
+    values = brightness, contrast, *np.median(colours, axis=0).tolist()
+    return dict(zip(FrameRange.model_fields, values, strict=True))
+
+
+def _compute_tolerance(range_limit: float) -> float:
+    return max(ABSOLUTE_TOLERANCE, RELATIVE_TOLERANCE * range_limit)
+
+
+class StoredErrorRates(Section):
+    """Error rates of a detector in a measurement file; `executive.cell.detection` describes the fields."""
+
+    miss_rate: float = Field(gt=0, lt=1)
+    confusion_rate: float = Field(gt=0, lt=1)
+    false_detections: float = Field(gt=0)
+    jitter: float = Field(gt=0)
+    repeated: float = Field(ge=0, lt=1)
+    bias: float = Field(ge=0)
+
+    def build_error_rates(self, threshold: float) -> ErrorRates:
+        """Return these rates for a detector with `threshold` as the minimum confidence of its detections."""
+        return ErrorRates(threshold, **self.model_dump())
+
+
+class ErrorCounts(Section):
+    """Numbers of objects, missed and misclassified objects, and false detections, in a part of the scenes."""
+
+    objects: int
+    missed: int
+    confused: int
+    false_detections: int
+
+
+class Measurement(Section):
+    """Errors of one detector in one cell, and the conditions under which they were measured."""
+
+    detector: str
+    """Name of the detector in the cell."""
+    fingerprint: dict[str, str]
+    """Values of the properties that affect the error rates, by the name of the property."""
+    command: str
+    """Command line of the measurement."""
+    seconds: float
+    """Duration of the measurement [s]."""
+    images: int
+    """Number of measured images."""
+    rates: StoredErrorRates
+    """`miss_rate`, `confusion_rate`, `false_detections`: upper 95 % bounds; `repeated`: Laplace estimate;
+    `jitter`, `bias`: standard deviations."""
+    classes: dict[str, ErrorCounts]
+    """Errors by class; a false detection counts for the class that the detector reported."""
+    counts: dict[str, ErrorCounts]
+    """Errors by number of objects in the scene."""
+    frames: FrameRange | None
+    """Ranges of the statistics of the measured frames; None if no frame showed the whole workspace."""
+
+
+class MeasurementFile(Section):
+    """Content of a file `CELL.measured.json`."""
+
+    version: Literal[1] = 1
+    measurements: tuple[Measurement, ...] = ()
+
+
+def read_measurements(path: Path) -> tuple[Measurement, ...]:
+    """Return the measurements in a file; no measurements if the file does not exist.
+
+    Raises:
+        InputError: The file cannot be read or is invalid.
+    """
+    if not path.is_file():
+        return ()
+    try:
+        if path.stat().st_size > MAX_FILE_SIZE:
+            raise InputError(f"{path} is larger than {MAX_FILE_SIZE} bytes; it is not a measurement file")
+        return MeasurementFile.model_validate_json(path.read_bytes()).measurements
+    except (OSError, ValidationError) as error:
+        problem = f"the measurements in {path} cannot be read: {str(error).splitlines()[0]}"
+        advice = "remove the file and measure again with `executive evaluate --cell`"
+        raise InputError(f"{problem}; {advice}") from error
+
+
+def read_folders(folders: Sequence[Path]) -> tuple[list[tuple[str, Measurement]], list[str]]:
+    """Return all stored measurements, each with the name of its cell, and messages about unreadable files."""
+    measurements: list[tuple[str, Measurement]] = []
+    problems = []
+    for file in (file for folder in folders for file in sorted(folder.glob(f"*{MEASUREMENT_SUFFIX}"))):
+        try:
+            cell = file.name.removesuffix(MEASUREMENT_SUFFIX)
+            measurements += [(cell, measurement) for measurement in read_measurements(file)]
+        except InputError as error:
+            problems.append(str(error))
+    return measurements, problems
+
+
+def is_measured(weights: Path, folder: Path) -> bool:
+    """Return True if a detector with this model file was measured in a cell of a folder."""
+    fingerprints = [measurement.fingerprint for _, measurement in read_folders([folder])[0]]
+    return _digest(weights) in [fingerprint.get("weights") for fingerprint in fingerprints]
+
+
+def format_measurements(measurements: Iterable[Measurement], new: Measurement) -> str:
+    """Return the text of a measurement file in which `new` replaces the measurement of its detector."""
+    others = [measurement for measurement in measurements if measurement.detector != new.detector]
+    ordered = sorted((*others, new), key=lambda measurement: measurement.detector)
+    content = MeasurementFile(measurements=tuple(ordered)).model_dump(mode="json")
+    return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+
+
+def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Mapping[str, str]:
+    """Return the fingerprint of a detector in its cell.
+
+    The fingerprint contains weights and settings of the detector, the localization method, the classes and
+    their sizes, and pose, intrinsics, image size, `table_view` and depth settings of the camera. It does not
+    contain bins, the number of objects, light, colours, and classes that look like another class. Paths in
+    the cell file are relative to `base`.
+    """
+    section = config.detectors[detector]
+    options = {key: value for key, value in section.options.items() if key != "threads"}
+    return {
+        "detector": f"{section.kind} {json.dumps(options, sort_keys=True)}",
+        "weights": _digest_weights(section, base),
+        "threshold": f"{section.threshold:g}",
+        "localization": config.localization,
+        **{
+            f"class {label}": f"{kind.height * 1000:.1f} mm high, radius {kind.radius * 1000:.1f} mm"
+            for label, kind in config.objects.items()
+            if not kind.looks_like
+        },
+        **_describe_camera(next(iter(config.cameras.values())), config),
+    }
+
+
+def list_changes(measured: Mapping[str, str], current: Mapping[str, str]) -> str:
+    """Return the names of the properties that differ between two fingerprints; "" if none."""
+    names = dict.fromkeys([*measured, *current])
+    return ", ".join(name for name in names if measured.get(name) != current.get(name))
+
+
+def _digest_weights(section: DetectorConfig, base: Path) -> str:
+    """Return a digest of the model file of a detector; "" for a detector without a model file."""
+    find_weights = getattr(find_detector_kinds()[section.kind].load(), "weights", None)
+    path = find_weights(section, base) if find_weights else None
+    return _digest(path) if path and path.is_file() else ""
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+
+
+def _describe_camera(camera: CameraConfig, config: CellConfig) -> dict[str, str]:
+    """Return the properties of a camera that affect error rates."""
+    matrix, X_MC = compute_calibration(camera)
+    poses = {name: config.arm.poses_deg[name] for name in camera.scan_poses if camera.mount == "wrist"}
+    return {
+        "camera pose": f"{camera.mount} {X_MC.to_rounded_list(4)} {json.dumps(poses)}",
+        "camera lens": f"{matrix.round(2).tolist()}",
+        "camera image": f"{camera.width} x {camera.height}, searched {list(camera.table_view)}",
+        "camera depth": "" if camera.depth is None else camera.depth.model_dump_json(),
+    }
+
+
+@dataclass(frozen=True)
+class DetectorEnvelope:
+    """Error rates of one detector, and the measured conditions to which the error rates apply.
+
+    Attributes:
+        error_rates: Measured error rates, or assumed error rates (with an `assumption_reason`).
+        frame_range: Ranges of the frame statistics in the measurement; None if unknown or not measured.
+    """
+
+    error_rates: ErrorRates
+    frame_range: FrameRange | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RatedDetector:
+    """Detector whose answers carry the error rates of its envelope; implements `ClosableDetector`.
+
+    Attributes:
+        detector: The detector.
+        envelope: Error rates of the detector, and the measured conditions.
+        config: The cell file, which declares the workspace.
+        name: Name of the detector in the cell file.
+    """
+
+    detector: ClosableDetector
+    envelope: DetectorEnvelope
+    config: CellConfig
+    name: str
+
+    def request(self, frame: Frame, view: str) -> ChangedRequest:
+        """Start the detection; outside the measured conditions, the answer has assumed error rates."""
+        error_rates, frame_range = self.envelope.error_rates, self.envelope.frame_range
+        statistics = compute_frame_statistics(frame, self.config) if frame_range else None
+        if frame_range and statistics and (difference := frame_range.describe_difference(statistics)):
+            reason = (
+                f"the workspace differs from all images with which detector {self.name} was measured: "
+                f"{difference}; {describe_measurement_command(self.config)}"
+            )
+            error_rates = assume_rates(error_rates.threshold, reason)
+        request = self.detector.request(frame, view)
+        return ChangedRequest(request, lambda answer: replace(answer, error_rates=error_rates))
+
+    def close(self) -> None:
+        """Close the detector."""
+        self.detector.close()
+
+
+def build_rated_detectors(
+    config: CellConfig, *, clock: Clock, base: Path, seed: int, folders: Sequence[Path]
+) -> dict[str, ClosableDetector]:
+    """Return the detectors of a cell by name, in the order of the cell file, with their error rates.
+
+    Args:
+        config: The cell file.
+        clock: Clock of the run.
+        base: Folder to which paths in the cell file are relative.
+        seed: Random seed of the detectors.
+        folders: Folders with measurement files `CELL.measured.json`.
+
+    Raises:
+        InputError: A detector cannot be built.
+    """
+    camera = next(iter(config.cameras.values()))
+    detectors = build_detectors(config.detectors, camera=camera, clock=clock, base=base, seed=seed)
+    envelopes = find_envelopes(config, base, folders)
+    return {
+        name: RatedDetector(detector, envelopes[name], config, name) if name in envelopes else detector
+        for name, detector in detectors.items()
+    }
+
+
+def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, DetectorEnvelope]:
+    """Return the envelope of each measurable detector of a cell, by name.
+
+    A measurement in another cell also applies if it has the same fingerprint as the detector. Paths in the
+    cell file are relative to `base`; `folders` contain measurement files `CELL.measured.json`.
+    """
+    names = list(find_measurable_detectors(config))
+    measurements, problems = read_folders(folders) if names else ([], [])
+    envelopes, advice = {}, describe_measurement_command(config)
+    for name in names:
+        threshold = config.detectors[name].threshold
+        fingerprint = compute_fingerprint(config, name, base)
+        match = next((entry for _, entry in measurements if entry.fingerprint == fingerprint), None)
+        if match is not None:
+            envelopes[name] = DetectorEnvelope(match.rates.build_error_rates(threshold), match.frames)
+            continue
+        own_entries = (entry for cell, entry in measurements if (cell, entry.detector) == (config.cell, name))
+        cause = "was never measured in this cell"
+        if outdated := next(own_entries, None):
+            changes = list_changes(outdated.fingerprint, fingerprint)
+            cause = f"was measured before a change of {changes}"
+        cause = f"detector {name} {cause}, so high error rates are assumed"
+        envelopes[name] = DetectorEnvelope(assume_rates(threshold, "; ".join([cause, advice, *problems])))
+    return envelopes
+
+
+def describe_measurement_command(config: CellConfig) -> str:
+    """Return a clause for messages: the advice to measure a detector, with the command."""
+    return f"measure it with `executive evaluate --cell {config.cell}` (about {MEASUREMENT_MINUTES} min)"
+
+
+def find_unmeasured_detectors(
+    config: CellConfig, base: Path, folders: Sequence[Path]
+) -> Iterator[tuple[tuple[str, str], str]]:
+    """Yield each detector without an applicable measurement: its keys in the cell file, and the reason."""
+    for name, envelope in find_envelopes(config, base, folders).items():
+        if envelope.error_rates.assumption_reason:
+            yield ("detectors", name), envelope.error_rates.assumption_reason
+
+
+def find_measurable_detectors(config: CellConfig) -> Iterator[str]:
+    """Yield the names of the detectors that can be measured: their kind is installed and not fake."""
+    kinds = {} if config.kind == FAKE_KIND else find_detector_kinds()
+    for name, section in config.detectors.items():
+        if section.kind in kinds and not getattr(kinds[section.kind].load(), "is_fake", False):
+            yield name

@@ -1,1 +1,0 @@
-"""Measured envelope of a detector: the conditions under which its error rates were measured."""
