@@ -92,7 +92,7 @@ class RecordOptions:
     Attributes:
         views: Views of the run.
         starts_paused: True to pause the run before its first control step.
-        saves_pictures: True to save pictures, and to keep the log of the simulated world for a film.
+        saves_pictures: True to save pictures, and to keep the log of the simulated world for a video.
         timeline: Timeline of the run, which receives the events first; None: one without history.
     """
 
@@ -125,7 +125,7 @@ def record_run(
         recorded_run = RecordedRun(run, loaded, directory, recorder, record)
         result = recorded_run.execute(options.seed, start_time)
     if not record.saves_pictures and not is_resumable(result.status):
-        # Only a resumption and a film need the log of the simulated world.
+        # Only a resumption and a video need the log of the simulated world.
         directory.world_log.unlink(missing_ok=True)
     return result
 

@@ -114,6 +114,6 @@ def _read_complete_lines(path: Path) -> bytes:
 
 
 def _read_content(path: Path) -> bytes:
-    consequence = "without it a simulated run can neither be resumed nor filmed"
+    consequence = "without it a simulated run can neither be resumed nor shown in a video"
     with explain_os_errors(InputError, f'cannot read the log of the world "{path}"', consequence):
         return path.read_bytes()
