@@ -79,7 +79,6 @@ def test_the_arguments_become_params_without_the_name() -> None:
     params = make_behaviour_skill("Primer", foreign.Primer).params
     assert list(params) == ["coats", "colour", "then", "stroke"]
     assert [params[name].is_required for name in params] == [False, True, False, False]
-    assert params["colour"].doc == "colour of the paint, which dries"
     logged = make_behaviour_skill("Logged", foreign.Logged)
     assert (params["stroke"].default, logged.params["last"].default) == (0.1, "SUCCESS")
     assert make_behaviour_skill("Logged", foreign.Logged) is logged

@@ -64,13 +64,6 @@ def test_a_kind_that_is_not_installed_is_found_before_and_at_the_start(tmp_path)
         build(second=configs["second"])
 
 
-def test_a_wrong_option_is_found_at_its_key(tmp_path):
-    configs = {"mine": DetectorConfig(kind="rfdetr", model_path="m.onnx", labels=["cube"])}
-    assert [keys for keys, _ in find_detector_errors(configs, tmp_path)] == [
-        ("detectors", "mine", "model_path")
-    ]
-
-
 def test_the_labels_of_a_kind_that_does_not_say_them_are_not_known(tmp_path, oracle_installed):
     configs = {kind: DetectorConfig(kind=kind) for kind in ("embedded", "oracle", "yolo")}
     known = find_detectable_labels(configs, tmp_path)

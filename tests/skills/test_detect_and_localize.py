@@ -86,13 +86,6 @@ def test_an_arm_in_the_way_may_be_looked_past(fake: FakeCell) -> None:
     assert [found.label for found in result.outputs["detections"].confident] == ["cube"]
 
 
-def test_what_is_seen_of_things_behind_the_arm_is_not_believed(fake: FakeCell) -> None:
-    behind, beside = (Detection("cube", 0.9, (x, 200, x + 20, 220)) for x in (300, 400))
-    fake.detector.make_answer = lambda look, true: [behind, beside]
-    fake.camera.occluded_regions.append((290, 190, 310, 230))
-    assert run_skill(Detect(hidden="pass"), fake).outputs["detections"].confident == (beside,)
-
-
 def test_a_moved_camera_is_noticed_in_every_look(fake: FakeCell) -> None:
     for displacement, reason in (("", ""), ("camera overhead was moved", "camera_moved"), ("", "")):
         fake.camera.displacement_message = displacement

@@ -11,7 +11,6 @@ from executive.errors import InputError
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.evaluation.metrics import Distribution, Evaluation
 from executive.training.train import (
-    Settings,
     choose_learning_rate,
     load_dataset,
     read_epochs,
@@ -24,7 +23,7 @@ def test_a_training_that_cannot_start_is_refused(tmp_path):
     with pytest.raises(InputError, match="split train contains no labelled images"):
         load_dataset(tmp_path)
     with pytest.raises(InputError, match=r"no model .*old\.pth to start from"):
-        train({}, tmp_path / "out", Settings(tmp_path / "old.pth"))
+        train({}, tmp_path / "out", start_model=tmp_path / "old.pth")
 
 
 def test_a_training_goes_on_in_smaller_steps_if_the_start_model_has_the_same_labels(tmp_path):
@@ -45,7 +44,7 @@ def test_training_without_the_extra_says_how_to_install_it(tmp_path):
     entries = [DatasetEntry(split, "a.jpg", (64, 64), ("cube",), boxes) for split in ("train", "valid")]
     write_annotations(tmp_path, "coco", entries, ["cube"])
     with pytest.raises(InputError, match=r"needs the package.*uv sync --extra train"):
-        train(load_dataset(tmp_path), tmp_path / "out", Settings())
+        train(load_dataset(tmp_path), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
