@@ -103,18 +103,6 @@ def test_data_on_the_blackboard_stay_in_their_run() -> None:
     assert (dict(Blackboard.storage), len(Blackboard.clients)) == before
 
 
-def test_a_nested_blackboard_and_its_activity_stream_end_with_their_block() -> None:
-    outer, inner = (RunBlackboard(FakeCell().cell.clock) for _ in range(2))
-    with outer:
-        Blackboard.set("/outer", 1)
-        with pytest.raises(ZeroDivisionError), inner:
-            assert not Blackboard.exists("/outer")
-            Blackboard.enable_activity_stream()
-            raise ZeroDivisionError
-        assert Blackboard.exists("/outer")
-    assert Blackboard.activity_stream is None
-
-
 def test_ports_become_inputs_and_outputs(fake: FakeCell) -> None:
     ports = make_behaviour_skill("Double", foreign.Double).ports
     assert {name: port.direction for name, port in ports.items()} == {
@@ -138,7 +126,6 @@ def test_ports_become_inputs_and_outputs(fake: FakeCell) -> None:
         (Behaviour, "is abstract: it has no method update, or does not declare its ports"),
         (Inverter, 'needs the argument "child", and no mission can contain a value of its type'),
         (foreign.Reserved, 'has an argument or port with the reserved name "run"'),
-        (foreign.SameName, 'has an argument and a port with the same name "number"'),
         (foreign.Secretive, r"cannot be a skill: Secretive writes \$doubled, and declares is_condition"),
     ],
 )

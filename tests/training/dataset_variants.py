@@ -120,7 +120,6 @@ COCO: dict[str, dict[str, Any]] = {
     "coco 2017": {"file": "annotations/instances_val2017.json", "folder": "val2017"},
     "label studio": {"file": "result.json", "folder": "images", "name": "images\\{}"},
     "backslash on disk": {"name": "cam\\{}", "stored_name": "cam\\{}"},
-    "path of another computer": {"name": "/home/joe/data/test/{}", "encoding": "utf-8-sig"},
     "upper case": {"suffixes": (".JPG", ".TIFF", ".Png"), "mode": "RGB"},
     "turned by 90": {"turn": 6, "suffixes": (".jpg", ".png", ".webp")},
     "stretched": {"factors": (1.0, 1.25)},
@@ -142,7 +141,6 @@ YOLO: dict[str, dict[str, Any]] = {
     "pose [3, 3]": {"line": POSE, "data": {"kpt_shape": [3, 3]}},
     "polygons": {"line": "{n} {l} {y} {x} {t} {r} {y} {r} {b} {x} {b}"},
     "oriented boxes": {"line": "{n} {l} {y} {x} {t} {r} {y} {x} {b}"},
-    "confidences": {"line": "{n}.0 {x} {y} {w} {h} 0.9"},
     "byte order marks": {"encoding": "utf-8-sig", "data": {"val": "val.txt"}, "suffixes": (".WEBP", ".Png")},
     "numbered names": {"data": {"names": dict(enumerate(CLASSES)), "val": "images/val"}},
 }

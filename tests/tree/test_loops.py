@@ -182,11 +182,3 @@ def test_all_that_cannot_be_halted_are_named(leaf: Any, site: Any, log: Any) -> 
     assert (str(caught.value), caught.value.node) == ("A: cannot stop; C: cannot stop", "here")
     assert log[4:] == ["A halted", "C halted", "D halted"]
     assert all(child.status is not Status.RUNNING for child in children)
-
-
-def test_details_of_a_parallel_say_what_the_mission_says(leaf: Any, site: Any) -> None:
-    def detail(*args: Any, **more: Any) -> str:
-        return parallel(site(), [leaf("A"), leaf("B"), leaf("C")], *args, **more).detail
-
-    assert detail() == detail(3) == "wait for all"
-    assert (detail(2), detail(1, halt=True)) == ("wait for 2 of 3", "wait for 1 of 3, halt")

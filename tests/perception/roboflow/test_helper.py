@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -97,18 +96,6 @@ def test_neither_what_it_prints_nor_an_answer_too_deep_to_read_stops_it(start, c
     assert ask(start("talks"), 5.0)["answer"] == {"width": 500, "height": 500}
     assert capfd.readouterr() == ("", "")
     assert ask(start("nests"), 5.0) == {"failure": "invalid", "detail": "the answer is nested too deeply"}
-
-
-def test_without_room_for_a_process_it_is_unavailable_until_there_is(start, monkeypatch):
-    def full(*args, **options):
-        raise OSError(11, "Resource temporarily unavailable")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(subprocess, "Popen", full)
-        helper = start("talks")
-        with pytest.raises(Unavailable, match="not running: resource temporarily unavailable"):
-            ask(helper)
-    assert "answer" in ask(helper, 5.0)
 
 
 def test_stopping_it_ends_a_call_under_way(start):

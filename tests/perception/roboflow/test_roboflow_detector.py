@@ -123,19 +123,6 @@ def test_a_box_is_returned_in_the_frames_pixels_and_renamed(make, server, api, v
         assert "confidence=0.25" in path if api == "v0" else json.loads(body)["confidence"] == 0.25
 
 
-@pytest.mark.slow
-def test_all_tiles_of_a_frame_share_one_deadline(make, server):
-    detector = make(**{**V1, "full": "tiles", "deadline": 5.0})
-    (found,) = search(detector, show_spot(180, 240), "full").confident
-    assert found.box == pytest.approx((180, 240, 210, 260), abs=1.0)
-    assert server.looks >= 9
-    server.delay = 1.0
-    start_time = time.monotonic()
-    with pytest.raises(DeadlinePassed, match=r"^no answer within 5\.0 s from"):
-        search(detector, show_spot(), "full")
-    assert 5.0 <= time.monotonic() - start_time < 6.0
-
-
 FAULTS = {
     "401": r"does not accept the key \(401: key \*\*\* is no good\); set ROBOFLOW_API_KEY to a key",
     "404": "has no (model shapes/1|workflow acme/sorting)",
@@ -170,20 +157,6 @@ def test_a_server_on_this_computer_is_asked_without_a_proxy(server, monkeypatch)
     monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
     with contextlib.closing(build("direct", url=server.url, **V1)) as detector:
         assert len(search(detector, show_spot()).confident) == 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        ({"url": "https://127.0.0.1:{port}"}, r"https://127.0.0.1:\d+ cannot be reached"),
-        ({"key": "", "api": "v0"}, "requires a key .*; set ROBOFLOW_API_KEY"),
-        ({**APIS["workflow"], "workflow_output": "circles"}, 'has no output "circles" .*picture, boxes'),
-    ],
-)
-def test_an_address_key_or_output_that_does_not_work_is_said(make, server, options, text):
-    options = {**options, **({"url": options["url"].format(port=server.port)} if "url" in options else {})}
-    assert_unavailable(make(deadline=30.0, **options), text)
 
 
 def test_closing_does_not_wait_for_a_server_that_hangs(server):
