@@ -21,7 +21,6 @@ from tests.benchmarks import (
     hostile_input,
     kills,
     longest_step,
-    motion,
     mutations,
     soak,
     suction_map,
@@ -58,24 +57,6 @@ def test_halts_of_a_fake_cell_are_in_order_and_a_wrong_ledger_is_found() -> None
     audit = {"right": 1, "wrong_bin": 0, "left": 3, "elsewhere": 1, "unseen": 1}
     assert list(halts.check_ledger(items, audit)) == []
     assert list(halts.check_ledger(items, {**audit, "wrong_bin": 1}))
-
-
-@pytest.mark.slow
-def test_the_simulated_arm_brakes_within_its_limits() -> None:
-    subject = load_mission_under_test("sort_overhead", {}, has_oracle=True, seed=1)
-    figures = halts.measure(subject, every=50)
-    worst = {row["figure"]: row["value"] for row in figures["worst"]}
-    # A figure of zero would not be measured.
-    assert figures["problems"] == []
-    assert worst["rest_s"] > 0.1 and worst["jerk_ratio"] > 0.5 and worst["deviation_rad"] > 0.0
-
-
-@pytest.mark.slow
-def test_planned_pairs_have_plausible_figures() -> None:
-    figures = motion.measure(load_cell(find_cell("overhead")), seed=5, pairs=2)
-    times = {row["method"]: row["time_s"] for row in figures["methods"]}
-    assert times["lower bound"] < times["ours"] < times["TOPP-RA"] < times["stops at waypoints"]
-    assert figures["problems"] == []
 
 
 @pytest.mark.slow

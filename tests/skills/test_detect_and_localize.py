@@ -55,7 +55,6 @@ def test_only_what_is_sure_is_found(
         ([TORN], "unsure", "at best a cube with confidence 0.62, and 0.58 for another class"),
         ("no answer within 1.0 s", "unavailable", "embedded: no answer within 1.0 s"),
         ([Detection("duck", 0.9, (9, 0, 0, 9))], "unavailable", "an invalid box: 'duck' 0.9 at ("),
-        ([Detection("\x1b[31mduck", 0.9, (0, 0, 9, 9))], "unavailable", "box: '\\x1b[31mduck' 0.9 at ("),
         ([Detection("d" * 101, 0.9, (0, 0, 9, 9))], "unavailable", f"box: '{'d' * 100}' 0.9 at ("),
     ],
 )

@@ -89,13 +89,6 @@ def test_the_summary_states_objects_and_dropped_boxes(tmp_path, samples):
     assert LabelledDataset(tmp_path).summary == f"{tmp_path}, split test: {counts}"
 
 
-def test_a_lost_label_file_is_counted_and_an_upper_case_one_is_read(tmp_path, samples):
-    write_yolo(tmp_path, samples)
-    (tmp_path / "labels/val/a0.txt").rename(tmp_path / "labels/val/a0.TXT")
-    (tmp_path / "labels/val/a1.txt").unlink()
-    assert "cube 1, duck 1; 1 images without a label file" in LabelledDataset(tmp_path).summary
-
-
 @pytest.mark.parametrize("split", ["test", "valid"])
 def test_a_missing_split_is_not_replaced_by_other_images(tmp_path, samples, split):
     data = {"train": "images/train", "val": "", "test": "../test/images"}
@@ -132,8 +125,6 @@ NAME, BOX = ("images", 0, "file_name"), ("annotations", 0, "bbox")
         (set_value("images", value=[{}]), "images[0].id: Field required"),
         (set_value("annotations", 0, "image_id", value=9), "annotations[0].image_id: no id 9; ids: 0"),
         (set_value(*BOX, value=[1, 2, 3, float("nan")]), "bbox[3]: Input should be a finite number"),
-        (set_value(*BOX, value=[1, 2, -3, 4]), "bbox[2]: Input should be greater than or equal to 0"),
-        (set_value("images", 1, "id", value=0), "have the same id"),
         (set_value(*NAME, value="./a1.png"), "two images have the same file_name"),
         (set_value(*NAME, value="../../b.jpg"), 'images[0].file_name: "../../b.jpg" is not a file in '),
         (set_value(*NAME, value="link.jpg"), "link.jpg is not a file in "),
@@ -156,7 +147,6 @@ def test_a_damaged_coco_dataset_is_one_error(tmp_path, samples, change, error):
         ("test/_annotations.coco.json", "{", "content: Invalid JSON: EOF"),
         ("test/annotations.json", "{}", "are COCO files of one split"),
         ("labels/val/a0.txt", " " * 10_000_001, "labels/val/a0.txt has more than 10 MB"),
-        ("labels/val/a0.txt", "\udcff", "labels/val/a0.txt cannot be read"),
         ("data.yaml", " " * 100_001, "data.yaml has more than 0.1 MB"),
         ("data.yaml", "names: [duck\n", "data.yaml:2: invalid YAML: "),
     ],
@@ -167,10 +157,3 @@ def test_a_damaged_file_is_one_error(tmp_path, samples, file, content, error):
     with pytest.raises(InputError) as raised:
         LabelledDataset(tmp_path)
     assert error in str(raised.value)
-
-
-@pytest.mark.parametrize("tag", ["!!timestamp foo", "!!python/name:os.system ''", "yes"])
-def test_names_of_classes_are_text_whatever_their_tag(tmp_path, samples, tag):
-    write_yolo(tmp_path, samples)
-    (tmp_path / "data.yaml").write_text(f"names: [{tag}, duck, sphere]\n")
-    assert all(isinstance(label, str) for label in LabelledDataset(tmp_path).object_counts)

@@ -36,8 +36,6 @@ class StubServer:
         self.finds = finds
         self.faults = faults
         self.looks = 0
-        self.delay = 0.0
-        """Time before every answer to an image [s]."""
         self.asked: list[tuple[str, dict[str, str], bytes]] = []
         """Path, headers and body of every request."""
         self.loaded: set[str] = set()
@@ -92,7 +90,6 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, image: np.ndarray) -> None:
         self.stub.looks += 1
-        self.stub.over.wait(self.stub.delay)
         fault = self.stub.faults(self.stub.looks)
         height, width = image.shape[:2]
         found = [dict(prediction) for prediction in self.stub.finds(image)]

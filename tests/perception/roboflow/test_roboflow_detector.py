@@ -65,7 +65,6 @@ def stub():
 @pytest.fixture
 def server(stub):
     stub.faults = lambda look: ""
-    stub.delay = 0.0
     stub.asked.clear()
     return stub
 

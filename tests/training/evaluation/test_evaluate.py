@@ -141,12 +141,6 @@ def test_the_rates_for_the_ledger_are_upper_bounds_rounded_up():
     assert tuple(stored.model_dump().values()) == (0.0023, 0.0047, 0.016, 0.44, 0.76, 0.0012)
 
 
-@pytest.mark.parametrize("full_view_count", [0, 5])
-def test_no_rate_is_zero_or_one_even_if_nothing_was_counted(full_view_count):
-    stored = measure(full_view_count, full_view_count, 0, 0, 1, 0.0).rates
-    assert tuple(stored.model_dump().values())[:4] == (0.99, 0.99, 3.0, 0.01)
-
-
 @pytest.mark.parametrize(
     ("full_view_count", "missed", "invented", "expected"),
     [

@@ -155,10 +155,8 @@ def _check_url(url: str) -> OptionErrors:
         is_server_address = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
     except ValueError:
         is_server_address = False
-    if not is_server_address:
-        yield "url", "url must be an address such as http://127.0.0.1:9001 or https://serverless.roboflow.com"
-    elif "@" in parts.netloc or parts.query or parts.fragment:
-        yield "url", f"url must not contain a user, query or fragment; set {KEY_VARIABLE} to the key"
+    if not is_server_address or "@" in parts.netloc or parts.query or parts.fragment:
+        yield "url", f"url must be an address such as {HOSTED_URL}, without a user or a query"
 
 
 def describe_failure(failure: Mapping[str, Any], options: RoboflowOptions) -> str:
