@@ -102,11 +102,9 @@ def describe_displacement(frame: Frame, bins: Sequence[Bin]) -> str:
     x, y, z = 1e3 * offset.shift
     return (
         f"camera {frame.camera} is not at its declared pose: the outlines of {', '.join(offset.bins)} "
-        f"appear {1e3 * offset.outline_distance:.0f} mm away from their "
-        f"expected positions, as if the camera had moved by ({x:+.0f}, {y:+.0f}, {z:+.0f}) mm and turned by "
-        f"{offset.rotation_deg:.1f} degrees; "
-        f"limit {1e3 * MAX_OUTLINE_DISTANCE:.0f} mm; mount camera and bins as declared, or "
-        "measure the pose again"
+        f"appear {1e3 * offset.outline_distance:.0f} mm away from their expected positions, as if the camera "
+        f"had moved by ({x:+.0f}, {y:+.0f}, {z:+.0f}) mm and turned by {offset.rotation_deg:.1f} degrees; "
+        f"limit {1e3 * MAX_OUTLINE_DISTANCE:.0f} mm; mount camera and bins as declared, or measure it again"
     )
 
 

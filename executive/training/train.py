@@ -16,11 +16,6 @@ from executive.training.evaluation.evaluate import evaluate_model, find_label_fi
 from executive.training.evaluation.metrics import Evaluation
 from executive.training.samples import LabelledDataset, read_image, read_image_header
 
-ReportEpoch = Callable[[int, dict[str, float]], None]
-"""Called after each epoch with its number, from 1, and its metrics by name."""
-ReportBatch = Callable[[int, int], None]
-"""Called after each batch with the number of finished batches and the number of all batches."""
-
 CARD_THRESHOLD = 0.5
 """Minimum confidence of the detections for precision and recall in a model card."""
 NEW_MODEL_LEARNING_RATE = 3e-4
@@ -41,8 +36,8 @@ EPOCH_COLUMNS = {
 def train(
     splits: Mapping[str, LabelledDataset], out: Path, *, start_model: Path | None = None,
     learning_rate: float | None = None, epochs: int = 20, seed: int = 0,
-    report_epoch: ReportEpoch = lambda _number, _metrics: None,
-    report_batch: ReportBatch = lambda _finished_count, _total_count: None,
+    report_epoch: Callable[[int, dict[str, float]], None] = lambda _number, _metrics: None,
+    report_batch: Callable[[int, int], None] = lambda _finished_count, _total_count: None,
 ) -> None:  # fmt: skip
     """Train a model and write it to `out`.
 
@@ -58,8 +53,8 @@ def train(
         learning_rate: Learning rate; None: 1e-4 if `start_model` has the same classes, else 3e-4.
         epochs: Number of passes over the dataset.
         seed: Seed of the initial weights, of the order of the images, and of the augmentation.
-        report_epoch: Called after each epoch.
-        report_batch: Called after each batch.
+        report_epoch: Called after each epoch with its number, from 1, and its metrics by name.
+        report_batch: Called after each batch with the numbers of finished and of all batches.
 
     Raises:
         InputError: An image is damaged, `start_model` does not exist, or the training packages are not
