@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
@@ -42,7 +43,8 @@ def list_arguments(behaviour: type[Behaviour]) -> dict[str, Param]:
         for parameter in parameters:
             if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY):
                 default = ... if parameter.default is parameter.empty else parameter.default
-                argument = replace(param(default), name=parameter.name, type=hints.get(parameter.name, Any))
+                argument = param(default, doc=_find_description(owner, parameter.name))
+                argument = replace(argument, name=parameter.name, type=hints.get(parameter.name, Any))
                 arguments.setdefault(parameter.name, argument)
         if all(parameter.kind is not parameter.VAR_KEYWORD for parameter in parameters):
             break
@@ -87,3 +89,12 @@ def to_argument(value: object, declared_type: object) -> object:
 
 def _is_enumeration(declared_type: object) -> TypeGuard[type[Enum]]:
     return isinstance(declared_type, type) and issubclass(declared_type, Enum)
+
+
+def _find_description(owner: type, name: str) -> str:
+    """Return the description of an argument in the Google-style docstring of its class or constructor."""
+    for documented in (owner, vars(owner)["__init__"]):
+        pattern = rf"^ *{name}(?: \(.*\))?: (.*(?:\n {{6,}}\S.*)*)"
+        if match := re.search(pattern, inspect.getdoc(documented) or "", re.MULTILINE):
+            return " ".join(match[1].split())
+    return ""

@@ -15,10 +15,11 @@ from executive.behaviours.arguments import find_mission_type, list_arguments, to
 Statuses = Literal["SUCCESS", "FAILURE", "RUNNING", "INVALID"]
 
 
-def test_arguments_have_types_and_defaults() -> None:
+def test_arguments_have_types_defaults_and_descriptions() -> None:
     arguments = list_arguments(Painter)
     assert list(arguments) == ["name", "colour", "then", "stroke"]
     assert (arguments["colour"].type, arguments["colour"].default) == (Colour, ...)
+    assert arguments["colour"].doc == "colour of the paint, which dries"
     assert (arguments["stroke"].type, arguments["stroke"].default) == (float, 0.1)
     assert {name: argument.type for name, argument in list_arguments(Untyped).items()} == {
         "thing": Any,

@@ -36,7 +36,7 @@ WORKFLOW = {"api": "workflow", "workspace": "acme", "workflow_id": "sorting"}
         ({"deadline": 0}, "deadline", "greater than 0"),
         ({"deadline": 61}, "deadline", "less than or equal to 60"),
         ({"labels": ["a"], "class_map": {"b": "cube"}}, "class_map", "contains b, .* the model are a$"),
-        ({"api_key": SECRET}, "api_key", "not permitted"),
+        ({"api_key": SECRET}, "api_key", "does not belong in a cell file"),
     ],
 )
 def test_a_wrong_option_is_said_in_a_sentence_that_tells_no_secret(tmp_path, options, option, text):

@@ -34,6 +34,8 @@ from executive.perception.detectors.views import Region, remove_duplicates, sear
 
 HOSTED_URL = "https://serverless.roboflow.com"
 """Address of Roboflow's hosted server."""
+SECRET_WORDS = ("key", "token", "secret", "password", "authorization")
+"""Substrings of the names of unknown options whose values are probably secrets."""
 WORKFLOW_OPTIONS = ("workspace", "workflow_id", "workflow_input", "workflow_output")
 """Options that only `api: workflow` uses."""
 FORBIDDEN_CHARACTERS = "?&#= "
@@ -116,7 +118,12 @@ class RoboflowOptions(DetectorOptions):
     def find_errors(cls, config: DetectorConfig) -> OptionErrors:
         """Yield each invalid option in the section `config`, with an error message."""
         errors = list(super().find_errors(config))
-        yield from errors
+        for option, message in errors:
+            if any(part in option.lower() for part in SECRET_WORDS):
+                message = (
+                    f'"{option}" does not belong in a cell file; set the variable {KEY_VARIABLE} instead'
+                )
+            yield option, message
         if errors:
             return
         options = cls.model_validate(config.options)
