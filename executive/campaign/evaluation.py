@@ -24,7 +24,7 @@ from executive.training.dataset import LabelledImage
 from executive.training.evaluation import evaluate
 from executive.training.evaluation.evaluate import CellDetector
 from executive.training.evaluation.metrics import NO_OBJECT, ClassMetrics, Evaluation
-from executive.training.evaluation.worst_mistakes import WorstMistakes
+from executive.training.evaluation.worst_mistakes import Mistake
 from executive.training.rendering import generate_dataset, render_run_frames
 from executive.training.samples import LabelledDataset
 
@@ -137,7 +137,7 @@ def check_detector(detector: DetectorUnderTest, settings: ImageSettings) -> None
 
 
 def measure_detector(
-    detector: DetectorUnderTest, settings: ImageSettings, mistakes: WorstMistakes, progress: OpenProgressBar
+    detector: DetectorUnderTest, settings: ImageSettings, mistakes: list[Mistake], progress: OpenProgressBar
 ) -> Evaluation:
     """Evaluate a detector on a dataset, or on rendered scenes of its cell; update the worst mistakes."""
     # Images of a dataset and of randomized scenes do not use the camera, table and localizer of the cell.

@@ -97,11 +97,10 @@ def command(
         from executive.campaign import evaluation
         from executive.cli.cells import find_cell, load_cells
         from executive.cli.progress import print_report, show_progress
-        from executive.training.evaluation.worst_mistakes import WorstMistakes
         from executive.training.samples import LabelledDataset
         from executive.view.detector_results import list_metrics
 
-        worst_mistakes = WorstMistakes()
+        worst_mistakes: list[Any] = []
         samples = LabelledDataset(dataset) if dataset else None
         if samples:
             click.echo(samples.summary, err=True)
@@ -133,8 +132,8 @@ def command(
             from executive.training.dataset import save_image
             from executive.training.evaluation.worst_mistakes import draw_sheet
 
-            save_image(sheet, draw_sheet(worst_mistakes.mistakes, ", ".join(results)))
-            click.echo(f"{sheet}: the {len(worst_mistakes.mistakes)} worst mistakes", err=True)
+            save_image(sheet, draw_sheet(worst_mistakes, ", ".join(results)))
+            click.echo(f"{sheet}: the {len(worst_mistakes)} worst mistakes", err=True)
     if as_json:
         files = {"scene": scene and str(scene), "weights": weights and str(weights)}
         print_json({"seed": seed, "varied": varied, **files, "measured": results})

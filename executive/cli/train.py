@@ -34,13 +34,16 @@ def command(dataset: Path, out: Path, model: Path | None, rate: float | None, ep
     """
     with keep_stdout_clean():
         from executive.cli.progress import show_progress
-        from executive.training.train import Settings, load_dataset, train
+        from executive.training.train import load_dataset, train
 
         splits = load_dataset(dataset)
         for images in splits.values():
             click.echo(images.summary, err=True)
         with show_progress("training") as progress:
-            train(splits, out, Settings(model, rate, epochs, seed), partial(_print_epoch, epochs), progress)
+            train(
+                splits, out, start_model=model, learning_rate=rate, epochs=epochs, seed=seed,
+                report_epoch=partial(_print_epoch, epochs), report_batch=progress,
+            )  # fmt: skip
         click.echo(
             "add these lines to the cell file, with paths relative to the folder of the cell file:\n\n"
             "detectors:\n  trained:\n    kind: rfdetr\n"

@@ -82,20 +82,15 @@ class CameraOffset:
     """Estimated displacement of a camera from its declared pose.
 
     Attributes:
-        shift, shift_std: Translation in the world `(3,)` [m], and the standard deviation along each axis [m].
+        shift: Translation in the world `(3,)` [m].
         rotation_deg: Angle of the rotation from the declared to the estimated pose [degree].
         outline_distance: Mean distance between the outlines of the bins and their expected positions [m].
-        pixel_distance: Mean distance between the outlines and their expected positions in the image [pixel].
-        support: Fraction of the outlines (0 to 1) at which the image has an edge, for the estimated pose.
         bins: Names of the bins in view.
     """
 
     shift: Array
-    shift_std: Array
     rotation_deg: float
     outline_distance: float
-    pixel_distance: float
-    support: float
     bins: tuple[str, ...]
 
 
@@ -107,11 +102,9 @@ def describe_displacement(frame: Frame, bins: Sequence[Bin]) -> str:
     x, y, z = 1e3 * offset.shift
     return (
         f"camera {frame.camera} is not at its declared pose: the outlines of {', '.join(offset.bins)} "
-        f"appear {offset.pixel_distance:.0f} pixels ({1e3 * offset.outline_distance:.0f} mm) away from their "
-        f"expected positions, as if the camera had moved by ({x:+.0f}, {y:+.0f}, {z:+.0f}) mm (standard "
-        f"deviation {1e3 * offset.shift_std.max():.0f} mm) and turned by {offset.rotation_deg:.1f} degrees; "
-        f"limit {1e3 * MAX_OUTLINE_DISTANCE:.0f} mm; mount camera and bins as declared, or "
-        "measure the pose again"
+        f"appear {1e3 * offset.outline_distance:.0f} mm away from their expected positions, as if the camera "
+        f"had moved by ({x:+.0f}, {y:+.0f}, {z:+.0f}) mm and turned by {offset.rotation_deg:.1f} degrees; "
+        f"limit {1e3 * MAX_OUTLINE_DISTANCE:.0f} mm; mount camera and bins as declared, or measure it again"
     )
 
 
@@ -134,16 +127,13 @@ def estimate_offset(frame: Frame, bins: Sequence[Bin]) -> CameraOffset | None:
 
 def _make_camera_offset(fit: PoseFit, frame: Frame, bins: Sequence[Bin]) -> CameraOffset:
     """Return the camera offset that corresponds to a fitted pose."""
-    samples, R_WC = fit.samples, frame.X_WC.rotation
+    samples = fit.samples
     expected_pixels = project(frame.matrix, frame.X_WC, samples.world_points)
     distances = np.linalg.norm(samples.pixels - expected_pixels, axis=1)
     return CameraOffset(
-        shift=R_WC @ fit.offset[3:],
-        shift_std=np.sqrt(np.diag(R_WC @ fit.covariance[3:, 3:] @ R_WC.T)),
+        shift=frame.X_WC.rotation @ fit.offset[3:],
         rotation_deg=math.degrees(float(np.linalg.norm(fit.offset[:3]))),
         outline_distance=float((distances * samples.camera_points[:, 2]).mean() / frame.matrix[0, 0]),
-        pixel_distance=float(distances.mean()),
-        support=fit.support,
         bins=tuple(bins[index].name for index in np.unique(samples.bin_indices)),
     )
 
@@ -171,13 +161,11 @@ class PoseFit(NamedTuple):
 
     Attributes:
         offset: Pose offset `(6,)`.
-        covariance: Covariance of the pose offset `(6, 6)`.
         samples: Visible samples of the outlines at the fitted pose.
         support: Support of the fitted pose.
     """
 
     offset: Array
-    covariance: Array
     samples: EdgeSamples
     support: float
 
@@ -194,18 +182,17 @@ class OutlineFitter:
 
         `max_distances` are the maximum distances between outline and edge in the iterations [pixel].
         """
-        covariance = np.diag(PRIOR_STD**2)
         for max_distance in max_distances:
             samples = self._find_visible_samples(offset)
             distances, has_edge = self._find_edges(samples, max_distance)
             if not _is_sufficient(samples) or has_edge.sum() < MIN_SAMPLES / 2:
                 return None
             jacobian = _compute_jacobian(samples, self._frame.matrix)[has_edge]
-            offset, covariance = _solve_robustly(jacobian, distances[has_edge], offset, max_distance / 2)
+            offset = _solve_robustly(jacobian, distances[has_edge], offset, max_distance / 2)
         samples = self._find_visible_samples(offset)
         if not _is_sufficient(samples):
             return None
-        return PoseFit(offset, covariance, samples, self.compute_support(offset))
+        return PoseFit(offset, samples, self.compute_support(offset))
 
     def compute_support(self, offset: Array) -> float:
         """Return the support of the pose with the given offset."""
@@ -339,18 +326,18 @@ def _compute_jacobian(samples: EdgeSamples, matrix: Array) -> Array:
     return np.column_stack([np.cross(gradient, samples.camera_points), -gradient])
 
 
-def _solve_robustly(jacobian: Array, distances: Array, offset: Array, scale: float) -> tuple[Array, Array]:
-    """Return the pose offset that fits edges at `distances` `(N,)` [pixel], and its covariance `(6, 6)`.
+def _solve_robustly(jacobian: Array, distances: Array, offset: Array, scale: float) -> Array:
+    """Return the pose offset that fits edges at `distances` `(N,)` [pixel].
 
     Maximum a posteriori estimate with Geman-McClure weights: edges with residuals above `scale` [pixel], or
     above 1.5 times the median residual, get a low weight.
     """
-    correction, covariance = np.zeros(6), np.zeros((6, 6))
+    correction = np.zeros(6)
     for _ in range(REWEIGHTING_ITERATIONS):
         residuals = distances - jacobian @ correction
         scale = max(MIN_OUTLIER_RESIDUAL, min(scale, 1.5 * float(np.median(np.abs(residuals)))))
         weights = (1 + (residuals / scale) ** 2) ** -2
         weighted = jacobian * weights[:, None] / EDGE_STD**2
-        covariance = np.asarray(np.linalg.inv(weighted.T @ jacobian + np.diag(PRIOR_STD**-2.0)), dtype=float)
+        covariance = np.linalg.inv(weighted.T @ jacobian + np.diag(PRIOR_STD**-2.0))
         correction = covariance @ (weighted.T @ distances - offset / PRIOR_STD**2)
-    return offset + correction, covariance
+    return np.asarray(offset + correction)

@@ -11,7 +11,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import cv2
 import numpy as np
@@ -235,12 +235,6 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Mappin
     }
 
 
-def list_changes(measured: Mapping[str, str], current: Mapping[str, str]) -> str:
-    """Return the names of the properties that differ between two fingerprints; "" if none."""
-    names = dict.fromkeys([*measured, *current])
-    return ", ".join(name for name in names if measured.get(name) != current.get(name))
-
-
 def _digest_weights(section: DetectorConfig, base: Path) -> str:
     """Return a digest of the model file of a detector; "" for a detector without a model file."""
     find_weights = getattr(find_detector_kinds()[section.kind].load(), "weights", None)
@@ -264,17 +258,9 @@ def _describe_camera(camera: CameraConfig, config: CellConfig) -> dict[str, str]
     }
 
 
-@dataclass(frozen=True)
-class DetectorEnvelope:
-    """Error rates of one detector, and the measured conditions to which the error rates apply.
-
-    Attributes:
-        error_rates: Measured error rates, or assumed error rates (with an `assumption_reason`).
-        frame_range: Ranges of the frame statistics in the measurement; None if unknown or not measured.
-    """
-
-    error_rates: ErrorRates
-    frame_range: FrameRange | None = None
+Envelope: TypeAlias = tuple[ErrorRates, FrameRange | None]
+"""Error rates of one detector (measured, or assumed with an `assumption_reason`), and the ranges of the frame
+statistics in the measurement, in which the error rates apply; None if unknown or not measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,13 +275,13 @@ class RatedDetector:
     """
 
     detector: ClosableDetector
-    envelope: DetectorEnvelope
+    envelope: Envelope
     config: CellConfig
     name: str
 
     def request(self, frame: Frame, view: str) -> ChangedRequest:
         """Start the detection; outside the measured conditions, the answer has assumed error rates."""
-        error_rates, frame_range = self.envelope.error_rates, self.envelope.frame_range
+        error_rates, frame_range = self.envelope
         statistics = compute_frame_statistics(frame, self.config) if frame_range else None
         if frame_range and statistics and (difference := frame_range.describe_difference(statistics)):
             reason = (
@@ -335,7 +321,7 @@ def build_rated_detectors(
     }
 
 
-def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, DetectorEnvelope]:
+def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, Envelope]:
     """Return the envelope of each measurable detector of a cell, by name.
 
     A measurement in another cell also applies if it has the same fingerprint as the detector. Paths in the
@@ -349,15 +335,15 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
         fingerprint = compute_fingerprint(config, name, base)
         match = next((entry for _, entry in measurements if entry.fingerprint == fingerprint), None)
         if match is not None:
-            envelopes[name] = DetectorEnvelope(match.rates.build_error_rates(threshold), match.frames)
+            envelopes[name] = match.rates.build_error_rates(threshold), match.frames
             continue
         own_entries = (entry for cell, entry in measurements if (cell, entry.detector) == (config.cell, name))
         cause = "was never measured in this cell"
         if outdated := next(own_entries, None):
-            changes = list_changes(outdated.fingerprint, fingerprint)
-            cause = f"was measured before a change of {changes}"
+            changes = dict(outdated.fingerprint.items() ^ fingerprint.items())
+            cause = f"was measured before a change of {', '.join(sorted(changes))}"
         cause = f"detector {name} {cause}, so high error rates are assumed"
-        envelopes[name] = DetectorEnvelope(assume_rates(threshold, "; ".join([cause, advice, *problems])))
+        envelopes[name] = assume_rates(threshold, "; ".join([cause, advice, *problems])), None
     return envelopes
 
 
@@ -370,9 +356,9 @@ def find_unmeasured_detectors(
     config: CellConfig, base: Path, folders: Sequence[Path]
 ) -> Iterator[tuple[tuple[str, str], str]]:
     """Yield each detector without an applicable measurement: its keys in the cell file, and the reason."""
-    for name, envelope in find_envelopes(config, base, folders).items():
-        if envelope.error_rates.assumption_reason:
-            yield ("detectors", name), envelope.error_rates.assumption_reason
+    for name, (error_rates, _) in find_envelopes(config, base, folders).items():
+        if error_rates.assumption_reason:
+            yield ("detectors", name), error_rates.assumption_reason
 
 
 def find_measurable_detectors(config: CellConfig) -> Iterator[str]:

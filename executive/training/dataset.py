@@ -152,12 +152,7 @@ def write_annotations(
 
     Each split also gets `ignored.json` with `DatasetEntry.ignored_boxes`, and `truth.json` with
     `DatasetEntry.truth`, by file name of the image.
-
-    Raises:
-        InputError: The layout is unknown.
     """
-    if layout not in ("coco", "yolo"):
-        raise InputError(f'the dataset layout "{layout}" is unknown; use coco or yolo')
     root.mkdir(parents=True, exist_ok=True)
     splits = [split for split in SPLITS if any(entry.split == split for entry in entries)]
     for split in splits:

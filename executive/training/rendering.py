@@ -81,7 +81,7 @@ def generate_dataset(
         progress: Called after each block of `BLOCK_SIZE` images.
 
     Raises:
-        InputError: The layout is unknown, the cells differ in their classes, a model of an object is missing
+        InputError: The cells differ in their classes, a model of an object is missing
             or has another size than in the cell file, or a file cannot be written.
     """
     cells = list(configs.values())
@@ -92,7 +92,6 @@ def generate_dataset(
     for name, cell in configs.items():
         for key, message in find_model_errors(cell):
             raise InputError(f"{name}: {'.'.join(map(str, key))}: {message}")
-    write_annotations(out, layout, [], classes)
     train_count = image_count - round(image_count * valid_fraction)
     render = partial(_render_dataset_images, cells, out, layout, seed, train_count)
     entries = _render_blocks(render, image_count, worker_count, progress)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from jinja2 import Environment, StrictUndefined
@@ -16,11 +15,6 @@ from executive.training.dataset import DatasetEntry, build_image_path, save_imag
 from executive.training.evaluation.evaluate import evaluate_model, find_label_file
 from executive.training.evaluation.metrics import Evaluation
 from executive.training.samples import LabelledDataset, read_image, read_image_header
-
-ReportEpoch = Callable[[int, dict[str, float]], None]
-"""Called after each epoch with its number, from 1, and its metrics by name."""
-ReportBatch = Callable[[int, int], None]
-"""Called after each batch with the number of finished batches and the number of all batches."""
 
 CARD_THRESHOLD = 0.5
 """Minimum confidence of the detections for precision and recall in a model card."""
@@ -39,28 +33,11 @@ EPOCH_COLUMNS = {
 """Headings in a model card, by column of the trainer's `metrics.csv`."""
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of a training that the user chooses.
-
-    Attributes:
-        start_model: Checkpoint (`.pth`) or exported model (`.onnx`) of this architecture to fine-tune, which
-            may have other classes; None: training starts from random weights.
-        learning_rate: Learning rate; None: 1e-4 if `start_model` has the same classes, else 3e-4.
-        epochs: Number of passes over the dataset.
-        seed: Seed of the initial weights, of the order of the images, and of the augmentation.
-    """
-
-    start_model: Path | None = None
-    learning_rate: float | None = None
-    epochs: int = 20
-    seed: int = 0
-
-
 def train(
-    splits: Mapping[str, LabelledDataset], out: Path, settings: Settings,
-    report_epoch: ReportEpoch = lambda _number, _metrics: None,
-    report_batch: ReportBatch = lambda _finished_count, _total_count: None,
+    splits: Mapping[str, LabelledDataset], out: Path, *, start_model: Path | None = None,
+    learning_rate: float | None = None, epochs: int = 20, seed: int = 0,
+    report_epoch: Callable[[int, dict[str, float]], None] = lambda _number, _metrics: None,
+    report_batch: Callable[[int, int], None] = lambda _finished_count, _total_count: None,
 ) -> None:  # fmt: skip
     """Train a model and write it to `out`.
 
@@ -71,15 +48,18 @@ def train(
     Args:
         splits: The splits `train` and `valid` of a dataset, from `load_dataset`.
         out: Output folder, which is created if it is missing.
-        settings: Settings of the training.
-        report_epoch: Called after each epoch.
-        report_batch: Called after each batch.
+        start_model: Checkpoint (`.pth`) or exported model (`.onnx`) of this architecture to fine-tune, which
+            may have other classes; None: training starts from random weights.
+        learning_rate: Learning rate; None: 1e-4 if `start_model` has the same classes, else 3e-4.
+        epochs: Number of passes over the dataset.
+        seed: Seed of the initial weights, of the order of the images, and of the augmentation.
+        report_epoch: Called after each epoch with its number, from 1, and its metrics by name.
+        report_batch: Called after each batch with the numbers of finished and of all batches.
 
     Raises:
         InputError: An image is damaged, `start_model` does not exist, or the training packages are not
             installed.
     """
-    start_model = settings.start_model
     if start_model is not None and not start_model.is_file():
         raise InputError(f"there is no model {start_model} to start from; train one first, or omit --from")
     try:
@@ -92,14 +72,13 @@ def train(
     with tempfile.TemporaryDirectory(dir=out) as folder:
         labels = write_coco_dataset(splits, Path(folder))
         fit_model(
-            Path(folder), out, labels, start_model=start_model, epochs=settings.epochs, seed=settings.seed,
-            learning_rate=settings.learning_rate or choose_learning_rate(start_model, labels),
+            Path(folder), out, labels, start_model=start_model, epochs=epochs, seed=seed,
+            learning_rate=learning_rate or choose_learning_rate(start_model, labels),
             report_epoch=report_epoch, report_batch=report_batch,
         )  # fmt: skip
     model = out / "model.onnx"
     export_onnx(out / "checkpoint_best_total.pth", len(labels), model)
     accuracy = evaluate_model(model, out / "labels.txt", splits["valid"], CARD_THRESHOLD)
-    learning_rate = settings.learning_rate
     card = render_card(
         title=f"Small RF-DETR trained on {splits['train'].folder.name}",
         summary=f"Detects {', '.join(labels)} in square images.",
@@ -107,8 +86,8 @@ def train(
             **describe_architecture(),
             "start": "random weights" if start_model is None else start_model.name,
             **({} if learning_rate is None else {"learning rate": f"{learning_rate:g}"}),
-            "epochs": str(settings.epochs),
-            "seed": str(settings.seed),
+            "epochs": str(epochs),
+            "seed": str(seed),
             "weights stored as": "int8",
         },
         epochs=read_epochs(out / "metrics.csv"),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from enum import Enum, auto
 from functools import cache
 from inspect import get_annotations
-from typing import Annotated, Any, ClassVar, Literal, ParamSpec, TypeAlias, Union, cast, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, Union, cast, get_args, get_origin
 
 from py_trees.behaviour import Behaviour
 from pydantic import Field, TypeAdapter
@@ -115,19 +115,11 @@ class Key:
         return _make_validator(self.value_type, self.ge, self.gt, max_value)
 
 
-_Arguments = ParamSpec("_Arguments")
-
-
-def _with_any_result(key_class: Callable[_Arguments, Key]) -> Callable[_Arguments, Any]:
-    """Return `key_class`, typed as a function with the result Any, so that mypy accepts `x: int = key()`."""
-    return key_class
-
-
-key = _with_any_result(Key)
+key: Callable[..., Any] = Key
 """Declare a key in the body of a class: `seconds: float = key(gt=0, doc="Limit [s].")`.
 
 `KeyOwner` derives name, kind and type from the attribute. The name of the key is the name of the
-attribute, without a trailing underscore.
+attribute, without a trailing underscore. The result is typed as Any, so that mypy accepts `x: int = key()`.
 """
 
 

@@ -24,12 +24,17 @@ generator continues after the end of the child, and the value of the `yield` is 
 class GeneratorNode(ControlNode):
     """Base class of control nodes that run one child after the other, in the order of a generator `run`.
 
-    A subclass implements `run` in place of `start` and `step`.
+    A subclass implements `run` in place of `start` and `step`. In a loop, the iteration after an iteration
+    that took only one tick begins in the next tick, so that a loop never blocks a tick. After a longer
+    iteration, the next iteration begins in the same tick.
     """
+
+    symbol = "↻"
 
     def start(self) -> None:
         """Begin a new generator."""
         self._run = self.run()
+        self._has_tick_passed = False
         self._running_child: Child | None = None
 
     def step(self) -> Status:
@@ -46,6 +51,7 @@ class GeneratorNode(ControlNode):
         except StopIteration as end:
             failure = cast("Failure | None", end.value)
             return Status.SUCCESS if failure is None else self.fail(failure)
+        self._has_tick_passed = True
         return Status.RUNNING
 
     def clean_up(self) -> None:
@@ -64,27 +70,6 @@ class GeneratorNode(ControlNode):
             status = yield
         return self.get_failure(child) if status is Status.FAILURE else None
 
-
-class Loop(GeneratorNode):
-    """Base class of loops, which determines when the next iteration begins.
-
-    After an iteration that took only one tick, the next iteration begins in the next tick, so that a loop
-    never blocks a tick. After a longer iteration, the next iteration begins in the same tick.
-    """
-
-    symbol = "↻"
-
-    def start(self) -> None:
-        """Begin the first iteration."""
-        super().start()
-        self._has_tick_passed = False
-
-    def step(self) -> Status:
-        """Continue by one tick."""
-        status = super().step()
-        self._has_tick_passed = True
-        return status
-
     def end_iteration(self) -> NodeRun:
         """End an iteration; wait for the next tick if the iteration took only one tick."""
         if not self._has_tick_passed:
@@ -93,7 +78,7 @@ class Loop(GeneratorNode):
         return None
 
 
-class While(Loop):
+class While(GeneratorNode):
     """Run the body as long as a condition succeeds; the condition runs before every iteration.
 
     The loop succeeds when the condition fails; a failure of the body is passed on.
@@ -161,7 +146,7 @@ class CounterLimits(KeySection):
         return [(name, limit) for name in self.keys if (limit := getattr(self, name)) is not None]
 
 
-class Repeat(Loop):
+class Repeat(GeneratorNode):
     """Run the body until a number of iterations, an expected failure, or the limit of a counter is reached.
 
     Each of these three conditions ends the loop with success. The loop reads the counters before each
@@ -271,7 +256,7 @@ class Repeat(Loop):
         return None if self.until else Counterpart("Repeat", {"num_cycles": "times"})
 
 
-class ForEach(Loop):
+class ForEach(GeneratorNode):
     """Run the body once for every element of a list, in order.
 
     The node reads the list at its start; with an empty list, the node succeeds at once. A failure of the body

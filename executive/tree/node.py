@@ -12,9 +12,8 @@ from typing import ClassVar
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from pydantic import ValidationError
 
-from executive.errors import Fault, InputError
+from executive.errors import Fault
 from executive.events import BranchChosen, NodeEnded, NodeStarted
 from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState
@@ -51,7 +50,6 @@ class ControlNode(KeyOwner, TreeNode):
         self.children = [child for key in self.keys for child in self.list_children(key)]
         for child in self.children:
             child.parent = self
-        self._check_constants()
 
     def list_children(self, key_name: str) -> list[Child]:
         """Return the nodes under a key, including those in the sections of the key."""
@@ -232,21 +230,6 @@ class ControlNode(KeyOwner, TreeNode):
         failure = self.failure if status is Status.FAILURE else None
         reason, message, origin = (str(failure), failure.message, failure.path) if failure else ("", "", "")
         self.emit(NodeEnded(self.path, status.value, reason=reason, message=message, origin=origin))
-
-    def _check_constants(self) -> None:
-        """Raise an InputError if a constant has another type than declared, or is out of bounds."""
-        for key in self.keys.values():
-            value = getattr(self, key.attribute)
-            if key.kind is KeyKind.CONSTANT and value != key.default:
-                max_value = len(self.list_children(key.max_key)) if key.max_key else None
-                try:
-                    key.make_validator(max_value).validate_python(value, strict=True)
-                except ValidationError as invalid:
-                    # For a union of types, pydantic reports several errors. An exceeded bound, for instance
-                    # `greater_than`, explains more than a wrong type.
-                    error = min(invalid.errors(), key=lambda error: "than" not in error["type"])
-                    message = f"{self.keyword}.{key.name} cannot be {value!r}: {error['msg']}"
-                    raise InputError(f"{self.path}: {message}") from None
 
 
 def _find_nodes(value: object) -> list[Child]:

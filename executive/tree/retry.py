@@ -11,7 +11,7 @@ from executive.tree.failure import format_reasons
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, find_fixed_point, join_states
 from executive.tree.inspection import Advice, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeySection, Reasons, key
-from executive.tree.loops import Loop, NodeRun
+from executive.tree.loops import GeneratorNode, NodeRun
 
 _GIVE_UP = "give up: the recovery failed"
 """Choice that a retry reports after a failure of its recovery."""
@@ -37,7 +37,7 @@ class Backoff(KeySection):
             return self.max
 
 
-class Retry(Loop):
+class Retry(GeneratorNode):
     """Run the body again after a failure.
 
     Failures that `on` does not list, and the failure of the last attempt, are passed on. Before every further

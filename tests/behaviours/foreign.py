@@ -169,13 +169,6 @@ class Reserved(Painter):
         super().__init__(name, Colour.RED)
 
 
-class SameName(Double):
-    """Have an argument and a port with the same name."""
-
-    def __init__(self, name: str, number: float) -> None:
-        super().__init__(name)
-
-
 class Secretive(Double):
     """Claim to be a condition in spite of its outputs."""
 
@@ -187,17 +180,6 @@ class Odd(Behaviour):
 
     def update(self) -> Status:
         return None  # type: ignore[return-value]
-
-
-class Draw(Behaviour):
-    """Run for ever; `/drawing` exists meanwhile."""
-
-    def update(self) -> Status:
-        Blackboard.set("/drawing", True)
-        return Status.RUNNING
-
-    def terminate(self, new_status: Status) -> None:
-        Blackboard.unset("/drawing")
 
 
 class Keep(Behaviour):

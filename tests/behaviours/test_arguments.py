@@ -19,8 +19,8 @@ def test_arguments_have_types_defaults_and_descriptions() -> None:
     arguments = list_arguments(Painter)
     assert list(arguments) == ["name", "colour", "then", "stroke"]
     assert (arguments["colour"].type, arguments["colour"].default) == (Colour, ...)
-    assert (arguments["stroke"].type, arguments["stroke"].default) == (float, 0.1)
     assert arguments["colour"].doc == "colour of the paint, which dries"
+    assert (arguments["stroke"].type, arguments["stroke"].default) == (float, 0.1)
     assert {name: argument.type for name, argument in list_arguments(Untyped).items()} == {
         "thing": Any,
         "other": Any,
@@ -36,13 +36,11 @@ def test_arguments_that_a_constructor_passes_on_are_found() -> None:
     ("hint", "expected"),
     [
         (int, int),
-        (Any, Any),
         (Colour, Literal["RED", "BLUE"]),
         (Sequence[Status], list[Statuses]),
         (Mapping[str, int], dict[str, int]),
         (tuple[float, ...], tuple[float, ...]),
         (str | Path, str),
-        (list[Path], None),
         (Callable[[], int], None),
     ],
 )
@@ -53,11 +51,9 @@ def test_a_mission_names_members_and_contains_plain_values(hint: object, expecte
 @pytest.mark.parametrize(
     ("value", "hint", "expected"),
     [
-        (None, Status | None, None),
         ("FAILURE", str | Status, Status.FAILURE),
         (["SUCCESS", "RUNNING"], list[Status], [Status.SUCCESS, Status.RUNNING]),
         (["BLUE", "FAILURE"], tuple[Colour, Status], [Colour.BLUE, Status.FAILURE]),
-        (["BLUE", "RED"], tuple[Colour, ...], [Colour.BLUE, Colour.RED]),
         ({"RED": ["BLUE"]}, Mapping[Colour, Sequence[Colour]], {Colour.RED: [Colour.BLUE]}),
         ([1, 2, 3], tuple[int, int] | list[int], [1, 2, 3]),
         ({"a": 1}, list[int] | dict[str, int], {"a": 1}),

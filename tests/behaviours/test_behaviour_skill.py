@@ -79,7 +79,6 @@ def test_the_arguments_become_params_without_the_name() -> None:
     params = make_behaviour_skill("Primer", foreign.Primer).params
     assert list(params) == ["coats", "colour", "then", "stroke"]
     assert [params[name].is_required for name in params] == [False, True, False, False]
-    assert params["colour"].doc == "colour of the paint, which dries"
     logged = make_behaviour_skill("Logged", foreign.Logged)
     assert (params["stroke"].default, logged.params["last"].default) == (0.1, "SUCCESS")
     assert make_behaviour_skill("Logged", foreign.Logged) is logged
@@ -102,18 +101,6 @@ def test_data_on_the_blackboard_stay_in_their_run() -> None:
     waiting[1].close()  # type: ignore[attr-defined]
     assert run(foreign.Counter, cells[0], most=1).message == "count is 2"
     assert (dict(Blackboard.storage), len(Blackboard.clients)) == before
-
-
-def test_a_nested_blackboard_and_its_activity_stream_end_with_their_block() -> None:
-    outer, inner = (RunBlackboard(FakeCell().cell.clock) for _ in range(2))
-    with outer:
-        Blackboard.set("/outer", 1)
-        with pytest.raises(ZeroDivisionError), inner:
-            assert not Blackboard.exists("/outer")
-            Blackboard.enable_activity_stream()
-            raise ZeroDivisionError
-        assert Blackboard.exists("/outer")
-    assert Blackboard.activity_stream is None
 
 
 def test_ports_become_inputs_and_outputs(fake: FakeCell) -> None:
@@ -139,7 +126,6 @@ def test_ports_become_inputs_and_outputs(fake: FakeCell) -> None:
         (Behaviour, "is abstract: it has no method update, or does not declare its ports"),
         (Inverter, 'needs the argument "child", and no mission can contain a value of its type'),
         (foreign.Reserved, 'has an argument or port with the reserved name "run"'),
-        (foreign.SameName, 'has an argument and a port with the same name "number"'),
         (foreign.Secretive, r"cannot be a skill: Secretive writes \$doubled, and declares is_condition"),
     ],
 )

@@ -7,9 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import foreign
-import jsonschema
 import pytest
-import yaml
 from guide_blocks import blocks
 from py_trees.blackboard import Blackboard
 
@@ -18,7 +16,6 @@ from executive.errors import InputError
 from executive.events import NodeEnded, TimedEvent
 from executive.mission.findings import MissionError
 from executive.mission.load import load_mission
-from executive.mission.schema.file_schemas import make_mission_schema
 from executive.plugins import load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
@@ -28,7 +25,6 @@ from executive.record.resume import resume_run
 from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions
 from executive.testing.run_mission import MissionResult, run_mission
-from executive.tree.node_registry import load_control_nodes
 
 PROJECT = """\
 [project]
@@ -37,7 +33,6 @@ name = "hall"
 Quiet = "foreign:Quiet"
 Double = "foreign:Double"
 Tally = "foreign:Counter"
-Draw = "foreign:Draw"
 """
 
 Write = Callable[[str], Path]
@@ -132,7 +127,6 @@ def test_ports_are_connected_to_variables(write: Write) -> None:
     [
         ("  - Double\n", "4:5", "unwritten"),
         ("  - Double: {number: many}\n", "4:22", "wrong-type"),
-        ("  - Double: {number: 3, doubled: 4}\n", "4:34", "wrong-type"),
         ("  - MoveToScan\n  - Detect\n  - Double: {number: $detections}\n", "6:22", "port-type"),
         ("  - parallel: {do: [{Double: {number: 1}}, {Double: {number: 2}}]}\n", "4:45", "shared-variable"),
     ],
@@ -142,12 +136,6 @@ def test_ports_are_checked(tree: str, place: str, code: str, write: Write) -> No
         load_mission(write(tree), load_skills())
     found = [(f"{finding.line}:{finding.col}", finding.code) for finding in caught.value.findings]
     assert (place, code) in found, str(caught.value)
-
-
-def test_two_classes_of_one_name_are_refused(write: Write) -> None:
-    (Path.cwd() / "pyproject.toml").write_text(PROJECT.replace("Tally", "SuccessEveryN"))
-    with pytest.raises(MissionError, match=r'4:21: .*there is another skill "SuccessEveryN"; register'):
-        load_mission(write("  - PyTree: {class: py_trees.behaviours:SuccessEveryN, n: 2}\n"), load_skills())
 
 
 class Cut(BaseException):
@@ -198,23 +186,6 @@ def test_a_value_that_json_cannot_restore_prevents_a_resumption(write: Write) ->
     run = record(write("  - PyTree: {class: foreign:Keep}\n  - Wait: {seconds: 1}\n"), Cutter())
     with pytest.raises(InputError, match=r'"/kept" \(Status\)'):
         resume(run)
-
-
-def test_what_a_halted_behaviour_wrote_is_restored(write: Write) -> None:
-    tree = """\
-  - try: {timeout: {seconds: 0.1, do: Draw}}
-    catch: [{on: timeout.timeout, do: succeed}]
-  - Wait: {seconds: 1}
-  - PyTree: {class: py_trees.behaviours:CheckBlackboardVariableExists, variable_name: drawing}
-"""
-    assert resume(record(write(tree), Cutter())).reason == "CheckBlackboardVariableExists.failed"
-
-
-def test_an_editor_accepts_the_mission_and_misses_the_class(write: Write) -> None:
-    schema = make_mission_schema(load_skills(), load_control_nodes())
-    jsonschema.validate(yaml.safe_load(write(FIVE).read_text()), schema)
-    with pytest.raises(jsonschema.ValidationError, match="'class' is a required property"):
-        jsonschema.validate(yaml.safe_load(write("  - PyTree: {n: 3}\n").read_text()), schema)
 
 
 def test_the_behaviour_of_the_guide_is_a_leaf(write: Write) -> None:

@@ -13,7 +13,6 @@ from executive.cell.config import CellConfig
 from executive.cli.cells import find_cell
 from executive.cli.progress import show_progress
 from executive.training.evaluation.metrics import NO_OBJECT, Evaluation
-from executive.training.evaluation.worst_mistakes import WorstMistakes
 from tests.benchmarks.outside_the_envelope import SCENES
 from tests.benchmarks.report import Figures, run_command, write_json
 
@@ -43,7 +42,7 @@ def measure(
             path.write_text(yaml.safe_dump({"scene": name, **scene}), encoding="utf-8")
             settings = ImageSettings(None, images, seed, False, "table", workers, path, THRESHOLD)
             check_detector(detector, settings)
-            evaluation = measure_detector(detector, settings, WorstMistakes(), show_progress)
+            evaluation = measure_detector(detector, settings, [], show_progress)
             rows.append(describe_evaluation(name, evaluation))
             details[name] = {"scene": scene, **rows[-1], **evaluation.to_dict()}
     figures = {

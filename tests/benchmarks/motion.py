@@ -3,7 +3,6 @@
 A pair consists of a motion from a bin to an object and a motion from there into a bin; each pair starts where
 the last one ended. Every method begins a pair in the posture in which the planner's own motion left the arm.
 There are no physics: the positions of the objects are known exactly, and the arm is taken to move as planned.
-With `--execute` the simulated arm makes the planner's motions instead (`motion_scenes.py`).
 
 Two methods follow the path of textbooks: up to the cell's travel height, across, and straight down. One stops
 at every waypoint; the other follows a spline through the waypoints, timed by TOPP-RA. The lower bound ignores
@@ -36,7 +35,7 @@ from executive.motion.joints import JointLimits, JointState, compute_min_time
 from executive.motion.planner import Planner
 from executive.motion.point_to_point import Connector
 from executive.motion.trajectory import Trajectory, compute_peak_fractions
-from tests.benchmarks.motion_scenes import Scene, SceneGenerator, execute_pairs, open_world
+from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world
 from tests.benchmarks.report import Figures, run_command, show_progress
 from tests.motion.joint_states import reach
 
@@ -145,11 +144,9 @@ PEAK_TOLERANCE = 1e-6
 """Rounding error by which a peak may exceed its limit, relative to the limit."""
 
 
-def measure(cell: CellConfig, seed: int = 0, pairs: int = 200, execute: bool = False) -> Figures:
+def measure(cell: CellConfig, seed: int = 0, pairs: int = 200) -> Figures:
     """Measure the motions of the arm of CELL from bin to object to bin, and other ways to move."""
     figures: Figures = {"cell": cell.cell, "pairs": pairs, "seed": seed}
-    if execute:
-        return {**figures, **execute_pairs(cell, pairs, seed)}
     rows: dict[str, list[PairMotion]] = defaultdict(list)
     problems = []
     height = compute_travel_height(cell)

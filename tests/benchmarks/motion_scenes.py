@@ -1,35 +1,31 @@
-"""Random scenes of the benchmark of motion, and the motions of the planner as the simulated arm makes them.
+"""Random scenes of the benchmark of motion.
 
 A scene has objects on the table, one to pick, and a slot in a bin.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
 from executive.cell.arm import Goal, Task
-from executive.cell.clock import STEP, StepClock
 from executive.cell.config import CellConfig
 from executive.cell.layout import build_bin
 from executive.cell.objects import Load, ObjectClass, Obstacle
-from executive.cells.sim.arm import SimArm
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import build_simulated_class, load_mesh
 from executive.cells.sim.spawn import spawn_objects
 from executive.cells.sim.suction import compute_breakaway_force, measure_contact
-from executive.cells.sim.tool import TOUCH_DISTANCE, SuctionTool
-from executive.cells.sim.world import World, name_load
-from executive.errors import Blocked, InputError, Unreachable
-from executive.geometry import Pose, make_tool_down_pose
+from executive.cells.sim.tool import TOUCH_DISTANCE
+from executive.cells.sim.world import World
+from executive.errors import InputError, Unreachable
+from executive.geometry import make_tool_down_pose
 from executive.manipulation.tool_goals import make_object_goal, make_slot_goal
 from executive.motion.arms import build_planner
 from executive.motion.planner import Planner
-from tests.benchmarks.report import Figures, show_progress
 
 MAX_TRIES = 50
 """Maximum number of scenes drawn to find one whose object can be held and reached."""
@@ -175,146 +171,3 @@ class SceneGenerator:
         if force < tool.min_force:
             raise Unreachable(f"no seal holds the {self._world.labels[body]} at its middle")
         return surface, force
-
-
-MAX_MEASURED_DISTANCE = 0.03
-"""Largest distance that is measured [m]."""
-CLEARANCE_PERIOD_STEPS = 4
-"""Control steps between two measurements of the distances."""
-SETTLE_STEPS = 24
-"""Steps in which a seal forms, as in the skill that grasps."""
-
-
-def execute_pairs(cell: CellConfig, pairs: int, seed: int) -> Figures:
-    """Execute random pairs in the simulated world and return their figures; a released object is removed."""
-    with open_world(cell) as (world, planner):
-        execution = _Execution(cell, world, planner)
-        scenes = SceneGenerator(cell, planner, world, seed)
-        for _ in show_progress(range(pairs), "executed"):
-            execution.execute_pair(scenes.draw())
-    distance, nearest = execution.clearance
-    return {
-        "executed_pairs": len(execution.steps_per_pair),
-        "executed_time_s": float(np.mean(execution.steps_per_pair or [math.nan])) * STEP,
-        "margin_mm": 1e3 * cell.motion.margin,
-        "clearance_mm": 1e3 * distance,
-        "nearest": nearest,
-        "slip_mm": 1e3 * execution.slip,
-        "missed": execution.missed_count,
-        "problems": execution.problems,
-    }
-
-
-class _Execution:
-    """An arm and its tool in a simulated world, and the figures so far.
-
-    Two things that were nearer than the margin when a motion began (two objects side by side, one of them
-    now in the tool, or the load and the table) do not count in that motion.
-
-    Attributes:
-        clearance: Smallest distance of the arm and its load in all measurements [m], and the two things.
-        slip: Largest motion of a held object in the tool [m].
-        missed_count: Number of objects that the tool did not hold.
-        steps_per_pair: Number of control steps of each pair.
-        problems: Motions without a plan, collisions and dropped objects.
-    """
-
-    def __init__(self, cell: CellConfig, world: World, planner: Planner) -> None:
-        clock = StepClock(lambda: world.step_count * STEP)
-        self._world = world
-        self._tool = SuctionTool(world, cell.tool)
-        self._arm = SimArm(world, planner, cell, clock, lambda: self._tool.held_body)
-        self._margin = cell.motion.margin
-        self.clearance = (math.inf, "nothing")
-        self.slip = 0.0
-        self.missed_count = 0
-        self.steps_per_pair: list[int] = []
-        self.problems: list[str] = []
-
-    def execute_pair(self, scene: Scene) -> None:
-        """Fetch one more object and carry it into a bin."""
-        try:
-            self._fetch_and_carry(scene)
-        except (Blocked, Unreachable) as error:
-            self.problems.append(f"not planned: {error}")
-        self._tool.open()
-
-    def _fetch_and_carry(self, scene: Scene) -> None:
-        tool = self._tool
-        fetching = self._move(scene.approach, scene.fetch_task, scene, lambda: tool.touching)
-        tool.close()
-        for _ in range(SETTLE_STEPS):
-            self._step()
-        if not tool.holding:
-            self.missed_count += 1
-            # The arm leaves the table, because the next scene may have an object where the tool is now.
-            self._move(scene.drop, scene.fetch_task, scene, lambda: False)
-            return
-        task = scene.make_carry_task(tool.holding_force)
-        carrying = self._move(scene.drop, task, scene, lambda: not tool.holding)
-        if tool.holding:
-            self.steps_per_pair.append(fetching + carrying)
-        else:
-            self.problems.append("an object was dropped")
-
-    def _move(self, goal: Goal, task: Task, scene: Scene, until: Callable[[], bool]) -> int:
-        """Make a motion, braking as soon as `until` holds, and return the number of its steps.
-
-        Raises:
-            Unreachable, Blocked: There is no motion.
-            Fault: The arm left its path.
-        """
-        arm = self._arm
-        motion = arm.plan(goal, task).result()
-        grasp = self._locate_in_tool()
-        steps = 0
-        is_braking = False
-        ignored = {pair for distance, pair in self._measure_distances(scene.body) if distance < self._margin}
-        arm.start(motion)
-        while not arm.at_rest:
-            if not is_braking and until():
-                arm.stop()
-                is_braking = True
-            self._step()
-            steps += 1
-            if steps % CLEARANCE_PERIOD_STEPS == 0:
-                distances = self._measure_distances(scene.body)
-                self.clearance = min(self.clearance, *(one for one in distances if one[1] not in ignored))
-                now = self._locate_in_tool()
-                if grasp is not None and now is not None:
-                    self.slip = max(self.slip, float(np.linalg.norm(now.position - grasp.position)))
-        if arm.collision is not None:
-            self.problems.append(f"contact: {arm.collision}")
-        return steps
-
-    def _measure_distances(self, target_body: int) -> Iterator[tuple[float, str]]:
-        """Yield the distance [m] and the names of two near things; contact with the target is allowed."""
-        world = self._world
-        near = world.client.getClosestPoints
-        held = self._tool.held_body
-        load = "" if held is None else name_load(world.labels[held])
-        for body in (world.table, *world.bin_bodies.values(), *world.labels):
-            if body in (held, target_body):
-                continue
-            for point in near(world.arm, body, MAX_MEASURED_DISTANCE):
-                if point[3] >= world.robot.first_collision_link:
-                    yield point[8], f"{world.name_link(point[3])} - {world.name_body(body)}"
-            for point in near(held, body, MAX_MEASURED_DISTANCE) if load else ():
-                yield point[8], f"{load} - {world.name_body(body)}"
-        for one, other in world.robot.self_collision_pairs:
-            for point in near(world.arm, world.arm, MAX_MEASURED_DISTANCE, linkIndexA=one, linkIndexB=other):
-                yield point[8], f"{world.name_link(one)} - {world.name_link(other)}"
-        for point in near(held, world.arm, MAX_MEASURED_DISTANCE) if load else ():
-            if world.robot.first_collision_link <= point[4] < world.robot.wrist_link:
-                yield point[8], f"{load} - {world.name_link(point[4])}"
-
-    def _locate_in_tool(self) -> Pose | None:
-        """Return the pose of the held object in the tool's frame, or None."""
-        held = self._tool.held_body
-        world = self._world
-        return None if held is None else world.get_tool_pose().inverse() @ world.get_object_pose(held)
-
-    def _step(self) -> None:
-        self._arm.advance()
-        self._world.step()
-        self._tool.advance()

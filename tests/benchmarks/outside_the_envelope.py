@@ -1,4 +1,7 @@
-"""Runs in scenes outside of what the cell files declare: wrong bins, and wrong bins without a report."""
+"""Runs in scenes outside of what the cell files declare: wrong bins, and wrong bins without a report.
+
+In the runs of the group `misnaming server`, the second of two detectors calls every duck a cube.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,20 @@ import re
 import statistics
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from functools import cache
+from dataclasses import asdict, dataclass, replace
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from executive.cell.config import CellConfig
+from executive.cell.detection import Answer
+from executive.cell.frame import Frame
 from executive.cells.sim.scene_file import load_scene
 from executive.mission.load import load_mission
+from executive.perception.detectors.requests import ChangedRequest, ClosableDetector
+from executive.perception.envelope import build_rated_detectors
 from executive.plugins import load_skills
 from executive.processes import WorkerPool
 from tests.benchmarks.ground_truth import FAULT, HUNG, WALL_TIME_LIMIT, AuditedRun, run_audited
@@ -27,6 +35,8 @@ MISSIONS = (OVERHEAD, "sort_wrist")
 """The missions of the campaign."""
 DECLARED = "declared"
 """Group of the runs without a scene, with which the others are compared."""
+MISNAMING = "misnaming server"
+"""Group of the runs with a detector that calls ducks cubes."""
 SEEDS_PER_CASE = 20
 """Distance between the first seeds of two cases, and the largest number of runs of a case."""
 
@@ -57,7 +67,33 @@ def list_cases() -> list[Case]:
         for group, scenes in SCENES[key].items():
             for name, scene in scenes.items():
                 cases.append(Case(group, name, mission, scene, len(cases)))
-    return cases
+    return [*cases, Case(MISNAMING, "ducks are cubes", "two_detectors", {}, len(cases))]
+
+
+@dataclass(frozen=True)
+class MisnamingDetector:
+    """Answers as another detector, but calls ducks cubes; implements `Detector`."""
+
+    other: ClosableDetector
+
+    def request(self, frame: Frame, view: str) -> ChangedRequest:
+        """Ask the other detector about `frame`."""
+        return ChangedRequest(self.other.request(frame, view), _call_ducks_cubes)
+
+    def close(self) -> None:
+        """Close the other detector."""
+        self.other.close()
+
+
+def _call_ducks_cubes(answer: Answer) -> Answer:
+    found = (replace(one, label="cube") if one.label == "duck" else one for one in answer.confident)
+    return replace(answer, confident=tuple(found))
+
+
+def build_with_misnaming(*arguments: Any, **options: Any) -> dict[str, ClosableDetector]:
+    """Return the detectors of a cell file; the one called `second` misnames ducks."""
+    built = build_rated_detectors(*arguments, **options)
+    return {**built, "second": MisnamingDetector(built["second"])}
 
 
 @dataclass(frozen=True)
@@ -96,10 +132,11 @@ def measure(
             if case.group == DECLARED or re.search(only, f"{case.mission}: {case.group}: {case.name}"):
                 scene = write_scene(case, Path(folder))
                 first = first_seed + SEEDS_PER_CASE * case.number
+                detectors = build_with_misnaming if case.group == MISNAMING else build_rated_detectors
+                run = partial(run_audited, detectors=detectors, wall_time_limit=wall_time_limit)
                 count = declared_runs if case.group == DECLARED else runs_per_scene
                 for seed in range(first, first + min(count, SEEDS_PER_CASE)):
-                    arguments = (case.mission, seed, runs_folder, scene)
-                    jobs.append((case, pool.submit(run_audited, *arguments, wall_time_limit=wall_time_limit)))
+                    jobs.append((case, pool.submit(run, case.mission, seed, runs_folder, scene)))
         for case, job in show_progress(jobs, "outside the envelope"):
             done.append(Done(case, job.result()))
     figures = {"runs": len(done), "first_seed": first_seed, **summarize(done)}
@@ -129,14 +166,14 @@ def _load_cell_of(mission: str) -> CellConfig:
 def summarize(done: Sequence[Done]) -> Figures:
     """Return a row per group and in total, the objects in wrong bins, and the problems."""
     declared = [one for one in done if one.case.group == DECLARED]
-    outside = [one for one in done if one.case.group != DECLARED]
+    outside = [one for one in done if one.case.group not in (DECLARED, MISNAMING)]
     usual_times = {
         mission: _median([one.time_per_object for one in declared if one.run.mission == mission])
         for mission in MISSIONS
     }
     groups = {
         group: [one for one in done if one.case.group == group]
-        for group in (DECLARED, *SCENES["both_missions"])
+        for group in (DECLARED, *SCENES["both_missions"], MISNAMING)
     }
     groups["total outside"] = outside
     broken = [
@@ -159,7 +196,7 @@ def _make_row(group: str, done: Sequence[Done], usual_times: Mapping[str, float 
     ratios = [
         one.time_per_object / usual_time
         for one in done
-        if one.time_per_object is not None and (usual_time := usual_times[one.run.mission])
+        if one.time_per_object is not None and (usual_time := usual_times.get(one.run.mission))
     ]
     statuses = ("SUCCESS", "INCOMPLETE", "FAILURE", FAULT, HUNG)
     return {

@@ -58,11 +58,11 @@ def test_train_shows_batches_and_a_line_per_epoch(monkeypatch: pytest.MonkeyPatc
     for name, value in {"FORCE_COLOR": "1", "NO_COLOR": "1", "TERM": "xterm"}.items():
         monkeypatch.setenv(name, value)
 
-    def train(dataset, out, settings, progress, batches):
-        for done in range(1, 2 * settings.epochs + 1):
-            batches(done, 2 * settings.epochs)
+    def train(dataset, out, *, epochs, report_epoch, report_batch, **settings):
+        for done in range(1, 2 * epochs + 1):
+            report_batch(done, 2 * epochs)
             if done % 2 == 0:
-                progress(done // 2, {"loss": 0.51234})
+                report_epoch(done // 2, {"loss": 0.51234})
 
     monkeypatch.setattr("executive.training.train.train", train)
     monkeypatch.setattr("executive.training.train.load_dataset", lambda _folder: {})

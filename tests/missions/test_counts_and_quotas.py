@@ -50,18 +50,3 @@ def test_the_first_kit_is_complete_before_the_second_begins() -> None:
     assert counts["red_bin"] == {"cube": 1, "sphere": 1, "duck": 1}
     assert counts["blue_bin"] == {"cube": 1, "sphere": 1}
     assert (result.status, result.items["skipped"], result.agrees) == ("SUCCESS", 1, True)
-
-
-def test_a_loop_over_wanted_classes_does_not_limit_the_count_to_them(tmp_path: Path) -> None:
-    path = tmp_path / "count_any.yaml"
-    path.write_text(
-        "mission: count_any\n"
-        "cell: cells/overhead.yaml\n"
-        "library: library/sorting.yaml\n"
-        "routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}\n"
-        "tree:\n"
-        "  - [{use: find}, {use: carry}]\n"
-        "  - for_each: {each: wanted, in: classes, do: {HasCounted: {at_least: 1}}}\n",
-        encoding="utf-8",
-    )
-    assert run_with(path, "cube").status == "SUCCESS"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-import yaml
 
 from executive.cell.config import CellConfig
 from executive.cells.fake.cell import FakeCell
@@ -30,20 +29,6 @@ def test_it_has_the_name_of_its_file_and_says_what_it_stands_for(path: Path, con
     assert config.cell == path.stem
     assert config.description
     assert path.read_text().startswith("# ")
-
-
-def test_three_keys_make_a_hosted_model_of_a_server_of_ones_own() -> None:
-    hosted, own = (load_cell(CELLS[0].with_name(f"{name}.yaml")) for name in ("hosted", "roboflow"))
-    written = yaml.safe_load(CELLS[0].with_name("hosted.yaml").read_text())
-    assert {name: list(keys) for name, keys in written["detectors"].items()} == {
-        "server": ["url", "model_id", "class_map"]
-    }
-    changed = {"url": "https://serverless.roboflow.com"}
-    assert hosted.detectors["server"].options == {**own.detectors["server"].options, **changed}
-    assert list(hosted.detectors) == ["server", "embedded"]
-    assert (
-        hosted.detectors["embedded"] == load_cell(CELLS[0].with_name("overhead.yaml")).detectors["embedded"]
-    )
 
 
 def test_its_kind_finds_nothing_wrong_with_it(path: Path, config: CellConfig) -> None:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import pytest
-
 from executive.cells.fake.cell import FakeCell
 from executive.events import ItemChanged
 from executive.testing.faults import during, object_moved
-from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_mission import MissionResult, run_mission
 
 VERIFY = "*for_each*/LookAt"
@@ -36,13 +33,3 @@ def test_an_object_that_is_put_back_on_the_table_is_sorted_again_under_its_name(
     assert "gone" in result.list_failure_reasons(VERIFY)
     assert list_states(result, "cube-1") == ["seen", "held", "placed", "dropped", "seen", "held", "placed"]
     assert (result.items["placed"], result.items["seen"]) == (1, 1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("seed", "number_of_cube"), [(0, 1), (3, 2), (4, 3)])
-def test_so_it_does_in_simulation(seed: int, number_of_cube: int) -> None:
-    fault = during(VERIFY, object_moved(FROM_RED_BIN_TO_TABLE, number_of_cube), activations=1)
-    result = run_mission("sort_and_verify", make_oracle_kind(), seed=seed, faults=[fault])
-    assert (result.status, result.agrees) == ("SUCCESS", True)
-    assert "gone" in result.list_failure_reasons(VERIFY)
-    assert result.items["placed"] == result.items["seen"]

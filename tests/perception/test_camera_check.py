@@ -72,7 +72,7 @@ def test_a_camera_in_its_place_is_believed_to_be_there(light: float) -> None:
     frame = draw(DECLARED, light=light)
     offset = estimate_offset(frame, BINS)
     assert offset is not None
-    assert offset.outline_distance < MAX_OUTLINE_DISTANCE / 3 and offset.support > 0.8
+    assert offset.outline_distance < MAX_OUTLINE_DISTANCE / 3
     assert describe_displacement(frame, BINS) == ""
 
 
@@ -90,14 +90,13 @@ def test_a_shift_and_a_rotation_are_measured(shift, turn_deg) -> None:
     assert offset.rotation_deg == pytest.approx(np.linalg.norm(turn_deg), abs=1.0)
     if turn_deg == (0, 0, 0):
         assert offset.shift == pytest.approx(shift, abs=0.015)
-        assert np.all(np.abs(offset.shift - shift) < 3 * offset.shift_std + 0.001)
 
 
 def test_the_words_say_where_the_bins_are_and_how_the_camera_has_moved() -> None:
     words = describe_displacement(draw(move((0.0, -0.03, 0.0))), BINS)
     assert re.search(
-        r"camera top .* outlines of red, blue, yellow appear 12 pixels \((29|30|31) mm\) away.* had moved by "
-        r"\(\S+, -[23]\d, \S+\) mm \(standard deviation \d+ mm\) and turned by 0\.\d degrees; limit 5 mm",
+        r"camera top .* outlines of red, blue, yellow appear (29|30|31) mm away.* had moved by "
+        r"\(\S+, -[23]\d, \S+\) mm and turned by 0\.\d degrees; limit 5 mm",
         words,
     )
 

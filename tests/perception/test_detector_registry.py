@@ -12,7 +12,6 @@ from executive.errors import InputError
 from executive.perception.detectors import detector_registry
 from executive.perception.detectors.detector_registry import (
     build_detectors,
-    find_detectable_labels,
     find_detector_errors,
 )
 
@@ -62,19 +61,6 @@ def test_a_kind_that_is_not_installed_is_found_before_and_at_the_start(tmp_path)
     assert list(find_detector_errors(configs, tmp_path)) == [(("detectors", "second", "kind"), sentence)]
     with pytest.raises(InputError, match='"yolo", which is not installed'):
         build(second=configs["second"])
-
-
-def test_a_wrong_option_is_found_at_its_key(tmp_path):
-    configs = {"mine": DetectorConfig(kind="rfdetr", model_path="m.onnx", labels=["cube"])}
-    assert [keys for keys, _ in find_detector_errors(configs, tmp_path)] == [
-        ("detectors", "mine", "model_path")
-    ]
-
-
-def test_the_labels_of_a_kind_that_does_not_say_them_are_not_known(tmp_path, oracle_installed):
-    configs = {kind: DetectorConfig(kind=kind) for kind in ("embedded", "oracle", "yolo")}
-    known = find_detectable_labels(configs, tmp_path)
-    assert known == {"embedded": ("cube", "sphere", "duck"), "oracle": None, "yolo": None}
 
 
 def test_detectors_are_built_once_in_the_order_of_the_file(oracle_installed, tmp_path):

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from executive.cell.detection import Detection
-from executive.errors import InputError
 from executive.perception.detectors.views import (
     list_regions,
     merge_detections,
@@ -27,8 +26,6 @@ def found(box, confidence=0.9, part=(0, 0, 256, 256), label="cube"):
 def test_the_table_view_is_the_square_of_the_cell_file_and_a_smaller_frame_is_one_tile():
     assert list_regions("table", TABLE, SIZE) == [TABLE]
     assert list_regions("full", TABLE, (200, 150)) == [(0, 0, 200, 150)]
-    with pytest.raises(InputError, match='no view "ceiling"; the views are table and full'):
-        list_regions("ceiling", TABLE, SIZE)
 
 
 def test_a_detection_keeps_the_confidence_of_its_second_class_and_gets_the_name_of_the_cell():

@@ -115,12 +115,6 @@ def test_what_should_be_in_the_tool_and_is_not_was_dropped(fake: FakeCell, held:
     assert (fake.ledger.find_held_item(), known.state, known.attempts) == (None, "lost", 1)
 
 
-@pytest.mark.parametrize("seconds", [0.0, 0.1, 2.5])
-def test_waiting_takes_its_time_on_the_runs_clock_and_moves_nothing(fake: FakeCell, seconds: float) -> None:
-    assert run_skill(Wait(seconds=seconds), fake).status == "SUCCESS"
-    assert (fake.cell.clock.now, fake.arm.commands) == (pytest.approx(seconds, abs=1 / 240), [])
-
-
-def test_waiting_can_be_halted(fake: FakeCell) -> None:
-    assert run_skill(Wait(seconds=60.0), fake, halt_at=24).status == "HALTED"
-    assert fake.cell.clock.now == pytest.approx(0.1)
+def test_waiting_takes_its_time_on_the_runs_clock_and_moves_nothing(fake: FakeCell) -> None:
+    assert run_skill(Wait(seconds=2.5), fake).status == "SUCCESS"
+    assert (fake.cell.clock.now, fake.arm.commands) == (pytest.approx(2.5, abs=1 / 240), [])

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
-
 import numpy as np
 import pytest
 
 from executive.errors import InputError
-from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.evaluation.metrics import Distribution, Evaluation
 from executive.training.train import (
-    Settings,
     choose_learning_rate,
     load_dataset,
     read_epochs,
@@ -24,7 +20,7 @@ def test_a_training_that_cannot_start_is_refused(tmp_path):
     with pytest.raises(InputError, match="split train contains no labelled images"):
         load_dataset(tmp_path)
     with pytest.raises(InputError, match=r"no model .*old\.pth to start from"):
-        train({}, tmp_path / "out", Settings(tmp_path / "old.pth"))
+        train({}, tmp_path / "out", start_model=tmp_path / "old.pth")
 
 
 def test_a_training_goes_on_in_smaller_steps_if_the_start_model_has_the_same_labels(tmp_path):
@@ -35,18 +31,6 @@ def test_a_training_goes_on_in_smaller_steps_if_the_start_model_has_the_same_lab
     assert choose_learning_rate(start, ["nut", "bolt"]) == 3e-4
     (tmp_path / "embedded.labels.txt").write_text("bolt\n")
     assert choose_learning_rate(tmp_path / "embedded.onnx", ["bolt"]) == 1e-4
-
-
-@pytest.mark.skipif(importlib.util.find_spec("torch") is not None, reason="the extra is installed")
-def test_training_without_the_extra_says_how_to_install_it(tmp_path):
-    for split in ("train", "valid"):
-        save_image(build_image_path(tmp_path, "coco", split, "a.jpg"), np.zeros((64, 64, 3), np.uint8))
-    boxes = ((10.0, 10.0, 30.0, 30.0),)
-    entries = [DatasetEntry(split, "a.jpg", (64, 64), ("cube",), boxes) for split in ("train", "valid")]
-    write_annotations(tmp_path, "coco", entries, ["cube"])
-    with pytest.raises(InputError, match=r"needs the package.*uv sync --extra train"):
-        train(load_dataset(tmp_path), tmp_path / "out", Settings())
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_model_restored_from_its_export_gives_the_same_answers(tmp_path):

@@ -99,7 +99,3 @@ def test_what_is_no_list_is_a_fault(make: Any, scope: Blackboard, value: Any, ki
     scope.update({"todo": value})
     with pytest.raises(Fault, match=f"todo holds a {kind}, not a list"):
         make("todo").tick_once()
-
-
-def test_details_say_what_the_mission_says(make: Any) -> None:
-    assert (make("todo").detail, make(["cube", 2]).detail) == ("$it in $todo", "$it in [cube, 2]")

@@ -63,14 +63,6 @@ def test_only_the_first_check_and_a_changed_check_are_events(
     ]  # fmt: skip
 
 
-def test_a_fault_of_a_condition_is_reported(leaf: Any, site: Any, events: Any) -> None:
-    node = make_guard(site, sequence(site("guard/holds"), [leaf("C", "S", "!")]), leaf("B", "R R"))
-    node.tick_once()
-    with pytest.raises(RuntimeError):
-        node.tick_once()
-    assert events[-1] == NodeStarted("guard/holds")
-
-
 def test_a_guard_in_a_guard_keeps_its_events_to_itself(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
     inner = Guard(site("in"), holds=sequence(site("in/holds"), [leaf("C")]), do=leaf("B", "R R R S"))
     ticks(make_guard(site, sequence(site("guard/holds"), [leaf("D")]), inner))

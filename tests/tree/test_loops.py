@@ -11,7 +11,7 @@ import pytest
 from build_nodes import make_backoff, parallel, repeat, retry, while_loop
 from py_trees.common import Status
 
-from executive.errors import Fault, InputError
+from executive.errors import Fault
 from executive.events import BranchChosen, NodeEnded
 from executive.tree.keys import Child, key
 from executive.tree.loops import GeneratorNode, NodeRun
@@ -50,13 +50,6 @@ def test_details_say_what_the_mission_says(leaf: Any, site: Any) -> None:
     assert repeat(site(), leaf("A"), until=[("A", "lost"), ("B", "x")]).detail == "until A.lost, B.x"
     assert repeat(site(), leaf("A"), times=3).detail == "3 times"
     assert repeat(site(), leaf("A"), 3, [("A", "lost")]).detail == "3 times or until A.lost"
-
-
-def test_a_number_of_rounds_that_makes_no_sense_is_refused(leaf: Any, site: Any) -> None:
-    with pytest.raises(InputError, match=r"tree/x: repeat\.times cannot be -1: .* or equal to 0"):
-        repeat(site("tree/x"), leaf("A"), times=-1)
-    with pytest.raises(InputError, match=r"tree/x: retry\.attempts cannot be 0: .* or equal to 1"):
-        retry(site("tree/x"), leaf("A"), 0)
 
 
 @pytest.mark.parametrize(
@@ -178,11 +171,6 @@ def test_a_reason_and_a_number_of_iterations_end_the_loop_as_before(
     assert choices(events) == ["done"]
 
 
-def test_details_name_the_limits(leaf: Any, counting_site: NodeContext) -> None:
-    node = repeat(counting_site, leaf("A"), until=[("A", "lost")], placed=4, elapsed=1.5)
-    assert node.detail == "until A.lost, placed: 4, elapsed: 1.5"
-
-
 def test_all_that_cannot_be_halted_are_named(leaf: Any, site: Any, log: Any) -> None:
     children = [leaf("A", "R R"), leaf("B", "R S"), leaf("C", "R R"), leaf("D", "R R")]
     for child in (children[0], children[2]):
@@ -194,18 +182,3 @@ def test_all_that_cannot_be_halted_are_named(leaf: Any, site: Any, log: Any) -> 
     assert (str(caught.value), caught.value.node) == ("A: cannot stop; C: cannot stop", "here")
     assert log[4:] == ["A halted", "C halted", "D halted"]
     assert all(child.status is not Status.RUNNING for child in children)
-
-
-@pytest.mark.parametrize("wait_for", [0, 3])
-def test_it_cannot_wait_for_more_than_there_are(wait_for: int, leaf: Any, site: Any) -> None:
-    bound = {0: "greater than or equal to 1", 3: "less than or equal to 2"}[wait_for]
-    with pytest.raises(InputError, match=rf"tree/x: parallel.wait_for cannot be {wait_for}: .* {bound}"):
-        parallel(site("tree/x"), [leaf("A"), leaf("B")], wait_for)
-
-
-def test_details_of_a_parallel_say_what_the_mission_says(leaf: Any, site: Any) -> None:
-    def detail(*args: Any, **more: Any) -> str:
-        return parallel(site(), [leaf("A"), leaf("B"), leaf("C")], *args, **more).detail
-
-    assert detail() == detail(3) == "wait for all"
-    assert (detail(2), detail(1, halt=True)) == ("wait for 2 of 3", "wait for 1 of 3, halt")

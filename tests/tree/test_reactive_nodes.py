@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
 from build_nodes import sequence
 
 from executive.events import BranchChosen, NodeStarted
-from executive.mission.load import load_mission
-from executive.plugins import load_skills
 from executive.tree.sequences import Fallback, Sequence
 
 
@@ -58,29 +55,3 @@ def test_a_fallback_reports_its_choice_only_when_the_choice_changes(
 ) -> None:
     ticks(reactive(Fallback, site, [leaf("A", "lost"), leaf("B", "R R R S")]))
     assert [event.choice for event in events if isinstance(event, BranchChosen)] == ["choice 2 of 2"]
-
-
-MISSION = """
-mission: fresh_approach
-cell: cells/overhead.yaml
-library: library/sorting.yaml
-routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
-tree:
-  - {use: look}
-  - SelectTarget
-  - NODE
-  - [Grasp, Transit, Release]
-"""
-
-
-@pytest.mark.parametrize(
-    "node",
-    [
-        "sequence: {memory: false, do: [{fallback: [IsFresh, [{use: look}, SelectTarget]]}, Approach]}",
-        "fallback: {memory: false, do: [[IsFresh, Approach], [{use: look}, SelectTarget, Approach]]}",
-    ],
-)
-def test_a_child_that_may_decide_at_once_lets_a_later_child_take_time(node: str, tmp_path: Path) -> None:
-    (tmp_path / "m.yaml").write_text(MISSION.replace("NODE", node))
-    warnings = load_mission(tmp_path / "m.yaml", load_skills()).warnings
-    assert [str(warning) for warning in warnings] == []

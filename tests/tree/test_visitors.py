@@ -12,8 +12,6 @@ from py_trees.composites import Selector
 from py_trees.trees import BehaviourTree
 from py_trees.visitors import VisitorBase
 
-from executive.errors import Fault
-
 
 class Notes(VisitorBase):
     """A visitor that notes the names of the nodes, tick by tick."""
@@ -60,10 +58,3 @@ def test_a_tick_that_raises_leaves_the_direct_tick_as_it_was(leaf: Any, site: An
     node.stop(Status.INVALID)
     node.tick_once()
     assert node.status is Status.RUNNING
-
-
-def test_a_child_without_a_status_is_a_fault_under_visitors_too(leaf: Any, site: Any) -> None:
-    broken = leaf("A")
-    broken.update = lambda: None
-    with pytest.raises(Fault, match="A was ticked but has no status"):
-        list(sequence(site(), [broken]).tick())

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from executive.cell.detection import Detection
 from executive.cell.frame import Box
-from executive.errors import InputError
 from executive.geometry import Array
 
 Region = tuple[int, int, int, int]
@@ -40,14 +39,9 @@ def list_regions(view: str, table_view: Region, size: tuple[int, int]) -> list[R
         view: `table` for the region `table_view`; `full` for tiles of this size that cover the image.
         table_view: Square region that shows the workspace.
         size: Width and height of the image [pixel].
-
-    Raises:
-        InputError: The view is unknown.
     """
     if view == "table":
         return [table_view]
-    if view != "full":
-        raise InputError(f'there is no view "{view}"; the views are table and full')
     side = table_view[2] - table_view[0]
     width, height = size
     lefts, tops = _list_tile_starts(width, side), _list_tile_starts(height, side)

@@ -29,7 +29,7 @@ from executive.training.evaluation.error_statistics import (
     match_detections,
 )
 from executive.training.evaluation.metrics import Distribution, Evaluation
-from executive.training.evaluation.worst_mistakes import WorstMistakes
+from executive.training.evaluation.worst_mistakes import Mistake, collect_mistakes
 
 MIN_CONFIDENCE = 0.01
 """Minimum confidence of the detections of a model file; the average precision needs low confidences."""
@@ -48,7 +48,7 @@ WHOLE_IMAGE_CAMERA = CameraConfig(
 
 def evaluate(
     detector: CellDetector, samples: Iterable[LabelledImage], *, threshold: float | None = None,
-    localizer: Localizer | None = None, mistakes: WorstMistakes | None = None, cell: CellConfig | None = None,
+    localizer: Localizer | None = None, mistakes: list[Mistake] | None = None, cell: CellConfig | None = None,
 ) -> Evaluation:  # fmt: skip
     """Return the accuracy of a detector on labelled images; ignored objects do not count.
 
@@ -57,7 +57,7 @@ def evaluate(
         samples: The images.
         threshold: Minimum confidence of a detection; None: the threshold of the detector.
         localizer: Computes positions, which are compared with the true positions; None: no comparison.
-        mistakes: Collects the missed objects and detections with the worst errors; None: no collection.
+        mistakes: The worst mistakes so far, to which those in the images are added; None: no collection.
         cell: Cell whose workspace is measured: brightness, contrast and colours; None: no measurement.
     """
     errors, repeated_errors = ErrorStatistics(localizer), RepeatedErrors(localizer)
@@ -87,7 +87,7 @@ def evaluate(
         if cell is not None and (frame_statistics := compute_frame_statistics(frame, cell)):
             statistics_of_frames.append(frame_statistics)
         if mistakes is not None:
-            mistakes.add(matches, sample)
+            collect_mistakes(mistakes, matches, sample)
     map50, map50_95 = average_precision.compute()
     metrics_by_class = {label: errors.compute_metrics([label]) for label in errors.labels}
     return Evaluation(

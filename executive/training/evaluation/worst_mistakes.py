@@ -69,25 +69,13 @@ class Mistake:
     detections: tuple[Detection, ...]
 
 
-class WorstMistakes:
-    """Worst mistakes in all images.
-
-    Args:
-        max_count: Maximum number of mistakes.
-
-    Attributes:
-        mistakes: Mistakes from the most to the least severe.
-    """
-
-    def __init__(self, max_count: int = 24) -> None:
-        self._max_count = max_count
-        self.mistakes: list[Mistake] = []
-
-    def add(self, matches: Sequence[BoxMatch], sample: LabelledImage) -> None:
-        """Add the mistakes in one image, and remove the least severe mistakes beyond the maximum number."""
-        self.mistakes += find_mistakes(matches, sample)
-        self.mistakes.sort(key=lambda mistake: -mistake.severity)
-        del self.mistakes[self._max_count :]
+def collect_mistakes(
+    mistakes: list[Mistake], matches: Sequence[BoxMatch], sample: LabelledImage, max_count: int = 24
+) -> None:
+    """Add the mistakes in one image to `mistakes`, and keep the most severe `max_count`, sorted."""
+    mistakes += find_mistakes(matches, sample)
+    mistakes.sort(key=lambda mistake: -mistake.severity)
+    del mistakes[max_count:]
 
 
 def find_mistakes(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterator[Mistake]:

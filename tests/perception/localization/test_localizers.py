@@ -61,15 +61,6 @@ def test_plane_puts_everything_on_the_table():
     assert np.linalg.norm(found[:2] - raised[:2]) > 0.008
 
 
-def test_noise_and_pixels_without_depth_move_it_by_millimetres():
-    random = np.random.default_rng(3)
-    centre = np.array([0.5, 0.1, 0.08])
-    detection, frame = show_cube(centre)
-    frame.depth[:] += random.normal(0, 0.005, frame.depth.shape)
-    frame.depth[random.random(frame.depth.shape) < 0.5] = np.nan
-    assert DEPTH.locate(detection, frame) == pytest.approx(centre, abs=0.005)
-
-
 def test_a_ray_is_cast_from_the_lens_through_the_middle_of_the_box():
     centre = np.array([0.6, 0.2, 0.05 + SIDE / 2])
 

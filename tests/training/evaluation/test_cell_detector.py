@@ -9,9 +9,8 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.cell.detection import Answer, Detection
 from executive.errors import Unavailable
-from executive.perception.detectors.views import list_regions
 from executive.training.evaluation import evaluate
-from executive.training.evaluation.evaluate import WHOLE_IMAGE_CAMERA, CellDetector
+from executive.training.evaluation.evaluate import CellDetector
 
 CONFIGS = {"eye": DetectorConfig(kind="embedded", threshold=0.6)}
 FOUND = tuple(Detection(label, 0.9, (1.0, 2.0, 3.0, 4.0)) for label in ("cube", "boat"))
@@ -83,17 +82,3 @@ def test_an_unavailable_detector_says_why_and_one_that_never_answers_is_given_up
         with pytest.raises(Unavailable, match=text):
             detector.detect(sample.to_frame(1))
     assert eye.stamps == pytest.approx([0.0, time], abs=0.01)
-
-
-def test_frames_of_a_camera_are_searched_as_in_a_run_and_other_images_as_a_whole(build, sample):
-    camera = WHOLE_IMAGE_CAMERA.model_copy(update={"table_view": (0, 0, 256, 256)})
-    detector, eye = build(camera=camera, view="table")
-    detector.detect(sample.to_frame(1))
-    assert (eye.camera, eye.views) == (camera, ["table"])
-    detector, eye = build()
-    answer, _ = detector.detect(sample.to_frame(1))
-    assert (answer, eye.views) == (ANSWER, ["full"])
-    for size in ((300, 100), (64, 900)):
-        assert list_regions("full", eye.camera.table_view, size) == [(0, 0, *size)]
-    detector.close()
-    assert eye.closed
