@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import codecs
 import math
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Annotated, Any, TypeVar
@@ -46,6 +47,8 @@ MAX_CLASS_FILE_SIZE = 100_000
 MAX_LABEL_FILE_SIZE = 10_000_000
 """Maximum size of a YOLO label file, or of a text file with the paths of images [byte]."""
 ContentT = TypeVar("ContentT")
+MAX_OBJECT_COUNT = 1_000
+"""Maximum number of labelled objects in an image; RF-DETR detects at most 300 (its number of queries)."""
 MAX_COCO_FILE_SIZE = 500_000_000
 """Maximum size of a COCO file [byte]; the largest annotation file of COCO 2017 has 470 MB."""
 MAX_NORMALIZED = 2.0
@@ -54,10 +57,26 @@ MAX_PIXELS = 1_000_000
 """Maximum width, height and absolute coordinate in a COCO file [pixel]; JPEG images have up to 65,535."""
 MIN_BOX_SIZE = 1.0
 """Minimum width and height of the box of an object [pixel]."""
-MAX_OUTSIDE_DISTANCE = 0.02
-"""Distance from the image, as a fraction of its width or height, from which a box is outside; tools round."""
-MAX_OUTSIDE_FRACTION = 0.25
-"""Maximum fraction of boxes that end outside of their images; more, and the numbers mean something else."""
+MAX_COPY_DISTANCE = 1.0
+"""Maximum difference between the coordinates of two boxes of the same object [pixel]."""
+CORNER_FRACTIONS = (0.9, 0.1)
+"""Minimum fractions of the boxes of a COCO file with corners: boxes that fit as two corners, and boxes that
+end outside of their images if they are read as corner and size."""
+MIN_SHIFTED_FRACTION = 0.05
+"""Minimum fraction of boxes that end outside of their images if corner and centre were confused."""
+COCO_FORM = "left, top, width and height"
+"""Meaning of the numbers of a box in a COCO file."""
+YOLO_FORM = "centre x, centre y, width and height"
+"""Meaning of the numbers of a box in a YOLO file."""
+MAX_CORNER_FRACTION = 0.02
+"""Maximum coordinate, as a fraction of the image, of boxes in 0..1 that are read as pixels."""
+MAX_BOX_WORDS = 6
+"""Maximum number of words of a YOLO box: class, centre, size, and perhaps confidence."""
+KEYPOINT_FRACTIONS = (0.9, 0.75)
+"""Minimum fraction of labels whose box contains all points, and maximum fraction that fits polygons, if the
+labels may be boxes with keypoints."""
+MAX_FRACTION = 1.02
+"""Maximum coordinate in an image, as a fraction of its width or height; annotation tools round."""
 OUTSIDE, SMALL = "boxes outside of the image dropped", "boxes smaller than a pixel dropped"
 """Descriptions of dropped boxes in the summary of a dataset."""
 
@@ -103,11 +122,14 @@ class _CocoFile(BaseModel):
 
 
 class YoloFile(BaseModel, extra="allow"):
-    """A YOLO class file: class names by number, and shape of the keypoints; further keys name the splits."""
+    """A YOLO class file: class names by number, and shape of the keypoints; further keys name the splits.
+
+    The shape of the keypoints is (0, 0) for boxes and polygons, and None if the file does not state it.
+    """
 
     names: dict[int, str] | list[str]
     path: str = ""
-    kpt_shape: tuple[int, int] = (0, 0)
+    kpt_shape: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -187,14 +209,18 @@ class LabelledDataset:
         self._property_folder = folder if path == folder else path.parent
         self.classes = self._read_coco() if is_coco else self._read_yolo()
         boxes = np.concatenate(self._relative_boxes)
-        ends_outside = (np.abs(boxes - 0.5) > 0.5 + MAX_OUTSIDE_DISTANCE).any(axis=1)
-        if len(boxes) and ends_outside.mean() > MAX_OUTSIDE_FRACTION:
-            form = "left, top, width and height" if is_coco else "centre x, centre y, width and height"
-            problem = f"{ends_outside.sum()} of {len(boxes)} boxes end outside of their images"
-            raise InputError(f"{self._source.file}: {problem}; write {form} of boxes in these images")
+        form = COCO_FORM if is_coco else YOLO_FORM
+        if wrong_form := _find_wrong_form(boxes, YOLO_FORM if is_coco else COCO_FORM):
+            problem = f"many boxes end outside of their images, and seem to be {wrong_form}"
+            raise InputError(f"{self._source.file}: {problem}; write {form}")
         object_count = self.object_counts.total()
         if self.notes[OUTSIDE] + self.notes[SMALL] > object_count:
-            raise InputError(f"{self.summary}; export images and boxes together, with boxes in pixels (COCO)")
+            remedy = "delete the boxes without an area, or draw them around the objects"
+            if is_coco and np.abs(boxes).max() <= MAX_CORNER_FRACTION:
+                remedy = "all boxes are in the upper left corner; write the boxes in pixels"
+            elif self.notes[OUTSIDE] > self.notes[SMALL]:
+                remedy = "the boxes may belong to other or larger images; export images and boxes together"
+            raise InputError(f"{self.summary}; {remedy}")
         if not object_count:
             raise InputError(f"{self.summary}; an evaluation or a training needs objects")
 
@@ -289,7 +315,11 @@ class LabelledDataset:
             self.notes["images without a label file"] += file is None
             text = read_text(file, MAX_LABEL_FILE_SIZE) if file else ""
             labels_of_images[path] = file, [words for line in text.splitlines() if (words := line.split())]
-        pose_word_count = 5 + math.prod(content.kpt_shape)
+        all_rows = [words for _, rows in labels_of_images.values() for words in rows]
+        if content.kpt_shape is None and _may_have_keypoints(all_rows):
+            remedy = "state kpt_shape in data.yaml: [number of keypoints, 2 or 3], or [0, 0] for polygons"
+            raise InputError(f"{self._source.file}: the labels may be boxes with keypoints; {remedy}")
+        pose_word_count = 5 + math.prod(content.kpt_shape or (0, 0))
         for path, (file, rows) in labels_of_images.items():
             lines = [" ".join(words[:5] if len(words) == pose_word_count else words) for words in rows]
             try:
@@ -317,6 +347,8 @@ class LabelledDataset:
         root = self._source.root
         if not os.path.isfile(path) or has_outside_link(root, str(path.relative_to(root))):
             raise InputError(f"{path} is not a file in {root}, or is a link to another folder")
+        if len(labels) > MAX_OBJECT_COUNT:
+            raise InputError(f"{path} has more than {MAX_OBJECT_COUNT} objects; divide the image")
         size, _ = read_image_header(path)
         stated_size = stated_size[0] or size[0], stated_size[1] or size[1]
         if size != stated_size == size[::-1]:
@@ -326,15 +358,63 @@ class LabelledDataset:
         relative = corners / (stated_size * 2)
         self._relative_boxes.append(relative)
         boxes = np.clip(relative, 0, 1) * (size * 2)
+        is_near = np.abs(boxes[:, None] - boxes).max(axis=2, initial=0) < MAX_COPY_DISTANCE
+        is_copy = np.tril(is_near & np.equal.outer(labels, labels), -1).any(axis=1)
         is_small = ((relative[:, 2:] - relative[:, :2]) * size < MIN_BOX_SIZE).any(axis=1)
         is_outside = (boxes[:, 2:] - boxes[:, :2] < MIN_BOX_SIZE).any(axis=1)
-        reasons = np.select([is_small, is_outside], [SMALL, OUTSIDE], "")
+        reasons = np.select([is_small, is_outside, is_copy], [SMALL, OUTSIDE, "duplicates dropped"], "")
         self.notes.update(reasons[reasons != ""].tolist())
         kept = np.flatnonzero(reasons == "").tolist()
         self.annotations[path] = ImageAnnotation(
             tuple(labels[index] for index in kept), tuple(map(tuple, boxes[kept].tolist())),
             (size[0] / stated_size[0], size[1] / stated_size[1]) if is_resized else (1.0, 1.0),
         )  # fmt: skip
+
+
+def _may_have_keypoints(rows: Iterable[list[str]]) -> bool:
+    """Return True if the words of YOLO labels may be boxes with keypoints, and not polygons.
+
+    A box contains its keypoints. The first two points of a polygon are nearer to each other than the first
+    and the farthest point; centre and size of a box are not.
+    """
+    numbers_of_labels = [words[1:] for words in rows if len(words) > MAX_BOX_WORDS]
+    if len(set(map(len, numbers_of_labels))) != 1:
+        return False
+    try:
+        numbers = np.array(numbers_of_labels, float)
+    except ValueError:
+        return False  # The parser of the labels names the word that is no number.
+    centres = numbers[:, None, :2]
+    sizes = numbers[:, None, 2:4]
+    keypoints = numbers[:, 4:]
+    if keypoints.shape[1] % 3 == 0 and np.isin(keypoints[:, 2::3], (0, 1, 2)).all():
+        return True  # The third number of a keypoint is its visibility.
+    if keypoints.shape[1] % 2:
+        return False
+    points = keypoints.reshape(len(keypoints), -1, 2)
+    offsets = np.where(points.any(axis=2, keepdims=True), points - centres, 0)  # (0, 0): no keypoint
+    is_inside = (np.abs(offsets) <= sizes / 2 + MAX_FRACTION - 1).all(axis=(1, 2))
+    max_distances = np.linalg.norm(offsets, axis=2).max(axis=1)
+    is_polygon = np.linalg.norm(sizes - centres, axis=2)[:, 0] <= max_distances
+    return bool(is_inside.mean() >= KEYPOINT_FRACTIONS[0] and is_polygon.mean() < KEYPOINT_FRACTIONS[1])
+
+
+def _find_wrong_form(relative: Array, other_form: str) -> str:
+    """Return what the numbers of boxes seem to be: left, top, right and bottom, or `other_form`, or "".
+
+    `relative` contains the corners `(N, 4)`, as fractions of their images, if the numbers are read as usual.
+    """
+    if not len(relative):
+        return ""
+    first, second = relative[:, :2], relative[:, 2:] - relative[:, :2]
+    fits = ((first <= second) & (second <= MAX_FRACTION)).all(axis=1)
+    ends_outside = (np.abs(relative - 0.5) > MAX_FRACTION - 0.5).any(axis=1)
+    if ([fits.mean(), ends_outside.mean()] >= np.array(CORNER_FRACTIONS)).all():
+        return "left, top, right and bottom"
+    shift = np.tile(second, 2) / 2
+    shifted = relative - shift if other_form == YOLO_FORM else relative + shift
+    fits_other_form = (np.abs(shifted - 0.5) <= MAX_FRACTION - 0.5).all()
+    return other_form if fits_other_form and ends_outside.mean() >= MIN_SHIFTED_FRACTION else ""
 
 
 def read_image_properties(file: Path) -> dict[str, Any]:
@@ -430,7 +510,9 @@ def read_text(file: Path, max_size: int) -> str:
     if file.stat().st_size > max_size:
         raise InputError(f"{file} has more than {max_size / 1e6:g} MB, the maximum for this kind of file")
     try:
-        return file.read_text(encoding="utf-8-sig")
+        content = file.read_bytes()
+        is_utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        return content.decode("utf-16" if is_utf16 else "utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{file} cannot be read: {error}") from error
 

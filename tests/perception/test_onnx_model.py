@@ -99,9 +99,11 @@ REFUSED = [
       for shape in ((4, 3, 8, 8), (1, 8, 8, 3), (1, 1, 3, 8, 8))),
     (make_images(1, 3, 8, 8, kind="uint8"), make_outputs(), "it has image tensor.uint8"),
     (make_images(1, 3, "height", "width"), make_outputs(), "variable size; export it with fixed sizes"),
+    ({**make_images(1, 3, 8, 8), "size": ("int64", (1, 2))}, make_outputs(), "it has .* size tensor"),
     (make_images(1, 3, 8, 8), {"output0": np.zeros((1, 84, 9), "float32")}, "it has .* output0"),
     (make_images(1, 3, 8, 8), make_outputs((1, 5, 5), (1, 5), kind="int64"), "it has .* labels tensor.int64"),
     (make_images(1, 3, 8, 8), make_outputs(logits=(1, 5, 4)), "has 3 classes, but there are 2 labels"),
+    (make_images(1, 3, 8, 8), make_outputs((1, 0, 4), (1, 0, 3)), r"dets \(1, 0, 4\)"),
     (make_images(1, 3, 8, 8), make_outputs((1, 6, 4)), r"dets \(1, 6, 4\) and labels \(1, 5, 3\)"),
     (make_images(1, 3, 8, 8), make_outputs(value=np.nan), "NaN"),
 ]  # fmt: skip
@@ -113,9 +115,13 @@ def test_a_model_of_another_kind_is_refused_in_a_sentence(tmp_path, inputs, arra
         OnnxModel(write(tmp_path, inputs, arrays), ("cube", "duck")).detect(IMAGE, 0.25)
 
 
-def test_a_file_that_is_no_model_is_refused_with_a_remedy(tmp_path):
-    (tmp_path / "model.onnx").touch()
-    with pytest.raises(InputError, match=r"model.onnx is not a model .*again"):
+@pytest.mark.parametrize(
+    ("content", "remedy"),
+    [(b"version https://git-lfs", "git lfs pull"), (b"\n<!DOCTYPE html>", "itself"), (b"", "again")],
+)
+def test_a_file_that_is_no_model_is_refused_with_a_remedy(tmp_path, content, remedy):
+    (tmp_path / "model.onnx").write_bytes(content)
+    with pytest.raises(InputError, match=f"model.onnx is not a model .*{remedy}"):
         OnnxModel(tmp_path / "model.onnx", ("cube",))
 
 

@@ -85,18 +85,13 @@ def add(*boxes: Any, **keys: Any) -> Change:
     )
 
 
-def add_once(box: Any) -> Change:
-    """Return a change that adds a box to the first image."""
-    return lambda content: content["annotations"].append({"image_id": 0, "category_id": 1, "bbox": box})
-
-
-def change_boxes(function: Callable[..., Any]) -> Change:
-    """Return a change that replaces each box by a function of box and image size."""
+def change_boxes(function: Callable[..., Any], is_added: bool = False) -> Change:
+    """Return a change that replaces each box, or adds a box to it, as a function of box and image size."""
 
     def change(content: dict[str, Any]) -> None:
         size = [content["images"][0][key] for key in ("width", "height")]
-        for entry in content["annotations"]:
-            entry["bbox"] = function(*entry["bbox"], *size)
+        changed = [{**entry, "bbox": function(*entry["bbox"], *size)} for entry in content["annotations"]]
+        content["annotations"] = changed + (content["annotations"] if is_added else [])
 
     return change
 
@@ -117,16 +112,22 @@ def add_parent(content: dict[str, Any]) -> None:
 COCO: dict[str, dict[str, Any]] = {
     "roboflow": {},
     "cvat with subset": {"file": "annotations/instances_default.json", "folder": "images/default"},
-    "coco 2017": {"file": "annotations/instances_val2017.json", "folder": "val2017"},
+    "cvat with test": {"file": "annotations/instances_Test.json", "folder": "images/Test"},
+    "coco 2017": {"file": "annotations/instances_val2017.json", "folder": "val2017", "encoding": "utf-16"},
     "label studio": {"file": "result.json", "folder": "images", "name": "images\\{}"},
+    "flat": {"file": "_annotations.coco.json", "folder": ""},
     "backslash on disk": {"name": "cam\\{}", "stored_name": "cam\\{}"},
+    "windows path": {"name": "C:\\data\\test\\{}"},
+    "path of another computer": {"name": "/home/joe/data/test/{}", "encoding": "utf-8-sig"},
     "upper case": {"suffixes": (".JPG", ".TIFF", ".Png"), "mode": "RGB"},
+    "mixed": {"suffixes": (".webp", ".tif", ".png"), "mode": "RGBA"},
     "turned by 90": {"turn": 6, "suffixes": (".jpg", ".png", ".webp")},
     "stretched": {"factors": (1.0, 1.25)},
     "without size": {"change": update("images", {"width": 0, "height": None})},
     "case": {"change": update("categories", {"name": "Cube"}, {"name": "DUCK"}, {"name": "sphere "})},
     "crowds": {"change": add([0, 0, 30, 30], iscrowd=1)},
-    "outside": {"change": add_once([5000, 5, 20, 20])},
+    "outside": {"change": add([5000, 5, 20, 20], [5, -90, 20, 20])},
+    "twice, rounded": {"change": change_boxes(lambda *box: [round(x) for x in box[:4]], is_added=True)},
     "parent category": {"change": add_parent},
 }
 """Options of `write_coco` for datasets that are read like the clean one."""
@@ -139,24 +140,32 @@ YOLO: dict[str, dict[str, Any]] = {
     "flat": {"folder": "", "labels": ""},
     "darknet": {"folder": "obj_Train_data", "labels": "obj_Train_data", "file": "obj.names"},
     "pose [3, 3]": {"line": POSE, "data": {"kpt_shape": [3, 3]}},
+    "pose [2, 2]": {"line": "{n} {x} {y} {w} {h} {l} {t} {x} {y}", "data": {"kpt_shape": [2, 2]}},
     "polygons": {"line": "{n} {l} {y} {x} {t} {r} {y} {r} {b} {x} {b}"},
     "oriented boxes": {"line": "{n} {l} {y} {x} {t} {r} {y} {x} {b}"},
+    "boxes and polygons": {"line": "{n} {x} {y} {w} {h}\n{n} {l} {t} {r} {y} {l} {b}"},
+    "confidences": {"line": "{n}.0 {x} {y} {w} {h} 0.9"},
     "byte order marks": {"encoding": "utf-8-sig", "data": {"val": "val.txt"}, "suffixes": (".WEBP", ".Png")},
     "numbered names": {"data": {"names": dict(enumerate(CLASSES)), "val": "images/val"}},
+    "outside": {"line": "{n} {x} {y} {w} {h}\n0 1.4 0.5 0.1 0.1"},
 }
 """Options of `write_yolo` for datasets that are read like the clean one."""
 REFUSED: dict[str, tuple[Callable[..., None], dict[str, Any]]] = {
-    "write left, top, width": (
+    "seem to be left, top, right": (
         write_coco, {"change": change_boxes(lambda x, y, w, h, *_: [x, y, x + w, y + h])}),
-    "with boxes in pixels": (
+    "write the boxes in pixels": (
         write_coco, {"change": change_boxes(lambda x, y, w, h, W, H: [x / W, y / H, w / W, h / H])}),
-    "boxes end outside": (write_coco, {"change": add([-9, 0, 5, 5], [0, -9, 5, 5], [-9, -9, 5, 5])}),
-    "write centre x": (write_yolo, {"line": "{n} {r} {b} {w} {h}"}),
+    "export images and boxes": (write_coco, {"change": add([-9, 0, 5, 5], [0, -9, 5, 5], [-9, -9, 5, 5])}),
+    "seem to be centre x": (
+        write_coco, {"change": change_boxes(lambda x, y, w, h, *_: [x + w / 2, y + h / 2, w, h])}),
+    "seem to be left, top, width": (write_yolo, {"line": "{n} {l} {t} {w} {h}"}),
     "is a class of detector eye": (write_coco, {"change": update("categories", {"name": "bolt"})}),
     "was turned": (write_coco, {"turn": 6, "change": update("images", {"width": 120, "height": 160})}),
     "objects: none": (write_coco, {"change": lambda content: content["annotations"].clear()}),
     "is not a file": (write_coco, {"name": "b{}"}),
     "must be normalized": (write_yolo, {"line": "{n} {p[0]} {p[1]} 30 40"}),
+    "state kpt_shape": (write_yolo, {"line": POSE}),
+    "with keypoints": (write_yolo, {"line": "{n} {x} {y} {w} {h} {l} {t} {x} {y}"}),
     "label is invalid": (write_yolo, {"line": "{n} {x} {y} {w}"}),
     "unknown class": (write_yolo, {"line": "7 {x} {y} {w} {h}"}),
 }  # fmt: skip

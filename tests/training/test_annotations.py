@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from tests.training.dataset_variants import (
     REFUSED,
     VARIANTS,
     Change,
-    add_once,
+    add,
     write_coco,
     write_yolo,
 )  # fmt: skip
@@ -85,8 +86,15 @@ def test_a_training_sees_the_pixels_and_boxes_of_an_evaluation(tmp_path, samples
 
 def test_the_summary_states_objects_and_dropped_boxes(tmp_path, samples):
     write_coco(tmp_path, samples, change=COCO["outside"]["change"])
-    counts = "2 images; objects: cube 1, duck 2, sphere 1; 1 boxes outside of the image dropped"
+    counts = "2 images; objects: cube 1, duck 2, sphere 1; 4 boxes outside of the image dropped"
     assert LabelledDataset(tmp_path).summary == f"{tmp_path}, split test: {counts}"
+
+
+def test_a_lost_label_file_is_counted_and_an_upper_case_one_is_read(tmp_path, samples):
+    write_yolo(tmp_path, samples)
+    (tmp_path / "labels/val/a0.txt").rename(tmp_path / "labels/val/a0.TXT")
+    (tmp_path / "labels/val/a1.txt").unlink()
+    assert "cube 1, duck 1; 1 images without a label file" in LabelledDataset(tmp_path).summary
 
 
 @pytest.mark.parametrize("split", ["test", "valid"])
@@ -98,7 +106,7 @@ def test_a_missing_split_is_not_replaced_by_other_images(tmp_path, samples, spli
 
 
 def test_boxes_are_clipped_and_ignored_boxes_are_resized_with_the_image(tmp_path, samples):
-    write_coco(tmp_path, samples, factors=(2, 1), change=add_once([140, 100, 40, 40]))
+    write_coco(tmp_path, samples, factors=(2, 1), change=add([140, 100, 40, 40]))
     (tmp_path / "test/ignored.json").write_text(json.dumps({"a0.png": [[10, 10, 20, 20]]}))
     image = next(iter(LabelledDataset(tmp_path)))
     assert image.boxes[-1] == pytest.approx((280, 100, 320, 120))
@@ -125,9 +133,14 @@ NAME, BOX = ("images", 0, "file_name"), ("annotations", 0, "bbox")
         (set_value("images", value=[{}]), "images[0].id: Field required"),
         (set_value("annotations", 0, "image_id", value=9), "annotations[0].image_id: no id 9; ids: 0"),
         (set_value(*BOX, value=[1, 2, 3, float("nan")]), "bbox[3]: Input should be a finite number"),
+        (set_value("images", 0, "width", value=10**400), "images[0].width: Input should be less than"),
+        (set_value(*BOX, value=[1, 2, -3, 4]), "bbox[2]: Input should be greater than or equal to 0"),
+        (set_value("images", 1, "id", value=0), "have the same id"),
         (set_value(*NAME, value="./a1.png"), "two images have the same file_name"),
+        (add(*[[1, 2, 30, 40]] * 1000), "has more than 1000 objects; divide the image"),
         (set_value(*NAME, value="../../b.jpg"), 'images[0].file_name: "../../b.jpg" is not a file in '),
         (set_value(*NAME, value="link.jpg"), "link.jpg is not a file in "),
+        (set_value(*NAME, value="pipe.jpg"), "pipe.jpg is not a file in "),
         (set_value(*NAME, value="text.png"), "text.png cannot be read; write a sound JPEG or PNG file"),
     ],
 )  # fmt: skip
@@ -136,6 +149,7 @@ def test_a_damaged_coco_dataset_is_one_error(tmp_path, samples, change, error):
     (tmp_path / "b.jpg").write_bytes(b"image")
     (tmp_path / "data/test/text.png").write_bytes(b"image")
     (tmp_path / "data/test/link.jpg").symlink_to(tmp_path / "b.jpg")
+    os.mkfifo(tmp_path / "data/test/pipe.jpg")
     with pytest.raises(InputError) as raised:
         LabelledDataset(tmp_path / "data")
     assert error in str(raised.value)
@@ -147,6 +161,8 @@ def test_a_damaged_coco_dataset_is_one_error(tmp_path, samples, change, error):
         ("test/_annotations.coco.json", "{", "content: Invalid JSON: EOF"),
         ("test/annotations.json", "{}", "are COCO files of one split"),
         ("labels/val/a0.txt", " " * 10_000_001, "labels/val/a0.txt has more than 10 MB"),
+        ("labels/val/a0.txt", "\udcff", "labels/val/a0.txt cannot be read"),
+        ("labels/val/a0.txt", "0 0.5 0.5 nan 0.4", "labels/val/a0.txt: a label is invalid"),
         ("data.yaml", " " * 100_001, "data.yaml has more than 0.1 MB"),
         ("data.yaml", "names: [duck\n", "data.yaml:2: invalid YAML: "),
     ],
@@ -157,3 +173,10 @@ def test_a_damaged_file_is_one_error(tmp_path, samples, file, content, error):
     with pytest.raises(InputError) as raised:
         LabelledDataset(tmp_path)
     assert error in str(raised.value)
+
+
+@pytest.mark.parametrize("tag", ["!!timestamp foo", "!!python/name:os.system ''", "yes"])
+def test_names_of_classes_are_text_whatever_their_tag(tmp_path, samples, tag):
+    write_yolo(tmp_path, samples)
+    (tmp_path / "data.yaml").write_text(f"names: [{tag}, duck, sphere]\n")
+    assert all(isinstance(label, str) for label in LabelledDataset(tmp_path).object_counts)

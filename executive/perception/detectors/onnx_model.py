@@ -64,8 +64,8 @@ class OnnxModel:
         try:
             self._session = InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
         except Exception as error:
-            problem = f"is not a model that onnxruntime can run: {_shorten(error).rstrip('.')}"
-            raise InputError(f"{path} {problem}; export or download it again") from error
+            problem = "is not a model that onnxruntime can run"
+            raise InputError(f"{path} {problem}: {_explain_load_error(path, error)}") from error
         self.labels = tuple(labels)
         self._check_signature(path)
         (self._input,) = self._session.get_inputs()
@@ -146,6 +146,16 @@ class OnnxModel:
 def _shorten(error: Exception) -> str:
     """Return the message of onnxruntime as one line, without error code, C++ file and C++ function."""
     return " ".join(re.sub(r"^\[\w+\] : \d+ : \w+ : |/\S+:\d+ [^(]*\([^)]*\) ", "", str(error)).split())
+
+
+def _explain_load_error(path: Path, error: Exception) -> str:
+    """Return why a file is no model, and what to do."""
+    content = path.read_bytes() if path.is_file() else b""
+    if content.startswith(b"version https://git-lfs"):
+        return "it is a pointer of Git LFS; fetch the file with `git lfs pull`"
+    if re.match(rb"\s*<(!doctype|html)", content, re.IGNORECASE):
+        return "it is a web page; download the file itself"
+    return f"{_shorten(error).rstrip('.')}; export or download it again"
 
 
 @functools.lru_cache(maxsize=4)

@@ -36,6 +36,8 @@ class StubServer:
         self.finds = finds
         self.faults = faults
         self.looks = 0
+        self.delay = 0.0
+        """Time before every answer to an image [s]."""
         self.asked: list[tuple[str, dict[str, str], bytes]] = []
         """Path, headers and body of every request."""
         self.loaded: set[str] = set()
@@ -90,11 +92,15 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _answer(self, image: np.ndarray) -> None:
         self.stub.looks += 1
+        self.stub.over.wait(self.stub.delay)
         fault = self.stub.faults(self.stub.looks)
         height, width = image.shape[:2]
         found = [dict(prediction) for prediction in self.stub.finds(image)]
         answer = {"inference_id": "1", "time": 0.01, "image": {"width": width, "height": height}}
         if fault == "hang":
+            self.stub.over.wait()
+        elif fault == "stop":
+            threading.Thread(target=self.stub.stop).start()
             self.stub.over.wait()
         elif fault.isdecimal():
             # A server may say anything: this one tells the key that it was given.
@@ -137,15 +143,26 @@ def _all(**values: Any) -> Spoil:
     return lambda found, answer: [{**one, **values} for one in found or [some]]
 
 
+def _other_size(found: list[dict[str, Any]], answer: dict[str, Any]) -> Any:
+    answer["image"] = {"width": 1, "height": 1}
+    return found
+
+
 BODIES = {
     "broken json": '{"predictions": [{"x": 1',
     "html": "<html><body>Please log in to the network.</body></html>",
+    "null": "null",
+    "foo": '{"foo": 1}',
     "deep": "[" * 100_000,
 }
 """Bodies of answers that are none."""
 
 SPOILT: Mapping[str, Spoil] = {
     "nan": _all(x=float("nan")),
+    "huge": _all(width=1e6, height=1e6),
     "endless": lambda found, answer: _all()(found, answer) * 400,
+    "other size": _other_size,
+    "doubtful": _all(confidence=0.2),
+    "strangers": lambda found, answer: [*found, *_all(**{"class": "banana"})(found, answer)],
 }
 """Faults of an answer that can be read."""

@@ -10,6 +10,7 @@ from executive.perception.detectors.roboflow.detector import (
     RoboflowOptions,
     describe_failure,
     describe_invalid_answer,
+    describe_missed_deadline,
     shorten_to_line,
 )
 
@@ -43,18 +44,24 @@ OF_CROP = answer(IN_CROP, image={"width": 30, "height": 20})
         (answer(CUBE, {**CUBE, "x": float("nan")}), r"predictions\[1\].x: input should be a finite number"),
         (answer({**CUBE, "x": "SECRET"}), r"predictions\[0\].x: input should be a valid number$"),
         (answer({**CUBE, "width": 0.0}), r"predictions\[0\].width: input should be greater than 0"),
+        (answer({**CUBE, "height": float("inf")}), r"predictions\[0\].height: input should be a finite"),
         (answer({**CUBE, "confidence": 1.1}), r"predictions\[0\].confidence: .* less than or equal to 1"),
+        (answer({**CUBE, "class": ""}), r"predictions\[0\].class: string should have at least 1"),
         (answer({**CUBE, "x": 4.0, "width": 30.0}), r"box from \(-11, 35\) to \(19, 45\) in an image"),
         (answer({**CUBE, "x": 96.0, "width": 30.0}), r"box from \(81, 35\) to \(111, 45\)"),
+        (answer({**CUBE, "y": 4.0, "height": 26.0}), r"box from \(40, -9\) to \(60, 17\)"),
         (answer({**CUBE, "y": 76.0, "height": 26.0}), r"box from \(40, 63\) to \(60, 89\)"),
         (answer({**CUBE, "x": -5.0, "width": 8.0}), r"box from \(-9, 35\) to \(-1, 45\)"),
         (answer({**CUBE, "width": 0.1, "height": 0.2}), r"predictions\[0\] is a box of 0.1 x 0.2 pixels"),
         (answer(*[CUBE] * 301), "predictions: list should have at most 300 items"),
         (answer(CUBE, image={"width": 1, "height": 1}), "1 x 1 pixels, but the sent image has 100 x 80"),
         # Outputs of workflows
+        ({"image": {"width": None, "height": 80}, "predictions": []}, r"image\.width: input should be"),
         ([NESTED], "60 x 80 pixels, but the sent image has 100 x 80"),
         ([[CUBE], []], "predictions per crop without the place of the crop"),
         ([IN_CROP, CUBE], "predictions per crop without the place of the crop"),
+        (answer(IN_CROP, CUBE, image={"width": 50, "height": 40}), "50 x 40 pixels, but the sent image"),
+        ([answer(CUBE, image={"width": 50, "height": 40})], "50 x 40 pixels, but the sent image"),
         ({"predictions": answer({**CUBE, "x": -30.0})}, r"box from \(-40, 35\) to \(-20, 45\)"),
     ],
 )
@@ -77,6 +84,27 @@ def test_the_output_of_a_workflow_is_read_in_every_form_also_of_crops(output):
     assert read_output(output, (100, 80)) == read_answer(answer(CUBE), (100, 80))
 
 
+@pytest.mark.parametrize(("angle", "x", "y"), [(90, 5, 10), (-30, 11.16, 9.33)])
+def test_an_oriented_box_becomes_the_box_around_it(angle, x, y):
+    (found,) = read_answer(answer({**CUBE, "angle": angle}), (100, 80))
+    assert found.box == pytest.approx((50 - x, 40 - y, 50 + x, 40 + y), abs=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("host", "variable", "exempt", "is_named"),
+    [
+        ("lab", "HTTP_PROXY", "", True), ("lab", "HTTPS_PROXY", "", False),
+        ("127.lan", "HTTP_PROXY", "", True),
+        ("127.0.0.1", "HTTP_PROXY", "", False), ("10.0.0.5", "HTTP_PROXY", "10.0.0.0/8", False),
+    ],
+)  # fmt: skip
+def test_a_message_names_the_proxy_of_a_server(monkeypatch, host, variable, exempt, is_named):
+    monkeypatch.setenv(variable, "http://user:SECRET@proxy:3128")
+    monkeypatch.setenv("NO_PROXY", exempt)
+    message = describe_failure({"failure": "refused"}, RoboflowOptions(url=f"http://{host}:9001"))
+    assert ("through the proxy in HTTP_PROXY" in message, "SECRET" in message) == (is_named, False)
+
+
 HOST = "https://serverless.roboflow.com"
 OPTIONS = RoboflowOptions(url=f"{HOST}/", model_id="shapes/1")
 WORKFLOW = RoboflowOptions(api="workflow", workspace="acme", workflow_id="sorting", workflow_output="boxes")
@@ -92,7 +120,7 @@ def test_somebody_elses_words_become_one_short_line():
     [
         ({"status": 404, "detail": "no such\nmodel"}, OPTIONS,
          "has no model shapes/1 (404: no such model); check model_id and url"),
-        ({"status": 599, "detail": ""}, OPTIONS, "reported an unexpected failure (599); check its log"),
+        ({"status": 599, "detail": ""}, OPTIONS, "reported an unexpected status (599); check its log"),
         ({"status": 400, "detail": ""}, WORKFLOW,
          "rejected the request (400); check workspace and workflow_id and api"),
         ({"failure": "no output", "detail": "top"}, WORKFLOW,
@@ -106,3 +134,15 @@ def test_a_sentence_says_what_where_and_what_to_look_at(failure, options, senten
 def test_an_impossible_answer_is_reported_with_the_advice_to_check():
     assert "sent an invalid answer: no box; is shapes/1 a" in describe_invalid_answer("no box", OPTIONS)
     assert 'no box; is "boxes" the predictions' in describe_invalid_answer("no box", WORKFLOW)
+
+
+@pytest.mark.parametrize(
+    ("repeats", "end"),
+    [
+        ((), "; check its log and the network, or increase deadline"),
+        ((None, 429), ", which received too many requests (429); reduce the request rate"),
+        ((None,), ", which is not reachable; check that the server is running"),
+    ],
+)
+def test_a_passed_deadline_is_reported_with_the_answers_of_the_server(repeats, end):
+    assert describe_missed_deadline(repeats, OPTIONS).startswith(f"no answer within 1.0 s from {HOST}{end}")

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import os
+import select
+import signal
+import socket
+import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +18,7 @@ import pytest
 
 from executive.errors import Fault, Unavailable
 from executive.perception.detectors.roboflow import inference_process as module
-from executive.perception.detectors.roboflow.inference_process import ApiKey, InferenceProcess
+from executive.perception.detectors.roboflow.inference_process import ApiKey, InferenceProcess, NoAnswer
 
 HERE = Path(__file__).parent
 SECRET = "SECRET1234567890"
@@ -55,7 +60,7 @@ def test_without_an_answer_it_gives_up_in_time_and_has_another_process_and_nothi
     (first,) = set(list_children()) - before
     assert os.getsid(int(first)) != os.getsid(0), "Ctrl-C reaches it"
     start_time = time.monotonic()
-    with pytest.raises(TimeoutError):
+    with pytest.raises(NoAnswer):
         helper.request(IMAGE, start_time + 0.2)
     assert 0.2 <= time.monotonic() - start_time < 1.0
 
@@ -64,7 +69,7 @@ def test_without_an_answer_it_gives_up_in_time_and_has_another_process_and_nothi
 
     held = count_resources()
     for _ in range(3):
-        with pytest.raises(TimeoutError):
+        with pytest.raises(NoAnswer):
             ask(helper, 0.005)
     assert count_resources() == held
     assert first not in list_children()
@@ -98,6 +103,18 @@ def test_neither_what_it_prints_nor_an_answer_too_deep_to_read_stops_it(start, c
     assert ask(start("nests"), 5.0) == {"failure": "invalid", "detail": "the answer is nested too deeply"}
 
 
+def test_without_room_for_a_process_it_is_unavailable_until_there_is(start, monkeypatch):
+    def full(*args, **options):
+        raise OSError(11, "Resource temporarily unavailable")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(subprocess, "Popen", full)
+        helper = start("talks")
+        with pytest.raises(Unavailable, match="not running: resource temporarily unavailable"):
+            ask(helper)
+    assert "answer" in ask(helper, 5.0)
+
+
 def test_stopping_it_ends_a_call_under_way(start):
     helper = start("mute")
     helper.wait_until_ready()
@@ -107,3 +124,35 @@ def test_stopping_it_ends_a_call_under_way(start):
         assert str(call.exception(5.0)) == "its helper process was ended by signal 9"
     with pytest.raises(Unavailable, match="not running: the detector is closed"):
         helper.wait_until_ready()
+
+
+@pytest.mark.slow
+def test_it_ends_with_its_parent_though_its_server_hangs():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        url = f"http://127.0.0.1:{server.getsockname()[1]}"
+        parent = subprocess.Popen(
+            [sys.executable, "-c", ORPHANING, url], stdout=subprocess.PIPE, cwd=HERE.parents[2], text=True
+        )
+        with parent.stdout:
+            parent.stdout.readline()
+        (process_id,) = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().split()
+        child = os.pidfd_open(int(process_id))
+        connection, _ = server.accept()
+        with connection:
+            parent.send_signal(signal.SIGKILL)
+            parent.wait()
+            ended = select.select([child], [], [], 10.0)[0]
+            os.close(child)
+    assert ended, "the helper outlives its parent"
+
+
+ORPHANING = """
+import sys, time
+import numpy as np
+from executive.perception.detectors.roboflow.inference_process import ApiKey, InferenceProcess
+
+helper = InferenceProcess({"url": sys.argv[1], "model_id": "a/1", "api": "v1", "confidence": 0.5}, ApiKey())
+print("started", flush=True)
+helper.wait_until_ready()
+helper.request(np.zeros((8, 8, 3), np.uint8), time.monotonic() + 60)
+"""

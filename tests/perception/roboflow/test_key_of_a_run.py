@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 
@@ -30,7 +31,9 @@ def test_the_key_is_in_no_file_and_no_output(tmp_path, monkeypatch):
         "--set",
         "cell.detectors.server.deadline=10",
     ]
-    ended = subprocess.run([*command, *options], cwd=tmp_path, capture_output=True, text=True)
+    ended = subprocess.run(
+        [*command, *options], cwd=tmp_path, env=dict(os.environ), capture_output=True, text=True
+    )
     server.stop()
     result = json.loads(ended.stdout)
     assert (ended.returncode, result["reason"]) == (1, "Detect.unavailable")

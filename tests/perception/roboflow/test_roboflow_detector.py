@@ -65,6 +65,7 @@ def stub():
 @pytest.fixture
 def server(stub):
     stub.faults = lambda look: ""
+    stub.delay = 0.0
     stub.asked.clear()
     return stub
 
@@ -122,13 +123,46 @@ def test_a_box_is_returned_in_the_frames_pixels_and_renamed(make, server, api, v
         assert "confidence=0.25" in path if api == "v0" else json.loads(body)["confidence"] == 0.25
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("api", "requests"), [("v0", 1), ("v1", 2), ("workflow", 1)])
+def test_tiles_and_whole_frames_take_the_stated_requests_within_one_deadline(make, server, api, requests):
+    detector = make(**{**APIS[api], "full": "tiles", "deadline": 5.0})
+    server.loaded.clear()
+    (found,) = search(detector, show_spot(180, 240), "full").confident
+    assert found.box == pytest.approx((180, 240, 210, 260), abs=1.0)
+    # A server that has not loaded the model is asked to load it.
+    assert len(server.asked) == 9 * requests + (api == "v1")
+    server.asked.clear()
+    search(make(**APIS[api]), show_spot(), "full")
+    assert len(server.asked) == requests
+    server.delay, start_time = 1.0, time.monotonic()
+    with pytest.raises(DeadlinePassed, match=r"^no answer within 5\.0 s from"):
+        search(detector, show_spot(), "full")
+    assert 5.0 <= time.monotonic() - start_time < 6.0
+
+
+@pytest.mark.slow
+def test_what_is_below_the_floor_is_left_out_and_a_class_nobody_asked_for_is_not(make, server):
+    server.faults = lambda look: "doubtful"
+    assert search(make(**V1), show_spot()).confident == ()
+    server.faults = lambda look: "strangers"
+    assert "cube" in [found.label for found in search(make(**V1), show_spot()).confident]
+
+
 FAULTS = {
+    "400": "rejected the request",
     "401": r"does not accept the key \(401: key \*\*\* is no good\); set ROBOFLOW_API_KEY to a key",
+    "402": "requires a payment",
+    "403": "does not accept the key",
     "404": "has no (model shapes/1|workflow acme/sorting)",
-    "418": "reported an unexpected failure",
-    "503": "is not ready, or cannot load|no answer within",
+    "413": "rejected the image as too large",
+    "418": "reported an unexpected status",
+    "429": "received too many requests",
+    "500": "had an internal error",
+    "502": "is a gateway without a connection to the server",
+    "503": "is not ready, or cannot load",
     **dict.fromkeys(sorted(BODIES), "sent an (answer that inference-sdk cannot read|invalid answer)"),
-    **dict.fromkeys(sorted(SPOILT), 'invalid answer: .*(shapes/1|"boxes")'),
+    **dict.fromkeys(sorted(set(SPOILT) - {"strangers", "doubtful"}), 'invalid answer: .*(shapes/1|"boxes")'),
 }
 
 
@@ -142,12 +176,19 @@ def test_every_fault_of_the_server_is_unavailable_with_what_to_do(make, server, 
 
 @pytest.mark.slow
 def test_a_server_that_is_gone_and_comes_back(make, server):
-    detector = make(**{**V1, "deadline": 10.0})
+    detector = make(**V1)
     server.stop()
     try:
-        assert_unavailable(detector, f"^{server.url} cannot be reached")
+        assert_unavailable(detector, f"^{server.url} refused the connection")
     finally:
         server.start()
+    server.faults = lambda look: "stop"
+    try:
+        assert_unavailable(detector, "closed the connection|refused the connection")
+    finally:
+        server.over.wait(5)
+        server.start()
+    server.faults = lambda look: ""
     assert len(search(detector, show_spot()).confident) == 1
 
 
@@ -156,6 +197,21 @@ def test_a_server_on_this_computer_is_asked_without_a_proxy(server, monkeypatch)
     monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
     with contextlib.closing(build("direct", url=server.url, **V1)) as detector:
         assert len(search(detector, show_spot()).confident) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"url": "http://nobody.invalid:9001"}, "http://nobody.invalid:9001 has an unknown host name"),
+        ({"url": "https://127.0.0.1:{port}"}, r"https://127.0.0.1:\d+ failed the TLS handshake"),
+        ({"key": "", "api": "v0"}, "requires a key .*; set ROBOFLOW_API_KEY"),
+        ({**APIS["workflow"], "workflow_output": "circles"}, 'has no output "circles" .*picture, boxes'),
+    ],
+)
+def test_an_address_key_or_output_that_does_not_work_is_said(make, server, options, text):
+    options = {**options, **({"url": options["url"].format(port=server.port)} if "url" in options else {})}
+    assert_unavailable(make(deadline=30.0, **options), text)
 
 
 def test_closing_does_not_wait_for_a_server_that_hangs(server):

@@ -3,17 +3,19 @@
 The argument is JSON with the server, the model or workflow, and the minimum confidence. An environment
 variable contains the API key. On the standard input, an image is a line of JSON with width and height,
 followed by the pixels. The standard output contains one JSON message per line: a message when the program is
-ready, and one answer per image. The program exits at the end of its input.
+ready, one for each retry, and one answer per image. The program exits at the end of its input.
 """
 
 from __future__ import annotations
 
 import json
+import logging
 import os
 import queue
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
@@ -48,6 +50,8 @@ def main() -> None:
         write(setup_error=f"{type(error).__name__}: {error}")
         # A normal exit would abort the interpreter, because the reading thread holds the lock of the input.
         os._exit(0)
+    logging.getLogger("backoff").addFilter(partial(_report_retry, write))
+    logging.getLogger("backoff").setLevel(logging.DEBUG)
     write(ready=True)
     while True:
         _process_image(infer, images.get(), write)
@@ -123,6 +127,9 @@ def _process_image(infer: InferenceFunction, image: NDArray[np.uint8], write: Wr
 
 def _describe_error(error: Exception) -> dict[str, Any]:
     """Return the kind of failure and the message of an exception of inference-sdk."""
+    import socket
+    import ssl
+
     import requests
     from inference_sdk.http import errors as sdk_errors
 
@@ -130,15 +137,13 @@ def _describe_error(error: Exception) -> dict[str, Any]:
         return {"failure": "status", "status": error.status_code, "detail": str(error.api_message or "")}
     if isinstance(error, MissingOutput):
         return {"failure": "no output", "detail": str(error)}
-    model_errors = (
-        sdk_errors.InvalidModelIdentifier, sdk_errors.ModelNotInitializedError,
-        sdk_errors.ModelTaskTypeNotSupportedError,
-    )  # fmt: skip
     failures: tuple[tuple[str, tuple[type[BaseException], ...]], ...] = (
         ("no key", (sdk_errors.APIKeyNotProvided,)),
-        ("no model", model_errors),
-        # An error of a certificate is a `ValueError`, too.
-        ("lost", (requests.ConnectionError,)),
+        ("no model", (sdk_errors.InvalidModelIdentifier, sdk_errors.ModelNotInitializedError)),
+        ("no detector", (sdk_errors.ModelTaskTypeNotSupportedError,)),
+        ("refused", (ConnectionRefusedError,)),
+        ("unknown host", (socket.gaierror,)),
+        ("tls", (ssl.SSLError,)),
         ("invalid", (ValueError, LookupError, AttributeError, TypeError, RecursionError)),
         ("lost", (OSError, requests.RequestException, sdk_errors.HTTPClientError)),
     )
@@ -156,6 +161,13 @@ def _iterate_causes(error: BaseException | None) -> Iterator[BaseException]:
         visited_ids.add(id(error))
         yield error
         error = error.__cause__ or error.__context__
+
+
+def _report_retry(write: WriteMessage, record: logging.LogRecord) -> bool:
+    """Write the HTTP status that caused a retry by inference-sdk, None without a connection; log nothing."""
+    cause = record.args[-1] if isinstance(record.args, tuple) else None
+    write(retry_status=getattr(cause, "status_code", None))
+    return False
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ inference-sdk does not validate answers: it returns any JSON, for instance `{"fo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Annotated, Any
 
@@ -48,6 +49,8 @@ class _Prediction(BaseModel):
     height: PositiveFloat
     confidence: Annotated[float, Field(ge=0, le=1)]
     label: str = Field(alias="class", min_length=1)
+    angle: FiniteFloat | None = None
+    """Rotation of the sides of the box, which the block "Bounding Rectangle" of a workflow adds [degree]."""
     parent_origin: _Origin | None = None
     """Origin of a crop in its parent image, which may be a crop itself."""
     root_parent_origin: _Origin | None = None
@@ -130,8 +133,12 @@ def _convert_predictions(predictions: list[_Prediction], size: tuple[int, int]) 
             raise ValueError(f"predictions[{index}] is a box of {box_size}, as if in fractions of the image")
         origin = prediction.origin or _Origin(offset_x=0.0, offset_y=0.0)
         x, y = prediction.x + origin.offset_x, prediction.y + origin.offset_y
-        left, right = x - prediction.width / 2, x + prediction.width / 2
-        top, bottom = y - prediction.height / 2, y + prediction.height / 2
+        angle = math.radians(prediction.angle or 0.0)
+        sine, cosine = abs(math.sin(angle)), abs(math.cos(angle))
+        half_width = (prediction.width * cosine + prediction.height * sine) / 2
+        half_height = (prediction.width * sine + prediction.height * cosine) / 2
+        left, right = x - half_width, x + half_width
+        top, bottom = y - half_height, y + half_height
         if (
             min(left / width, top / height) < -MAX_OVERHANG
             or max(right / width, bottom / height) > 1 + MAX_OVERHANG

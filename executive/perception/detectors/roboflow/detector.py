@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import urlsplit
+from urllib.request import getproxies
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ from executive.perception.detectors.roboflow.inference_process import (
     KEY_VARIABLE,
     ApiKey,
     InferenceProcess,
+    NoAnswer,
 )
 from executive.perception.detectors.views import Region, remove_duplicates, search_regions
 
@@ -44,23 +46,33 @@ MAX_DETAIL_LENGTH = 100
 """Maximum number of characters that are quoted from a message of a server."""
 
 _KEY_ADVICE = f"set {KEY_VARIABLE} to a key that may use it"
-_TEMPLATES: Mapping[Any, tuple[str, str]] = {
+_TEMPLATE_BY_STATUS: Mapping[int, tuple[str, str]] = {
     400: ("rejected the request", "check {options} and api"),
     401: ("does not accept the key", _KEY_ADVICE),
     402: ("requires a payment", f"check the plan of the account to which {KEY_VARIABLE} belongs"),
     403: ("does not accept the key", _KEY_ADVICE),
     404: ("has no {model}", "check {options} and url"),
+    413: ("rejected the image as too large", "give the camera a smaller table_view, or set full: tiles"),
     429: ("received too many requests", "reduce the request rate, or check the plan of the account"),
     500: ("had an internal error", "check its log"),
+    502: ("is a gateway without a connection to the server", "check that the server is running"),
     503: ("is not ready, or cannot load {model}", "check its log and {options}"),
-    "no key": ("requires a key", f"set {KEY_VARIABLE}"),
-    "no model": ("has no {model} that detects objects", "check {options}"),
-    "no output": ('ran {model}, which has no output "{output}"', "check workflow_output"),
-    "lost": ("cannot be reached, or closed the connection", "check url, its log and the network"),
-    "invalid": ("sent an answer that inference-sdk cannot read", "check that url is an inference server"),
 }
-"""Failure and advice by HTTP status, or by `failure` in the messages of the helper process; with placeholders
-for the names of the model, the output and the options."""
+"""Failure and advice by HTTP status, with placeholders for the names of the model and the options."""
+_UNKNOWN_STATUS = ("reported an unexpected status", "check its log")
+_TEMPLATE_BY_KIND: Mapping[str, tuple[str, str]] = {
+    "no key": ("requires a key", f"set {KEY_VARIABLE}"),
+    "no model": ("has no {model}", "check {options}"),
+    "no detector": ("has a {model} that detects no objects", "check {options}"),
+    "no output": ('ran {model}, which has no output "{output}"', "check workflow_output"),
+    "refused": ("refused the connection", "check that the server is running, and check url"),
+    "unknown host": ("has an unknown host name", "check url and the network"),
+    "tls": ("failed the TLS handshake", "check url, the certificate and the clock"),
+    "lost": ("closed the connection", "check its log and the network"),
+    "invalid": ("sent an answer that inference-sdk cannot read", "check that url is an inference server"),
+    "other": ("could not be queried", "check the error of inference-sdk"),
+}
+"""Failure and advice by `failure` in the messages of the helper process."""
 
 
 class RoboflowOptions(DetectorOptions):
@@ -103,9 +115,16 @@ class RoboflowOptions(DetectorOptions):
 
     @property
     def server_origin(self) -> str:
-        """Scheme, host and port of the server's address, for messages."""
+        """Scheme, host and port of the server's address, for messages, with a note if a proxy is used."""
         parts = urlsplit(self.url)
-        return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}"
+        origin = f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}"
+        if self.is_local or not getproxies():
+            return origin
+        # The import takes 0.2 s, and most computers have no proxy.
+        from requests.utils import get_environ_proxies, select_proxy
+
+        note = f", through the proxy in {parts.scheme.upper()}_PROXY or ALL_PROXY (see NO_PROXY),"
+        return f"{origin}{note}" if select_proxy(self.url, get_environ_proxies(self.url)) else origin
 
     @property
     def model_or_workflow(self) -> str:
@@ -120,9 +139,8 @@ class RoboflowOptions(DetectorOptions):
         errors = list(super().find_errors(config))
         for option, message in errors:
             if any(part in option.lower() for part in SECRET_WORDS):
-                message = (
-                    f'"{option}" does not belong in a cell file; set the variable {KEY_VARIABLE} instead'
-                )
+                problem = f'"{option}" does not belong in a cell file, because others can read the file'
+                message = f"{problem}; delete the option and set the environment variable {KEY_VARIABLE}"
             yield option, message
         if errors:
             return
@@ -135,7 +153,7 @@ class RoboflowOptions(DetectorOptions):
 
 def _check_model(options: RoboflowOptions) -> OptionErrors:
     """Yield the first invalid option for requests to a model, with a message."""
-    api, model_id = options.api, options.model_id
+    api, model_id, parts = options.api, options.model_id, options.model_id.split("/")
     if unused_options := [name for name in WORKFLOW_OPTIONS if name in options.model_fields_set]:
         names = ", ".join(unused_options)
         yield unused_options[0], f"api: {api} does not use {names}; write api: workflow, or delete {names}"
@@ -143,6 +161,9 @@ def _check_model(options: RoboflowOptions) -> OptionErrors:
         yield "model_id", f"api: {api} needs model_id: project/version, or a name such as rfdetr-nano"
     elif any(character in model_id for character in FORBIDDEN_CHARACTERS):
         yield "model_id", "model_id must be a name or project/version, without ?, &, #, = or a space"
+    elif api == "v0" and (len(parts) > 2 or not all(parts)):
+        problem = "must be project/version for v0, or a name such as rfdetr-nano"
+        yield "model_id", f'model_id {problem}, not "{model_id}"'
 
 
 def _check_workflow(options: RoboflowOptions) -> OptionErrors:
@@ -162,21 +183,38 @@ def _check_url(url: str) -> OptionErrors:
         is_server_address = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
     except ValueError:
         is_server_address = False
-    if not is_server_address or "@" in parts.netloc or parts.query or parts.fragment:
-        yield "url", f"url must be an address such as {HOSTED_URL}, without a user or a query"
+    if not is_server_address:
+        yield "url", "url must be an address such as http://127.0.0.1:9001 or https://serverless.roboflow.com"
+    elif "@" in parts.netloc or parts.query or parts.fragment:
+        yield "url", f"url must not contain a user, query or fragment; set {KEY_VARIABLE} to the key"
 
 
 def describe_failure(failure: Mapping[str, Any], options: RoboflowOptions) -> str:
     """Return the message about a failure that the helper process reports."""
     detail = shorten_to_line(str(failure.get("detail", "")))
-    cause = failure.get("status", failure.get("failure"))
-    problem, advice = _TEMPLATES.get(cause, ("reported an unexpected failure", "check its log"))
-    if "status" in failure:
-        detail = f"{cause}: {detail}" if detail else str(cause)
-    problem = problem.format(model=options.model_or_workflow, output=options.workflow_output)
-    names = "workspace and workflow_id" if options.api == "workflow" else "model_id"
-    note = f" ({detail})" if detail else ""
-    return f"{options.server_origin} {problem}{note}; {advice.format(options=names)}"
+    status = failure.get("status")
+    if status is None:
+        problem, advice = _fill_in(_TEMPLATE_BY_KIND[failure["failure"]], options)
+    else:
+        problem, advice = _fill_in(_TEMPLATE_BY_STATUS.get(status, _UNKNOWN_STATUS), options)
+        detail = f"{status}: {detail}" if detail else str(status)
+    return f"{options.server_origin} {problem}{f' ({detail})' if detail else ''}; {advice}"
+
+
+def describe_missed_deadline(retry_causes: Sequence[int | None], options: RoboflowOptions) -> str:
+    """Return the message about a missed deadline.
+
+    `retry_causes` are the HTTP statuses that caused retries before the deadline; None for no connection.
+    """
+    message = f"no answer within {options.deadline} s from {options.server_origin}"
+    if not retry_causes:
+        return f"{message}; check its log and the network, or increase deadline"
+    # inference-sdk retries requests; the status that caused the last retry explains the delay.
+    status = retry_causes[-1]
+    if status is None:
+        return f"{message}, which is not reachable; check that the server is running, and check url"
+    problem, advice = _fill_in(_TEMPLATE_BY_STATUS.get(status, _UNKNOWN_STATUS), options)
+    return f"{message}, which {problem} ({status}); {advice}"
 
 
 def describe_invalid_answer(problem: str, options: RoboflowOptions) -> str:
@@ -185,6 +223,14 @@ def describe_invalid_answer(problem: str, options: RoboflowOptions) -> str:
     if options.api == "workflow":
         question = f'is "{options.workflow_output}" the predictions of a model that detects objects?'
     return f"{options.server_origin} sent an invalid answer: {shorten_to_line(problem)}; {question}"
+
+
+def _fill_in(template: tuple[str, str], options: RoboflowOptions) -> tuple[str, str]:
+    """Return failure and advice of a template, with the names of model, workflow and options inserted."""
+    problem, advice = template
+    problem = problem.format(model=options.model_or_workflow, output=options.workflow_output)
+    names = "workspace and workflow_id" if options.api == "workflow" else "model_id"
+    return problem, advice.format(options=names)
 
 
 def shorten_to_line(text: str) -> str:
@@ -258,10 +304,9 @@ class RoboflowDetector(ThreadedDetector):
         """Return the detections of the server in a crop of a frame, with boxes in pixels of the crop."""
         try:
             message = self._process.request(crop, deadline)
-        except TimeoutError:
-            problem = f"no answer within {self._options.deadline} s from {self._options.server_origin}"
-            advice = "check that it is running, its log and the network, or increase deadline"
-            raise DeadlinePassed(f"{problem}; {advice}") from None
+        except NoAnswer as error:
+            text = describe_missed_deadline(error.retry_causes, self._options)
+            raise DeadlinePassed(text) from None
         if "failure" in message:
             raise Unavailable(describe_failure(message, self._options))
         try:

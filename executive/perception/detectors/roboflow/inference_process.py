@@ -10,7 +10,7 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,11 @@ class ApiKey:
         """Environment variables of the process that uses the key."""
         self._key = environment.get(KEY_VARIABLE, "").strip()
 
+    @property
+    def is_set(self) -> bool:
+        """True if the environment contains a key."""
+        return bool(self._key)
+
     def redact(self, text: str) -> str:
         """Return `text`, plain or JSON, without the key."""
         if len(self._key) < MIN_KEY_LENGTH:
@@ -52,7 +57,19 @@ class ApiKey:
         return text.replace(self._key, REDACTED_KEY).replace(json.dumps(self._key)[1:-1], REDACTED_KEY)
 
     def __repr__(self) -> str:
-        return f"ApiKey({REDACTED_KEY if self._key else ''})"
+        return f"ApiKey({REDACTED_KEY if self.is_set else ''})"
+
+
+class NoAnswer(Exception):
+    """The server did not answer before the deadline.
+
+    Attributes:
+        retry_causes: HTTP statuses that caused retries before the deadline; None for no connection.
+    """
+
+    def __init__(self, retry_causes: Sequence[int | None]) -> None:
+        super().__init__()
+        self.retry_causes = tuple(retry_causes)
 
 
 class InferenceProcess:
@@ -106,13 +123,22 @@ class InferenceProcess:
             deadline: Latest time of the answer, on the clock `time.monotonic` [s].
 
         Raises:
-            TimeoutError: There was no answer before the deadline.
+            NoAnswer: There was no answer before the deadline.
             Unavailable: Another process killed the helper process.
             Fault: The process exited.
         """
         height, width = image.shape[:2]
         data = json.dumps({"width": width, "height": height}).encode() + b"\n" + image.tobytes()
-        return self._send_and_receive(data, deadline)
+        retry_causes: list[int | None] = []
+        while True:
+            try:
+                message = self._send_and_receive(data, deadline)
+            except TimeoutError:
+                raise NoAnswer(retry_causes) from None
+            if "retry_status" not in message:
+                return message
+            retry_causes.append(message["retry_status"])
+            data = b""
 
     def stop(self) -> None:
         """Kill the process; a concurrent call of `request` or `wait_until_ready` raises `Unavailable`."""
