@@ -87,8 +87,6 @@ class ItemRecord:
         contradiction_count: Number of images that contradict the class since the last possible move.
         last_contradiction: Last evidence of size, height or weight against the class, as a sentence, or "".
         bin_log_odds: For each bin, log odds that the dropped item lies in the bin.
-        is_untracked: True if the run was interrupted before the journal recorded whether the tool moved the
-            item.
         deferral_count: Number of times that the item was deferred.
         deferral_rank: Rank among the deferred items; 0 if the item is not deferred.
         was_taken_away: True if images showed the place of the item empty, because a person removed it.
@@ -123,7 +121,6 @@ class ItemRecord:
     contradiction_count: int = 0
     last_contradiction: str = ""
     bin_log_odds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
-    is_untracked: bool = False
     deferral_count: int = 0
     deferral_rank: int = 0
     was_taken_away: bool = False

@@ -126,14 +126,3 @@ def test_a_dropped_item_is_placed_once_in_a_bin_of_its_class(
     changes = [event for event in bench.events if isinstance(event, ItemChanged)]
     assert [change.bin for change in changes if change.state == "placed"] == placed
     assert len(bench.ledger.records) == 1, "what lies in a bin is no item"
-
-
-def test_each_object_in_a_forbidden_bin_is_an_item(bench: Bench) -> None:
-    bench.look(("sphere", 0.5, 0.0))
-    bench.ledger.record_grasp("sphere-1")
-    bench.ledger.record_interruption()
-    bench.look(("sphere", 0.2, -0.44), ("sphere", 0.22, -0.39), view="full")
-    bench.ledger.record_bin_contents()
-    reason = "found in red_bin when the run was resumed"
-    assert [row.reason for row in bench.ledger.list_items()] == [reason, reason]
-    assert {state for state, _ in bench.end().values()} == {"rejected"}

@@ -11,7 +11,6 @@ import py_trees
 import pytest
 from click.testing import CliRunner, Result
 from events import at, run_ended
-from executive.record.pictures.drawing_thread import PictureDrawer
 
 from executive.cell.json_values import to_json
 from executive.cells.fake.cell import FakeCell
@@ -169,7 +168,7 @@ class Disk:
 @pytest.fixture
 def run_command(bring_one, tmp_path, monkeypatch, cells):
     """Run the command once, without pictures; the result, and the directory that it left, if any."""
-    monkeypatch.setattr(PictureDrawer, "queue", lambda self, name, scene: True)
+    monkeypatch.setattr(PictureRecorder, "__call__", lambda self, timed: None)
 
     def once() -> tuple[Result, Path | None]:
         before = set(tmp_path.glob("runs/[0-9]*/*"))

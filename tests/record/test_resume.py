@@ -202,35 +202,11 @@ def truncate(path: Path, share: float) -> None:
     (path / "journal.jsonl").write_bytes(content[: int(share * len(content))])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "share"), [("sort_overhead", 0.15), ("sort_overhead", 0.8), ("sort_wrist", 0.6)]
-)
-def test_a_scene_is_observed_if_the_journal_lacks_actions_of_the_tool(
-    missions: Path, tmp_path: Path, name: str, share: float
-) -> None:
-    path = Path(run_of(load(missions, name), tmp_path, frames=True).run)
-    truncate(path, share)
-    watcher = Cutter()
-    result = resumed(path, views=[watcher])
-    assert (result.status, result.items.placed) == ("SUCCESS", 6)
-    assert result.audit.agrees
-    assert decided_again(path).is_equal
-    (note,) = watcher.notes
-    assert re.match(r"the journal ends \d+ control steps before the log of the world", note)
-
-
-@pytest.mark.slow
-def test_a_scene_whose_observation_was_interrupted_is_observed_again(missions: Path, tmp_path: Path) -> None:
+def test_a_run_whose_journal_lost_commands_to_the_tool_is_refused(missions: Path, tmp_path: Path) -> None:
     path = Path(run_of(load(missions, "sort_overhead"), tmp_path, frames=True).run)
     truncate(path, 0.6)
-    steps = json.loads((path / "world.log").read_text())["steps"]
-    with pytest.raises(Cut):
-        resumed(path, views=[Cutter(steps + 1, 3)])
-    result = resumed(path)
-    assert (result.status, result.items.placed) == ("SUCCESS", 6)
-    assert result.audit.agrees
-    assert decided_again(path).is_equal
+    with pytest.raises(InputError, match="lacks later commands to the tool"):
+        resumed(path)
 
 
 @pytest.mark.slow

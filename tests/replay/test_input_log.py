@@ -62,32 +62,9 @@ def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
     assert InputLog([START, sense(8, 1)]).make_final_interruption(steps).kept_step_count == complete
 
 
-@pytest.mark.parametrize(
-    ("last_command", "is_complete", "complete", "action"),
-    [
-        (8, True, 9, "open"),
-        (9, True, 9, "unknown"),
-        (7, False, 8, "open"),
-        (8, False, 8, "unknown"),
-    ],
-)
-def test_a_world_that_did_more_than_the_journal_knows(
-    last_command: int, is_complete: bool, complete: int, action: str
-) -> None:
+def test_a_kill_within_a_control_step_discards_the_step_but_no_action() -> None:
     log = InputLog([START, at(8, ToolCommanded("open"))])
-    interruption = log.make_final_interruption(20, last_command, is_complete=is_complete)
-    assert (interruption.kept_step_count, interruption.last_action) == (complete, action)
-
-
-def test_actions_stay_unknown_if_the_resumption_was_interrupted_at_once() -> None:
-    log = InputLog([START, sense(5, 1), resume(9, 6, "unknown"), sense(9, 2)])
-    interruption = log.make_final_interruption(9, 8)
-    assert (interruption.kept_step_count, interruption.last_action) == (6, "unknown")
-
-
-def test_a_kill_within_a_control_step_loses_no_action() -> None:
-    log = InputLog([START, at(8, ToolCommanded("open"))])
-    interruption = log.make_final_interruption(8, 8, is_complete=False)
+    interruption = log.make_final_interruption(8, is_complete=False)
     assert (interruption.kept_step_count, interruption.last_action) == (8, "open")
 
 
