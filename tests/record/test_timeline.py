@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from events import at, detected, frame_searched, item_changed, read, run_started, skill_ended, skill_started
+from events import at, detected, frame_searched, item_changed, run_started, skill_ended, skill_started
 from failed_runs import PICK, FailedRun
 
 from executive.cell.frame import FrameCaptured
@@ -118,16 +118,6 @@ def test_a_control_node_knows_the_skills_that_it_halted() -> None:
         NodeEnded("tree", "FAILURE", reason="timeout.timeout"),
     )  # fmt: skip
     assert (timeline.activation_by_path["tree"].halted_skills, timeline.halted_skills) == (("tree/Wait",), ())
-
-
-def test_a_failed_skill_has_the_answers_of_the_cell_until_then_without_lists() -> None:
-    timeline = folded(
-        read("arm.met", None), read("arm.q", [0.0] * 7), skill_started("tree/Approach", "cube-1"),
-        read("arm.met", "a wrench"), skill_ended("tree/Approach", "FAILURE", "cube-1", reason="blocked"),
-        read("tool.holding", True),
-    )  # fmt: skip
-    readings = timeline.activation_by_path["tree/Approach"].readings
-    assert [(each.name, each.value, each.clock) for each in readings] == [("arm.met", "a wrench", 3)]
 
 
 def test_an_item_has_its_last_sighting_and_failure_and_the_number_of_looks_since_then() -> None:

@@ -1,4 +1,4 @@
-"""Activations (executions) of a node, and readings of the cell before a failure."""
+"""Activations (executions) of a node."""
 
 from __future__ import annotations
 
@@ -8,24 +8,6 @@ from dataclasses import dataclass, field
 
 STATUS_TEXTS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted", "RUNNING": "running"}
 """Text for each status, in the order of the texts in `format_counts`."""
-
-
-@dataclass(frozen=True)
-class Reading:
-    """Number, truth value or string that a skill read from the cell.
-
-    Attributes:
-        name: Name of the input.
-        value: Value of the input, or message of the exception that the cell raised.
-        raised: Name of the exception that the cell raised, or "".
-        tick, clock: Control step and time [s] at which the skill first read `value`.
-    """
-
-    name: str
-    value: bool | int | float | str
-    raised: str
-    tick: int
-    clock: float
 
 
 @dataclass
@@ -46,7 +28,6 @@ class Activation:
         message_by_reason: Last message of each handled failure, by name of the failure.
         last_handled_reason: Name of the last handled failure, or "".
         halted_skills: Paths of the skills that the control node halted before its end.
-        readings: Last reading of each input before the failure of a skill, sorted by time.
     """
 
     node: str
@@ -65,7 +46,6 @@ class Activation:
     message_by_reason: dict[str, str] = field(default_factory=dict)
     last_handled_reason: str = ""
     halted_skills: tuple[str, ...] = ()
-    readings: tuple[Reading, ...] = ()
 
     @property
     def failure(self) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from executive import events
-from executive.record.timeline.activation import Activation, Reading
+from executive.record.timeline.activation import Activation
 from executive.record.timeline.items import ItemsTimeline
 
 
@@ -46,7 +46,6 @@ class Timeline:
         requests: Requests of the operator; None for the request to quit.
         faults: Time [s] and name of each injected fault.
         traceback: Traceback of the exception that ended the run, or "".
-        _reading_by_input: Last reading of each input by name, sorted by time.
     """
 
     has_history: bool = True
@@ -67,7 +66,6 @@ class Timeline:
     faults: list[tuple[float, str]] = field(default_factory=list)
     traceback: str = ""
     _activation_count: int = 0
-    _reading_by_input: dict[str, Reading] = field(default_factory=dict)
 
     @staticmethod
     def from_events(timed_events: Iterable[events.TimedEvent]) -> Timeline:
@@ -84,8 +82,6 @@ class Timeline:
         self.tick, self.clock = timed.tick, timed.clock
         event = timed.event
         match event:
-            case events.InputRead():
-                self._add_reading(event)
             case events.NodeStarted():
                 self._add_start(event)
             case events.NodeEnded():
@@ -164,8 +160,6 @@ class Timeline:
             activation.halted_skills, self.halted_skills = self.halted_skills, ()
         elif event.skill:
             self.halted_skills += (event.node,)
-        if event.skill and event.reason:
-            activation.readings = tuple(self._reading_by_input.values())
         if event.skill and event.status == "FAILURE" and event.item in self.items.by_name:
             self.items.by_name[event.item].failure = activation
 
@@ -182,10 +176,3 @@ class Timeline:
             activation.handled_counts[event.reason] += 1
             activation.message_by_reason[event.reason] = event.message
             activation.last_handled_reason = event.reason
-
-    def _add_reading(self, event: events.InputRead) -> None:
-        self._reading_by_input.pop(event.name, None)  # The new reading must be the last entry.
-        # A diagnosis shows only numbers, truth values and strings, not poses, images or lists.
-        if isinstance(event.value, (bool, int, float, str)):
-            reading = Reading(event.name, event.value, event.exception, self.tick, self.clock)
-            self._reading_by_input[event.name] = reading
