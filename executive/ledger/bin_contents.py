@@ -17,8 +17,7 @@ from executive.cell.protocols import Routes
 from executive.cell.quotas import Quotas, is_quota_reached
 from executive.geometry import Array
 from executive.ledger.association import MAX_STANDARD_DEVIATIONS
-from executive.ledger.item import ItemRecord, State
-from executive.ledger.records import ItemRecords
+from executive.ledger.item import ItemRecord, ItemRecords, State
 
 WALL_MARGIN = 0.035
 """Minimum distance from the walls at which an object that lands in a bin certainly stays there [m]."""

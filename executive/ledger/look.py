@@ -18,8 +18,7 @@ from executive.ledger.association import associate, find_duplicate, find_moved_i
 from executive.ledger.belief import ITEM_AREA_FRACTION, Belief, make_viewpoint_key
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
-from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, State
-from executive.ledger.records import ItemRecords
+from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, ItemRecords, State
 from executive.ledger.staleness import Staleness
 
 EXPECTED_OBJECT_COUNT = 3.0

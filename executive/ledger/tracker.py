@@ -26,9 +26,8 @@ from executive.ledger.belief import make_viewpoint_key
 from executive.ledger.bin_contents import BinContents, find_probable_bin
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
-from executive.ledger.item import ON_TABLE, ItemRecord, State
+from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
 from executive.ledger.look import LookUpdate, make_look_event
-from executive.ledger.records import ItemRecords
 from executive.ledger.staleness import Staleness
 from executive.perception.evidence import (
     compute_weight_log_ratios,

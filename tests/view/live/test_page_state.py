@@ -21,8 +21,7 @@ from events import (
 
 from executive.events import Event, OperatorAsked, RequestGiven, RunResumed, TargetSelected
 from executive.geometry import Pose
-from executive.view.live.messages import CameraImage, PageChange, encode_poses
-from executive.view.live.page_state import PageState
+from executive.view.live.page_state import CameraImage, PageChange, PageState, encode_poses
 
 
 @pytest.mark.parametrize(

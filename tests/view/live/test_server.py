@@ -17,8 +17,7 @@ from events import at, run_started
 from executive.cell.visuals import Shape
 from executive.geometry import Pose
 from executive.view.live import live_scene
-from executive.view.live.messages import PageChange, PageCommand
-from executive.view.live.page_state import PageState
+from executive.view.live.page_state import PageChange, PageCommand, PageState
 from executive.view.live.scene_proxy import SceneProxy
 from executive.view.live.server import (
     CONTENT_POLICY,

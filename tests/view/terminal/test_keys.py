@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import pytest
 
 from executive.run.run_control import RunControl
-from executive.view.terminal.keyboard import KeyReader
+from executive.view.terminal.screen import KeyReader
 
 PATIENCE = 10.0
 

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from executive.view.tree.tree_layout import NodeSize, Rectangle, compute_layout
+from executive.view.tree.svg import NodeSize, Rectangle, compute_layout
 
 
 def draw_tree(seed: int) -> tuple[list[int], list[NodeSize]]:
