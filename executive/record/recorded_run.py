@@ -23,7 +23,7 @@ from executive.record.recorded_mission import format_tree
 from executive.record.recorder import Recorder
 from executive.record.result import Audit, ItemCounts, Result, is_resumable, list_requests, write_result
 from executive.record.run_directory import SCENE_FILE, RunDirectory, make_dated_folder
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 

@@ -18,7 +18,7 @@ from executive.record.result import (
     write_result,
 )
 from executive.record.run_directory import RunDirectory
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Timeline
 
 ITEMS = ItemCounts(seen=3, placed=2, rejected=1, phantom=1)
 AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "fell_in_wrong_bin": 0, "unseen": 0}

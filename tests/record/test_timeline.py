@@ -23,12 +23,13 @@ from executive.events import (
     TargetSelected,
 )
 from executive.record.journal import Journal, read_journal
-from executive.record.timeline.activation import (
+from executive.record.timeline import (
+    PlanningTotals,
+    Timeline,
     find_last_failure,
     format_counts,
     group_by_node,
 )
-from executive.record.timeline.timeline import PlanningTotals, Timeline
 
 
 def folded(*events: Event, history: bool = True) -> Timeline:

@@ -16,9 +16,7 @@ from executive.record.diagnosis.diagnosis import Diagnosis, FailureNode, LostIte
 from executive.record.picture_recorder import find_picture
 from executive.record.result import is_resumable
 from executive.record.run_directory import RunDirectory
-from executive.record.timeline.activation import get_skill_name
-from executive.record.timeline.items import ItemHistory, Look, Sighting
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import ItemHistory, Look, Sighting, Timeline, get_skill_name
 from executive.tree.failure import Reason
 from executive.tree.inspection import Advice, PropagatedFailure
 from executive.tree.node_registry import load_control_nodes

@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from executive.record.timeline.items import Look, Sighting
+from executive.record.timeline import Look, Sighting
 
 MAX_LINE_WIDTH = 110
 """Maximum length of a line [characters]."""

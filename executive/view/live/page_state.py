@@ -15,7 +15,7 @@ from executive.cell.frame import Frame
 from executive.cell.visuals import Shape
 from executive.events import FrameSearched, TimedEvent
 from executive.geometry import Pose
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Timeline
 
 JPEG_QUALITY = 80
 """JPEG quality of the camera image, 0 to 100."""

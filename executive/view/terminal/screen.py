@@ -18,7 +18,7 @@ from rich.text import Text
 from executive.errors import escape_control_characters
 from executive.events import OperatorAsked, RequestGiven, TimedEvent
 from executive.mission.outline import OutlineNode, make_outline
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Timeline
 from executive.run.run import Run
 from executive.run.run_control import RunControl
 from executive.view.tree.tree_text import draw_line_prefixes, select_active_nodes

@@ -8,8 +8,7 @@ import pytest
 from made_up_runs import TREE, ran, skill
 
 from executive.mission.outline import OutlineNode
-from executive.record.timeline.activation import Activation
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Activation, Timeline
 from executive.view.report.activity_times import (
     FAILED_ATTEMPTS,
     LOOK,

@@ -12,8 +12,7 @@ import pytest
 from made_up_runs import TREE, activation, picks, ran
 
 from executive.mission.outline import OutlineNode
-from executive.record.timeline.activation import Activation
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Activation, Timeline
 from executive.view.report.lanes import MAX_AXIS_LENGTH, MAX_BAR_COUNT, MIN_AXIS_LENGTH, draw_lanes
 
 THINNEST = 1.5

@@ -14,7 +14,7 @@ from executive.record.diagnosis.diagnosis import (
     FailureNode,
     format_diagnosis,
 )
-from executive.record.timeline.items import Sighting
+from executive.record.timeline import Sighting
 from tests.record.failed_runs import PICK, FailedRun
 
 CUBE = [("cube", 0.5, 0.1)]
