@@ -134,15 +134,3 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_
     result = replace(RESULT, status="SUCCESS", reason="", node="", message="")
     shown = format_summary(result, [], repeat, "runs/x/report.html").splitlines()
     assert shown == ["SUCCESS", *lines[1:3], "report: runs/x/report.html"]
-
-
-def test_the_keys_are_named_beside_the_clock_where_there_is_a_keyboard(monkeypatch):
-    control = RunControl()
-    keys = SimpleNamespace(start=lambda: None, stop=lambda: None, control=control)
-    monkeypatch.setattr("executive.view.terminal.screen.KeyReader", lambda file, control: keys)
-    view = TerminalView(Console(file=io.StringIO(), force_terminal=True), keyboard=0)
-    view.open(SimpleNamespace(root=TREE, control=control))
-    for words in ("p pause, s step, Ctrl-C stop", "paused: p continue, s step, Ctrl-C stop"):
-        assert page(view).splitlines()[0].rstrip() == f"  0.0 s   {words}"
-        control.pause()
-    view.close()
