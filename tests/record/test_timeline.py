@@ -136,12 +136,6 @@ def test_an_item_has_its_last_sighting_and_failure_and_the_number_of_looks_since
     assert item.failure == timeline.activation_by_path["tree/Grasp"]
 
 
-def test_an_item_has_the_times_at_which_the_tool_got_and_lost_it() -> None:
-    states = ("seen", "held", "held", "dropped")
-    item = folded(*(item_changed("cube-1", state) for state in states)).items.by_name["cube-1"]
-    assert (item.pick_time, item.drop_time) == (1.0, 3.0)
-
-
 def test_the_accounts_after_the_end_of_the_tree_leave_the_final_states_as_they_were() -> None:
     timeline = folded(
         NodeStarted("tree"), item_changed("cube-1"), item_changed("cube-2", "held"),

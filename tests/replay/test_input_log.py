@@ -6,7 +6,7 @@ import pytest
 from events import at, read, run_ended, run_started
 
 from executive.events import RunHalted, RunResumed, TimedEvent, ToolCommanded
-from executive.replay.input_log import InputLog, Interruption
+from executive.replay.input_log import InputLog
 
 
 def sense(tick: int, value: object, name: str = "tool.holding", nth: int = 1) -> TimedEvent:
@@ -22,13 +22,6 @@ START = at(0, run_started())
 
 def values(log: InputLog) -> list[object]:
     return [one.reading.value for one in log.inputs["tool.holding"]]
-
-
-def test_answers_are_in_order_by_the_name_of_the_input() -> None:
-    log = InputLog([START, sense(0, False), sense(0, "arm", name="arm.met"), sense(7, True, nth=2)])
-    found = [(one.tick, one.reading.read_number, one.reading.value) for one in log.inputs["tool.holding"]]
-    assert found == [(0, 1, False), (7, 2, True)]
-    assert (len(log.inputs["arm.met"]), log.control_period) == (1, 1 / 240)
 
 
 def test_an_incomplete_control_step_is_void_once_the_run_was_resumed() -> None:
@@ -75,10 +68,3 @@ def test_a_resumption_that_was_interrupted_at_once_is_repeated_from_its_beginnin
     log = InputLog([START, sense(5, 1), resume(9, 6, "close"), sense(9, 2)])
     interruption = log.make_final_interruption(steps)
     assert (interruption.kept_step_count, interruption.resume_tick) == (complete, steps)
-
-
-def test_a_run_that_ended_as_incomplete_is_reopened() -> None:
-    log = InputLog([START, sense(8, 1), at(9, run_ended("INCOMPLETE"))])
-    assert log.make_final_interruption(9) == Interruption(10, "", True, 10)
-    log = InputLog([*log.events, resume(10, 10), sense(11, 2)])
-    assert log.interruptions[10].restarts_tree

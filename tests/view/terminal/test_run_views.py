@@ -13,13 +13,11 @@ from py_trees.behaviour import Behaviour
 from rich.console import Console
 
 from executive.events import BranchChosen, NodeEnded, NodeStarted, TimedEvent
-from executive.mission.outline import make_outline
 from executive.record.result import Result
 from executive.run.run_control import RunControl
 from executive.view.terminal.lines import LineView
 from executive.view.terminal.screen import TerminalView
 from executive.view.terminal.summary import format_repeat_command, format_summary
-from executive.view.tree.tree_text import find_skill_names, select_active_nodes
 
 GRASP = "tree/sort/repeat/Grasp"
 
@@ -46,20 +44,6 @@ def started(node: str, item: str = "", clock: float = 1.0) -> TimedEvent:
 
 def failed(node: str, clock: float = 1.0, **fields) -> TimedEvent:
     return at(1, NodeEnded(node, "FAILURE", "Grasp" if node == GRASP else "", **fields), clock)
-
-
-def test_skills_are_the_leaves_and_what_rests_is_folded():
-    nodes = make_outline(TREE)
-    leaves = {"tree/sort/repeat/Detect": "Detect", GRASP: "Grasp", "tree/sort/Release": "Release"}
-    assert find_skill_names(nodes) == leaves
-    assert [node.path for node in select_active_nodes(nodes, set())] == ["tree/sort"]
-    assert [node.name for node in select_active_nodes(nodes, {"tree/sort"})] == [
-        "sort",
-        "repeat",
-        "Release",
-    ]
-    assert select_active_nodes(nodes, {"tree/sort", "tree/sort/repeat"}) == nodes
-    assert [node.name for node in select_active_nodes(nodes, {"tree/sort/repeat"})] == ["sort"]
 
 
 MISSED = {"item": "cube-1", "reason": "missed", "message": "no seal 0.1 s after contact"}
