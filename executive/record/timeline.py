@@ -303,17 +303,6 @@ class Timeline:
         activations = (each for each in self.activation_by_path.values() if each.status == "RUNNING")
         return sorted(activations, key=lambda activation: activation.number)
 
-    def find_current_activation(self, path: str) -> Activation | None:
-        """Return the last activation of a node, or None if an ancestor was started after this activation."""
-        last = self.activation_by_path.get(path)
-        ancestor_path = path.rpartition("/")[0]
-        while last is not None and ancestor_path:
-            ancestor = self.activation_by_path.get(ancestor_path)
-            if ancestor is not None and ancestor.number > last.number:
-                return None
-            ancestor_path = ancestor_path.rpartition("/")[0]
-        return last
-
     @property
     def root(self) -> Activation | None:
         """Last activation of the root of the tree, which starts before all other nodes; None at first."""

@@ -92,14 +92,6 @@ def test_the_ends_of_a_node_are_counted_and_its_last_failure_is_found() -> None:
     assert timeline.end_counts == {"tree/Grasp": {"FAILURE": 2, "INVALID": 1, "SUCCESS": 1}}
 
 
-def test_an_activation_is_current_until_an_ancestor_starts_again() -> None:
-    timeline = folded(NodeStarted("tree"), skill_started("tree/do/Grasp"), skill_ended("tree/do/Grasp"))
-    assert timeline.find_current_activation("tree/do/Grasp") == timeline.activation_by_path["tree/do/Grasp"]
-    timeline(at(960, NodeStarted("tree")))
-    assert timeline.find_current_activation("tree/do/Grasp") is None
-    assert timeline.find_current_activation("tree") == timeline.activation_by_path["tree"]
-
-
 def test_the_failures_that_a_control_node_handled_are_counted_with_their_last_message() -> None:
     timeline = folded(
         NodeStarted("tree/retry"), BranchChosen("tree/retry", "attempt 2 of 3", "Grasp.missed", "no seal"),
