@@ -25,10 +25,9 @@ from executive.ledger.association import AMBIGUITY_FACTOR
 from executive.ledger.belief import make_viewpoint_key
 from executive.ledger.bin_contents import BinContents, find_probable_bin
 from executive.ledger.certainty import Certainty
-from executive.ledger.coverage import Coverage
+from executive.ledger.coverage import Coverage, Staleness
 from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
 from executive.ledger.look import LookUpdate, make_look_event
-from executive.ledger.staleness import Staleness
 from executive.perception.evidence import (
     compute_weight_log_ratios,
     describe_weight,
