@@ -38,7 +38,7 @@ class CellWithoutHardware:
         accounts: The ledger of the run.
         cell: The interface of the cell for skills.
         steps: Number of control steps since the start of the run.
-        last_command_step: Control step of the last logged command to the tool; 0 if there is none.
+        last_command_step: Control step of the last logged command to arm or tool; 0 if there is none.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Points of the table at which looks may have missed an object, and positions that the robot may have changed."""
+"""Points of the table at which looks may have missed an object, and positions that may have changed."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def resume_run(
 
     Raises:
         InputError: Another process executes the run, the run has a result of SUCCESS or FAILURE, the record
-            lacks commands to the tool, or the replay differs from the record.
+            lacks commands to arm or tool, or the replay differs from the record.
         ExecutiveError: The result cannot be written.
     """
     start_time = time.perf_counter()

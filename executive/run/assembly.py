@@ -105,7 +105,7 @@ def assemble_resumed(
 
     Raises:
         InputError: The kind of the cell is not installed, its world cannot be reconstructed, or the log lacks
-            commands to the tool.
+            commands to arm or tool.
     """
     context = RunContext()
     control = RunControl()
@@ -113,10 +113,11 @@ def assemble_resumed(
     request_count = sum(isinstance(timed.event, RequestGiven) for timed in log.events)
     resume_point = ResumePoint(world_log, frame_count, pose_count)
     workcell = _build_workcell(loaded, options, context, control, resume_point, request_count)
-    # A killed run loses no command, because each command is in the journal before the cell executes it.
+    # A killed run loses no command: before the cell executes a command, the journal contains an event of the
+    # same control step, which is `ToolCommanded` or `MotionPlanned`.
     if workcell.last_command_step > log.last_tick:
         workcell.close()
-        text = f"the journal ends in control step {log.last_tick}, and lacks later commands to the tool"
+        text = f"the journal ends in control step {log.last_tick}, and lacks later commands to arm or tool"
         raise InputError(f"{text}; somebody changed it, or a disk lost its end; run the mission again")
     interruption = log.make_final_interruption(workcell.steps, is_complete=is_complete)
     cell = ReplayedCell(workcell, log, None if has_ended else interruption)

@@ -131,6 +131,7 @@ class FakeArm:
         if not isinstance(motion, FakeMotion):
             raise Fault(f"the fake arm follows its own planned motions, not a {type(motion).__name__}")
         self.commands.append("start")
+        self._world.is_commanded = True
         self._path = list(motion.qs)
         self._half_length = len(self._path) // 2
         self.collision = None

@@ -47,7 +47,7 @@ class FakeWorld:
         objects: The objects, in the order in which they were added.
         removed_objects: The objects that were removed from the world.
         held_object: The object that the tool holds, or None.
-        is_commanded: True if the tool has received a command since the last control step.
+        is_commanded: True if arm or tool has received a command since the last control step.
     """
 
     classes: Mapping[str, ObjectClass]

@@ -32,7 +32,7 @@ class WorldRebuilder:
         braking_start: Joint targets of the last physics step `(n,)` [rad], empty before the first step, and
             their time since the start of the motion [s]; the arm brakes from there.
         step_count: Number of control steps of the run.
-        last_command_step: Number of control steps before the last vacuum command; 0: no command.
+        last_command_step: Number of control steps before the last motion or vacuum command; 0: no command.
     """
 
     def __init__(self, world: World, tool: SuctionTool) -> None:
@@ -53,7 +53,7 @@ class WorldRebuilder:
             InputError: The command is invalid.
         """
         kind, arguments = command
-        if kind in (command_log.VACUUM_ON, command_log.VACUUM_OFF):
+        if kind in (command_log.MOTION, command_log.VACUUM_ON, command_log.VACUUM_OFF):
             self.last_command_step = self.step_count
         try:
             if kind == command_log.MOTION:
