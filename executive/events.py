@@ -283,8 +283,7 @@ class RunResumed(Event):
 
     Attributes:
         valid_ticks: Number of control steps before the interruption that are still valid.
-        last_command: Last command to the tool before the interruption: `open` or `close`; "" for none;
-            `unknown` if arm or tool executed commands that the journal does not contain.
+        last_command: Last command to the tool before the interruption: `open` or `close`; "" for none.
         versions: Versions of this project, Python, the machine and the required packages.
     """
 

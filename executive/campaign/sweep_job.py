@@ -13,7 +13,7 @@ from executive.errors import ExecutiveError
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import load_skills
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions
 from executive.view.report.page import try_write_report
 

@@ -199,16 +199,3 @@ class Ledger(Protocol):
 
         `point` is the contact point `(x, y, z)` [m]; None if it is unknown.
         """
-
-    def record_interruption(self) -> None:
-        """Record an interruption of the run: the tool may have moved any item that is not in a bin.
-
-        Later frames are searched for the items on the table and in the bins. An item without a detection
-        until the end of the run is rejected, because its position is unknown.
-        """
-
-    def record_bin_contents(self) -> None:
-        """Record an item for each unknown object that the frames since `record_interruption` show in a bin.
-
-        An unknown object is assigned to a dropped item of its class, or becomes a new item.
-        """

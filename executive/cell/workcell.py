@@ -58,10 +58,7 @@ class Workcell(Protocol):
 
     @property
     def last_command_step(self) -> int:
-        """Control step at which the cell last started a motion or received a command to the tool.
-
-        The step is 0 before the first command, and after an interruption that makes the step unknown.
-        """
+        """Control step of the last start of a motion or command to the tool; 0 if none or unknown."""
 
     def log_to(self, path: Path) -> None:
         """Start a log file from which the simulated world can be reconstructed at any control step.

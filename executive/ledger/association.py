@@ -13,8 +13,8 @@ import numpy as np
 
 from executive.cell.detection import Observation
 from executive.ledger.certainty import MIN_EXISTENCE_PROBABILITY, Certainty
+from executive.ledger.coverage import Staleness
 from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, ItemRecord, State
-from executive.ledger.staleness import Staleness
 
 MAX_STANDARD_DEVIATIONS = 3.5
 """Number of standard deviations within which two measurements of a position agree with probability 0.999."""

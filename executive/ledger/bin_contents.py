@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from statistics import median_low
 
 import numpy as np
 
@@ -18,9 +17,7 @@ from executive.cell.protocols import Routes
 from executive.cell.quotas import Quotas, is_quota_reached
 from executive.geometry import Array
 from executive.ledger.association import MAX_STANDARD_DEVIATIONS
-from executive.ledger.belief import CONFIRMATION_LOG_ODDS, Belief
-from executive.ledger.item import ItemRecord, State
-from executive.ledger.records import ItemRecords
+from executive.ledger.item import ItemRecord, ItemRecords, State
 
 WALL_MARGIN = 0.035
 """Minimum distance from the walls at which an object that lands in a bin certainly stays there [m]."""
@@ -202,67 +199,3 @@ def update_bin_log_odds(
     likelihood_ratio = (1.0 - miss_rate) / false_positive_rate if has_additional_object else miss_rate
     log_odds = record.bin_log_odds[bin_name] + math.log(likelihood_ratio)
     record.bin_log_odds[bin_name] = max(0.0, log_odds)
-
-
-class BinRecovery:
-    """Finds objects in the bins that are missing from the ledger, and records items for these objects.
-
-    The journal of a resumed run may lack commands to the tool. A look is an image with its detections.
-
-    Args:
-        bins: Contents of the bins according to the ledger.
-    """
-
-    def __init__(self, bins: BinContents) -> None:
-        self._bins = bins
-        self._object_counts: dict[str, list[Counter[str]]] = defaultdict(list)
-        """For each bin name: one counter per look, with the number of detected objects of each class."""
-
-    def add_look(self, look: Detections, bin_names: BinNameByObservation) -> None:
-        """Count the confident detections in each bin (`bin_names`) whose floor the look shows completely."""
-        for name in self._bins.bins:
-            if self._bins.is_floor_visible(name, look):
-                observed_objects = [entry for entry in bin_names if bin_names[entry] == name]
-                labels = (entry.detection.label for entry in observed_objects if entry.is_confident)
-                self._object_counts[name].append(Counter(labels))
-
-    def record_bin_contents(self, change_count: int) -> None:
-        """Record an item in each bin for each object that the ledger does not know.
-
-        The item is an untracked item of the same class, or else a new item. The item is placed if the bin is
-        permitted for the class, and rejected otherwise. `change_count`: number of changes so far.
-        """
-        bins, records = self._bins, self._bins.records
-        untracked = [record for record in records.filter_by_state(State.DROPPED) if record.is_untracked]
-        for label, bin_name in self._find_unknown_objects():
-            record = next((record for record in untracked if record.detected_label == label), None)
-            if record is None:
-                belief = Belief(label, CONFIRMATION_LOG_ODDS, is_confirmed=True)
-                position = bins.bins[bin_name].position
-                record = records.add(belief, position, change_count, 0.0, was_place_empty=True)
-            else:
-                untracked.remove(record)
-            if bin_name in bins.routes.get(record.label, ()):
-                record.reason = "found in the bin when the run was resumed"
-                records.set_placed(record, bin_name)
-            else:
-                records.reject(record, f"found in {bin_name} when the run was resumed")
-
-    def _find_unknown_objects(self) -> Iterator[tuple[str, str]]:
-        """For each object that lies in a bin and has no item in the ledger, yield its class and bin name.
-
-        The number of objects of a class is the median over the looks. The total number of unknown objects is
-        limited to the number of objects minus the number of items in the bin. Classes with a route to the bin
-        have priority: an object of another class may be a known item with a wrongly detected class, and must
-        not be rejected.
-        """
-        for bin_name, counts in self._object_counts.items():
-            labels = set().union(*counts)
-            detected_counts = {label: median_low(count[label] for count in counts) for label in labels}
-            max_unknown_count = sum(detected_counts.values()) - self._bins.count_objects_in(bin_name)
-            wrong_labels = {label for label in labels if bin_name not in self._bins.routes.get(label, ())}
-            for label in sorted(labels, key=lambda label: (label in wrong_labels, label)):
-                known_count = self._bins.count_placed(label, bin_name)
-                unknown_count = max(min(detected_counts[label] - known_count, max_unknown_count), 0)
-                max_unknown_count -= unknown_count
-                yield from [(label, bin_name)] * unknown_count

@@ -1,9 +1,10 @@
-"""Record of one item: its position, its state, and the evidence about it."""
+"""Records of the items: position, state and evidence of each item; each change is emitted as an event."""
 
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -12,8 +13,9 @@ import numpy as np
 from executive.cell.detection import Observation
 from executive.cell.frame import Frame
 from executive.cell.json_values import round_values
-from executive.cell.objects import KnownItem, Target
-from executive.events import ItemChanged
+from executive.cell.objects import Item, KnownItem, Target
+from executive.errors import Fault
+from executive.events import Emit, ItemChanged
 from executive.geometry import Array
 from executive.ledger.belief import Belief
 
@@ -87,8 +89,6 @@ class ItemRecord:
         contradiction_count: Number of images that contradict the class since the last possible move.
         last_contradiction: Last evidence of size, height or weight against the class, as a sentence, or "".
         bin_log_odds: For each bin, log odds that the dropped item lies in the bin.
-        is_untracked: True if the run was interrupted before the journal recorded whether the tool moved the
-            item.
         deferral_count: Number of times that the item was deferred.
         deferral_rank: Rank among the deferred items; 0 if the item is not deferred.
         was_taken_away: True if images showed the place of the item empty, because a person removed it.
@@ -123,7 +123,6 @@ class ItemRecord:
     contradiction_count: int = 0
     last_contradiction: str = ""
     bin_log_odds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
-    is_untracked: bool = False
     deferral_count: int = 0
     deferral_rank: int = 0
     was_taken_away: bool = False
@@ -254,3 +253,73 @@ class ItemRecord:
             self.belief.log_odds, self.reason = new_item.belief.log_odds, ""
         if self.state in (State.DROPPED, State.PHANTOM):
             self.state = State.REJECTED if self.reason else State.SEEN
+
+
+class ItemRecords:
+    """Records of the items of a run, in the order of the first detection.
+
+    Args:
+        emit: Function that receives the events.
+    """
+
+    def __init__(self, emit: Emit) -> None:
+        self._emit = emit
+        self._records: dict[Item, ItemRecord] = {}
+        self._name_counts: Counter[str] = Counter()
+
+    def __iter__(self) -> Iterator[ItemRecord]:
+        """Return an iterator over all records; records may be added and removed during the iteration."""
+        return iter(list(self._records.values()))
+
+    def find(self, item: Item) -> ItemRecord:
+        """Return the record of an item.
+
+        Raises:
+            Fault: No item has this name.
+        """
+        if item not in self._records:
+            known_items = ", ".join(self._records) or "none"
+            raise Fault(f'the ledger knows no item "{item}"; it knows: {known_items}')
+        return self._records[item]
+
+    def filter_by_state(self, *states: State) -> list[ItemRecord]:
+        """Return the records of all items in one of the given states."""
+        return [record for record in self if record.state in states]
+
+    def add(
+        self, belief: Belief, position: Array, change_count: int, stamp: float, *, was_place_empty: bool
+    ) -> ItemRecord:
+        """Add an item with the name `<class>-<number>` and return its record.
+
+        `position` `(3,)` [m], `change_count` and `stamp` [s] are values of the first detection.
+        """
+        label = belief.first_label
+        self._name_counts[label] += 1
+        name = f"{label}-{self._name_counts[label]}"
+        self._records[name] = ItemRecord(name, belief, position, change_count, stamp, was_place_empty)
+        return self._records[name]
+
+    def remove(self, record: ItemRecord) -> None:
+        """Remove an item that no event has reported yet."""
+        del self._records[record.item]
+
+    def emit(self, *records: ItemRecord) -> None:
+        """Emit the current state of each given item as an event."""
+        for record in records:
+            self._emit(record.event)
+
+    def change_state(self, record: ItemRecord, state: State) -> None:
+        """Set the state of an item, and emit the item."""
+        record.state = state
+        self.emit(record)
+
+    def set_placed(self, record: ItemRecord, bin_name: str) -> None:
+        """Set the state of an item to PLACED in a bin, and emit the item."""
+        record.bin, record.was_taken_away = bin_name, False
+        self.change_state(record, State.PLACED)
+
+    def reject(self, record: ItemRecord, reason: str) -> None:
+        """Reject an item; a held or dropped item keeps its state until a look shows the item on the table."""
+        record.reason = f"{reason}: {record.last_contradiction}" if record.last_contradiction else reason
+        is_off_table = record.state in (State.HELD, State.DROPPED)
+        self.change_state(record, record.state if is_off_table else State.REJECTED)

@@ -17,10 +17,8 @@ from executive.geometry import Array
 from executive.ledger.association import associate, find_duplicate, find_moved_item, may_show_item
 from executive.ledger.belief import ITEM_AREA_FRACTION, Belief, make_viewpoint_key
 from executive.ledger.certainty import Certainty
-from executive.ledger.coverage import Coverage
-from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, State
-from executive.ledger.records import ItemRecords
-from executive.ledger.staleness import Staleness
+from executive.ledger.coverage import Coverage, Staleness
+from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, ItemRecords, State
 
 EXPECTED_OBJECT_COUNT = 3.0
 """Order of magnitude of the expected number of objects on the table before the first look."""

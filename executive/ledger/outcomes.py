@@ -7,8 +7,6 @@ from collections.abc import Collection, Mapping
 from executive.ledger.certainty import Certainty
 from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, State
 
-REASON_UNTRACKED = "its position is unknown: the journal lacks actions of the tool; no look showed it since"
-"""Reason for the rejection of an item that the tool may have moved while the journal was incomplete."""
 MIN_EMPTY_PROBES = 3
 """Minimum number of descents that touched only the table (`ItemRecord.empty_probe_count`) at a phantom."""
 FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
@@ -54,8 +52,6 @@ def find_final_state(
     if record.empty_probe_count >= MIN_EMPTY_PROBES and has_touched_item and not record.had_contact:
         count = record.empty_probe_count
         return State.PHANTOM, f"the tool found only the table at its position, {count} times"
-    if record.state is State.DROPPED and record.is_untracked:
-        return State.REJECTED, REASON_UNTRACKED
     if record.state is State.DROPPED or certainty.is_position_empty(record):
         return State.LOST, "known to exist, not found again"
     if record.state is State.REJECTED:

@@ -23,13 +23,11 @@ from executive.geometry import Array
 from executive.ledger import outcomes
 from executive.ledger.association import AMBIGUITY_FACTOR
 from executive.ledger.belief import make_viewpoint_key
-from executive.ledger.bin_contents import BinContents, BinRecovery, find_probable_bin
+from executive.ledger.bin_contents import BinContents, find_probable_bin
 from executive.ledger.certainty import Certainty
-from executive.ledger.coverage import Coverage
-from executive.ledger.item import ON_TABLE, ItemRecord, State
+from executive.ledger.coverage import Coverage, Staleness
+from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
 from executive.ledger.look import LookUpdate, make_look_event
-from executive.ledger.records import ItemRecords
-from executive.ledger.staleness import Staleness
 from executive.perception.evidence import (
     compute_weight_log_ratios,
     describe_weight,
@@ -95,8 +93,6 @@ class Tracker:
         self._certainty = Certainty(self.config, find_classes_distinct_by_touch(self.classes))
         self._bin_contents = BinContents(self.config, self.bins, self.routes, self._records, self.quotas)
         self._coverage, self._staleness = Coverage(self.table), Staleness()
-        self._bin_recovery: BinRecovery | None = None
-        """Recovery of the bin contents between `record_interruption` and `record_bin_contents`, or None."""
         self._last_frame_id = self._deferral_count = 0
         self._last_stamp = 0.0
         """Capture time of the last look [s]."""
@@ -231,7 +227,7 @@ class Tracker:
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
         """Record that the tool lost an item; `landing` is the predicted landing position `(3,)` [m]."""
         record = self._records.find(item)
-        record.is_untracked = record.was_taken_away = False
+        record.was_taken_away = False
         self._records.change_state(record, State.DROPPED)
         self._bin_contents.set_prior_log_odds(record, landing)
         self._count_failed_pick(record)
@@ -282,24 +278,6 @@ class Tracker:
         self.invalidate_positions()
         if point is not None:
             self._add_body(np.array(point))
-
-    def record_interruption(self) -> None:
-        """Record an interruption of the run: the tool may have moved any item that is not in a bin."""
-        self._bin_recovery = BinRecovery(self._bin_contents)
-        for record in self._records.filter_by_state(State.HELD, State.DROPPED, State.SEEN):
-            if record.state is not State.SEEN or record.belief.is_probable:
-                record.change_count = self.change_count
-                record.is_untracked = True
-                record.was_taken_away = False
-                record.bin_log_odds.clear()
-                self._records.change_state(record, State.DROPPED)
-        self.invalidate_positions()
-
-    def record_bin_contents(self) -> None:
-        """Record an item for each unknown object that a look after `record_interruption` showed in a bin."""
-        recovery, self._bin_recovery = self._bin_recovery, None
-        assert recovery is not None, "the contents of bins are recorded after `record_interruption`"
-        recovery.record_bin_contents(self.change_count)
 
     def set_final_states(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the behaviour tree succeeded."""
@@ -464,9 +442,7 @@ class Tracker:
         for record in update.apply(observations_on_table):
             self._certainty.reject_if_uncertain(record, is_unmoved=self._staleness.is_unmoved(record))
             self._records.emit(record)
-        if detections.view == "full" and self._bin_recovery is not None:
-            self._bin_recovery.add_look(detections, bin_names)
-        elif detections.view == "full":
+        if detections.view == "full":
             self._bin_contents.confirm_placed_items(detections, observations)
             self._bin_contents.mark_dropped_items_as_placed(detections, bin_names)
 

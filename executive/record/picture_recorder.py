@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, FrameSearched, NodeEnded, RunEnded, TargetSelected, TimedEvent
 from executive.record.atomic_file import replace_atomically
-from executive.record.timeline.activation import get_skill_name
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Timeline, get_skill_name
 
 MAX_STORED_LOOKS = 24
 """Maximum number of stored looks; a look is an image (1.2 MB at 640 x 480 pixels) with its detections."""

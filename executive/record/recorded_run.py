@@ -23,7 +23,7 @@ from executive.record.recorded_mission import format_tree
 from executive.record.recorder import Recorder
 from executive.record.result import Audit, ItemCounts, Result, is_resumable, list_requests, write_result
 from executive.record.run_directory import SCENE_FILE, RunDirectory, make_dated_folder
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 
@@ -163,7 +163,6 @@ class RecordedRun:
         recorder: Recorder of the run.
         options: Views of the run, and whether the run starts paused.
         earlier_events: Events from before the resumption of the run; the observers receive them first.
-        start_message: Message that the views show at the start of the run, or "".
     """
 
     run: Run
@@ -172,7 +171,6 @@ class RecordedRun:
     recorder: Recorder
     options: RecordOptions = RecordOptions()
     earlier_events: Sequence[TimedEvent] = ()
-    start_message: str = ""
 
     def __post_init__(self) -> None:
         self._timeline = self.options.timeline or Timeline(has_history=False)
@@ -238,8 +236,6 @@ class RecordedRun:
                 exit_stack.callback(view.close)
             for view in views:
                 view.open(run)
-                if self.start_message:
-                    view.show_message(self.start_message)
             for observer in observers:
                 run.add_observer(observer)
                 for timed in self.earlier_events:

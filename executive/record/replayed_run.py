@@ -14,7 +14,7 @@ from executive.events import NodeEnded, NodeStarted, TimedEvent
 from executive.mission.load import LoadedMission
 from executive.record.journal import find_run_end
 from executive.record.recorded_mission import read_mission_of_run
-from executive.record.timeline.activation import get_skill_name
+from executive.record.timeline import get_skill_name
 from executive.replay.input_log import InputLog
 from executive.run.assembly import assemble_replay
 from executive.run.resumed_run import ResumedRun

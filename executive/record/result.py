@@ -18,7 +18,7 @@ from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis.diagnosis import Diagnosis
 from executive.record.journal import find_run_end
 from executive.record.run_directory import RunDirectory
-from executive.record.timeline.timeline import PlanningTotals, Timeline
+from executive.record.timeline import PlanningTotals, Timeline
 
 QUIT_REQUEST = "quit"
 """Request of the operator to end the run."""

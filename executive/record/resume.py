@@ -17,7 +17,7 @@ from executive.record.recorder import Recorder
 from executive.record.replayed_run import replay_and_compare
 from executive.record.result import Result, is_resumable, read_result
 from executive.record.run_directory import RunDirectory
-from executive.replay.input_log import UNKNOWN_ACTION, InputLog
+from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions, assemble_resumed
 from executive.skill import Skill
 
@@ -37,7 +37,7 @@ def resume_run(
 
     If the run ended as INCOMPLETE, the tree is restarted, and rejected and skipped items may be picked again;
     placed items stay placed. If the run ended as SUCCESS or FAILURE without a result file, the result is
-    written. If the journal lacks commands to arm or tool, the scene is observed before the run continues.
+    written.
 
     Args:
         path: The run directory.
@@ -47,7 +47,7 @@ def resume_run(
 
     Raises:
         InputError: Another process executes the run, the run has a result of SUCCESS or FAILURE, the record
-            is incomplete, or the replay differs from the record.
+            lacks commands to arm or tool, or the replay differs from the record.
         ExecutiveError: The result cannot be written.
     """
     start_time = time.perf_counter()
@@ -81,13 +81,7 @@ def resume_run(
         for timed in replayed_events:
             recorder.trace(timed)
         earlier_events = [each for each in replayed_events if isinstance(each.event, EVENTS_WITHOUT_REPLAY)]
-        message = ""
-        interruption = run.replayed_cell.last_interruption
-        if interruption is not None and interruption.last_action == UNKNOWN_ACTION:
-            count = interruption.resume_tick - interruption.kept_step_count
-            problem = f"the journal ends {count} control steps before the log of the world"
-            message = f"{problem} and may lack commands; the scene is observed before the run continues"
-        recorded_run = RecordedRun(run, loaded, directory, recorder, record, earlier_events, message)
+        recorded_run = RecordedRun(run, loaded, directory, recorder, record, earlier_events)
         return recorded_run.execute(start.seed, start_time)
 
 

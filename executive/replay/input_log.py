@@ -18,9 +18,6 @@ from executive.events import (
     ToolCommanded,
 )
 
-UNKNOWN_ACTION = "unknown"
-"""Value of `Interruption.last_action` if the journal may lack commands to arm or tool."""
-
 
 class RecordedInput(NamedTuple):
     """Event with a value that a run read from its cell, and number of the control step of the reading."""
@@ -35,7 +32,7 @@ class Interruption:
 
     Attributes:
         kept_step_count: Number of control steps before the interruption that the resumed run keeps.
-        last_action: Last action of the tool, `open` or `close`; "" without an action, or `UNKNOWN_ACTION`.
+        last_action: Last action of the tool, `open` or `close`; "" without an action.
         restarts_tree: True if the run ended as INCOMPLETE; the resumption then restarts the tree.
         resume_tick: First control step after the resumption.
     """
@@ -122,9 +119,7 @@ class InputLog:
                     return f'JSON cannot restore the value of "{key}" ({entry})'
         return ""
 
-    def make_final_interruption(
-        self, step_count: int, last_command_tick: int = 0, *, is_complete: bool = True
-    ) -> Interruption:
+    def make_final_interruption(self, step_count: int, *, is_complete: bool = True) -> Interruption:
         """Return the interruption between the end of the log and the next resumption.
 
         A run that ended as INCOMPLETE keeps all control steps. Otherwise, the kept steps are in the log and
@@ -133,7 +128,6 @@ class InputLog:
 
         Args:
             step_count: Number of control steps that the cell has executed.
-            last_command_tick: Control step of the last command to arm or tool according to the cell.
             is_complete: True if the log contains all events of its last control step.
         """
         incomplete_end_ticks = _find_incomplete_end_ticks(self.events)
@@ -141,15 +135,10 @@ class InputLog:
             return Interruption(self.last_tick + 1, self.last_action, True, self.last_tick + 1)
         logged_count = self.last_tick + 1 if is_complete else self.last_tick
         kept_count = min(step_count, logged_count if self.halt is None else self.halt.tick)
-        # Each command is logged before it is executed, also in the last step if the cell was killed in it.
-        may_lack_commands = last_command_tick >= logged_count and step_count > self.last_tick
         for interruption in reversed(self.interruptions.values()):
-            was_resumption_interrupted = interruption.resume_tick >= kept_count
-            if was_resumption_interrupted:
+            if interruption.resume_tick >= kept_count:
                 kept_count = min(kept_count, interruption.kept_step_count)
-                may_lack_commands |= interruption.last_action == UNKNOWN_ACTION
-        action = UNKNOWN_ACTION if may_lack_commands else self.last_action
-        return Interruption(kept_count, action, kept_count - 1 in incomplete_end_ticks, step_count)
+        return Interruption(kept_count, self.last_action, kept_count - 1 in incomplete_end_ticks, step_count)
 
     def has_ended_before_tick(self, tick: int) -> bool:
         """Return True if the recorded run ended before its tree was ticked in control step `tick`."""

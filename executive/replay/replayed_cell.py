@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -135,15 +133,6 @@ class ReplayedCell(CellWrapper):
         while self.inner.steps < interruption.kept_step_count:
             self.inner.advance()
         self.is_live = True
-
-    @contextmanager
-    def suppress_commands(self) -> Iterator[None]:
-        """Ignore commands and return the last recorded inputs in the `with` block."""
-        is_live, self.is_live = self.is_live, False
-        try:
-            yield
-        finally:
-            self.is_live = is_live
 
     def advance(self) -> None:
         """Execute one control step.

@@ -9,6 +9,7 @@ from pathlib import Path
 from executive.cell.protocols import Operator
 from executive.cell.workcell import CellOptions, ResumePoint, Workcell
 from executive.cells.without_hardware import CellWithoutHardware
+from executive.errors import InputError
 from executive.events import Observer, RequestGiven, RunStarted
 from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission
@@ -103,7 +104,8 @@ def assemble_resumed(
         has_ended: True if the recorded run has ended and is therefore only replayed.
 
     Raises:
-        InputError: The kind of the cell is not installed, or its world cannot be reconstructed.
+        InputError: The kind of the cell is not installed, its world cannot be reconstructed, or the log lacks
+            commands to arm or tool.
     """
     context = RunContext()
     control = RunControl()
@@ -111,9 +113,13 @@ def assemble_resumed(
     request_count = sum(isinstance(timed.event, RequestGiven) for timed in log.events)
     resume_point = ResumePoint(world_log, frame_count, pose_count)
     workcell = _build_workcell(loaded, options, context, control, resume_point, request_count)
-    interruption = log.make_final_interruption(
-        workcell.steps, workcell.last_command_step, is_complete=is_complete
-    )
+    # A killed run loses no command: before the cell executes a command, the journal contains an event of the
+    # same control step, which is `ToolCommanded` or `MotionPlanned`.
+    if workcell.last_command_step > log.last_tick:
+        workcell.close()
+        text = f"the journal ends in control step {log.last_tick}, and lacks later commands to arm or tool"
+        raise InputError(f"{text}; somebody changed it, or a disk lost its end; run the mission again")
+    interruption = log.make_final_interruption(workcell.steps, is_complete=is_complete)
     cell = ReplayedCell(workcell, log, None if has_ended else interruption)
     return _build_resumed_run(loaded, options, context, control, cell)
 

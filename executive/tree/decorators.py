@@ -146,7 +146,7 @@ class Timeout(ControlNode):
     def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
         """Yield the advice to increase the limit after a timeout."""
         if failure.child is None:
-            yield Advice(f"allow more than {self.seconds:g} s", "seconds")
+            yield Advice(f"allow more than {self.seconds:g} s")
 
     @property
     def counterpart(self) -> Counterpart | None:

@@ -107,12 +107,10 @@ class Advice:
 
     Attributes:
         text: Description of the change without the line number, which the diagnosis adds.
-        key: Key of the node that the author should change, or "".
         child: Child that the author should change; None for the node itself.
     """
 
     text: str
-    key: str = ""
     child: Child | None = None
 
 

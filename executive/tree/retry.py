@@ -160,7 +160,7 @@ class Retry(GeneratorNode):
         if failure.last_choice == _GIVE_UP:
             yield Advice(f"handle {failure.last_handled_name} in the recovery", child=self.recover)
         elif attempt == attempts and (not self.on or failure.matches(self.on)):
-            yield Advice(f"allow more than {attempts} attempt{'s' if attempts > 1 else ''}", "attempts")
+            yield Advice(f"allow more than {attempts} attempt{'s' if attempts > 1 else ''}")
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
         """Yield the key `recover` and the node at this key, if the node has a recovery."""

@@ -4,35 +4,21 @@ from __future__ import annotations
 
 import re
 import textwrap
-import unicodedata
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from rich.cells import cell_len
 
 _INVALID_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Pattern of the characters that XML 1.0 does not allow."""
-_WIDTH_BY_CHARACTER = {
-    **dict.fromkeys("ijlIJ',./:;\\| ", 0.36),
-    **dict.fromkeys("frt!()-[]", 0.42),
-    **dict.fromkeys('csz"*?_`', 0.54),
-    **dict.fromkeys("wDGHOQ#&+<=>^~MNU", 0.85),
-    **dict.fromkeys("mW%@", 1.0),
-}
-"""Width of characters in DejaVu Sans, the widest common sans-serif font [fraction of the font size]."""
-_DEFAULT_WIDTH, _EAST_ASIAN_WIDTH = 0.64, 1.05
-"""Widths of unlisted characters, and of wide East Asian characters [fraction of the font size]."""
+_CELL_WIDTH = 0.64
+"""Width of most characters in DejaVu Sans, the widest common sans-serif font [fraction of the font size]."""
 _BOLD_FACTOR = 1.12
 """Ratio of the widths of a bold and a regular character."""
 
 
 def estimate_text_width(text: str, font_size: float, *, bold: bool = False) -> float:
-    """Return an upper bound of the width [pixel] of a text in a sans-serif font of `font_size` [pixel]."""
-    widths = (
-        _EAST_ASIAN_WIDTH
-        if unicodedata.east_asian_width(character) in ("W", "F")
-        else _WIDTH_BY_CHARACTER.get(character, _DEFAULT_WIDTH)
-        for character in text
-    )
-    return sum(widths) * font_size * (_BOLD_FACTOR if bold else 1.0)
+    """Return the approximate width [pixel] of a text in a sans-serif font of `font_size` [pixel]."""
+    return cell_len(text) * _CELL_WIDTH * font_size * (_BOLD_FACTOR if bold else 1.0)
 
 
 def wrap_and_truncate(text: str, max_length: int, max_lines: int = 1) -> tuple[str, ...]:

@@ -26,8 +26,7 @@ from executive.record.atomic_file import replace_atomically
 from executive.record.journal import find_run_start, read_journal
 from executive.record.recorded_mission import read_cell
 from executive.record.run_directory import RunDirectory
-from executive.record.timeline.activation import get_skill_name
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Timeline, get_skill_name
 from executive.replay.input_log import InputLog
 
 FRAME_RATE = 10

@@ -30,7 +30,7 @@ from executive.campaign.results.sweep_summary import (
 from executive.errors import InputError
 from executive.events import ItemChanged, NodeEnded, NodeStarted, RunEnded, TargetSelected, TimedEvent
 from executive.record.result import Audit, ItemCounts, Result
-from executive.record.timeline.timeline import PlanningTotals, Timeline
+from executive.record.timeline import PlanningTotals, Timeline
 
 SETTINGS = SweepSettings(
     mission="sort.yaml", mission_name="sort", cell="cells/fruit.yaml", overrides={"attempts": "3"},

@@ -26,7 +26,7 @@ from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions
 from executive.run.run_control import RunControl
 from executive.run.signals import HALT_SIGNALS, halt_on_signals

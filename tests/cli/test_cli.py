@@ -21,7 +21,7 @@ from executive.errors import Fault, InputError
 from executive.mission.findings import Finding
 from executive.mission.flow_analysis import UnhandledFailure
 from executive.record.result import Audit, ItemCounts, Result
-from executive.record.timeline.timeline import PlanningTotals
+from executive.record.timeline import PlanningTotals
 from executive.run.assembly import RunOptions
 
 RESULT = Result(

@@ -9,13 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from ledger_bench import Bench
-from scipy.special import expit
 
 from executive.cell.detection import Detection, ErrorRates, Observation
 from executive.cell.objects import ObjectClass
 from executive.geometry import GRAVITY
 from executive.ledger.association import compute_association_distance
-from executive.ledger.belief import Belief, compute_probability
+from executive.ledger.belief import Belief
 from executive.ledger.bin_contents import update_bin_log_odds
 from executive.ledger.item import ItemRecord
 from executive.perception.evidence import compute_weight_log_ratios
@@ -43,15 +42,6 @@ def test_one_vote_of_a_good_detector_is_enough_for_a_class_and_three_of_a_bad_on
         other.add_detection("cube", BAD)
         doubts.append(other.class_error)
     assert doubts == [pytest.approx(0.1), pytest.approx(1 / 82), pytest.approx(1 / 730)]
-
-
-def test_votes_against_each_other_leave_nothing_certain() -> None:
-    mixed = belief()
-    for label in ("cube", "duck"):
-        mixed.add_detection(label, BAD)
-    assert mixed.label == "cube", "the first in the alphabet"
-    assert mixed.class_error == pytest.approx((1 + 1 / 9) / (2 + 1 / 9))
-    assert mixed.confusion_p_value == pytest.approx(0.19), "1 of 2 wrong at 10 %"
 
 
 def test_what_looks_say_of_existence_adds_up() -> None:
@@ -128,11 +118,6 @@ def test_the_gate_is_as_wide_as_the_measurements_scatter(spread: float, new: flo
     assert compute_association_distance(item, observation, 0.025) == pytest.approx(allowed)
 
 
-@given(st.floats(-1e4, 1e4))
-def test_a_probability_from_log_odds_is_the_logistic_function_to_the_last_bit(log_odds: float) -> None:
-    assert compute_probability(log_odds) == pytest.approx(float(expit(log_odds)), rel=0, abs=1e-300)
-
-
 STD = 0.05
 LIGHT = ObjectClass("cube", 0.05, 0.0354, mass=0.05, mass_std=0.0)
 HEAVY = ObjectClass("full_cube", 0.05, 0.0354, mass=0.20, mass_std=0.0, looks_like="cube")
@@ -182,14 +167,6 @@ def test_the_heavy_one_of_two_that_look_alike_is_found_out_and_the_class_stays_a
     assert belief.confusion_p_value == 1.0
 
 
-def test_a_class_that_looks_different_is_no_hypothesis() -> None:
-    belief = Belief("ball", 0.0)
-    belief.add_detection("ball", GOOD)
-    weigh(belief, 0.05 * GRAVITY)
-    assert belief.label == "ball"
-    assert belief.class_error > 0.99
-
-
 def test_looks_after_a_weighing_are_evidence_for_both_classes() -> None:
     belief = seen_belief()
     weigh(belief, 0.20 * GRAVITY)
@@ -225,14 +202,3 @@ def test_an_item_that_was_weighed_and_dropped_is_found_again_with_its_class() ->
         (target,) = bench.look(("cube", 0.55, 0.1))
     assert (target.item, target.label) == ("cube-1", "full_cube")
     assert bench.ledger.is_certain("cube-1")
-
-
-def test_a_second_weighing_with_the_same_error_leaves_the_class_as_uncertain() -> None:
-    near = {
-        "cube": LIGHT,
-        "full_cube": ObjectClass("full_cube", 0.05, 0.0354, mass=0.06, mass_std=0.0, looks_like="cube"),
-    }
-    bench = seen_bench(near)
-    answers = {bench.ledger.record_weight("cube-1", 0.058 * GRAVITY, STD) for _ in range(6)}
-    assert answers == {"it weighs 0.57 N; expected: cube 0.49 N or full_cube 0.59 N"}
-    assert set(bench.ledger.list_possible_labels("cube-1")) == {"cube", "full_cube"}

@@ -78,20 +78,6 @@ def test_what_was_given_up_is_found_in_its_bin_all_the_same(bench: Bench) -> Non
     assert bench.states() == {"cube-1": ("placed", "red_bin")}
 
 
-def test_given_up_and_found_on_the_table_it_stays_given_up_and_never_found_it_is_lost(bench: Bench) -> None:
-    other = Bench()
-    for one in (bench, other):
-        one.look(CUBE)
-        one.drop("cube-1")
-        one.ledger.reject("cube-1", "12 attempts failed")
-    assert bench.look(("cube", 0.55, 0.1)) == []
-    assert bench.states() == {"cube-1": ("rejected", "12 attempts failed")}
-    assert bench.ledger.list_items()[0].position == [0.55, 0.1, 0.025]
-    for _ in range(2):
-        other.look(view="full")
-    assert other.end() == {"cube-1": LOST}
-
-
 def test_a_dropped_item_is_recognized_where_it_lies(bench: Bench) -> None:
     bench.look(CUBE, ("cube", 0.6, 0.1))
     bench.drop("cube-1")
@@ -126,14 +112,3 @@ def test_a_dropped_item_is_placed_once_in_a_bin_of_its_class(
     changes = [event for event in bench.events if isinstance(event, ItemChanged)]
     assert [change.bin for change in changes if change.state == "placed"] == placed
     assert len(bench.ledger.records) == 1, "what lies in a bin is no item"
-
-
-def test_each_object_in_a_forbidden_bin_is_an_item(bench: Bench) -> None:
-    bench.look(("sphere", 0.5, 0.0))
-    bench.ledger.record_grasp("sphere-1")
-    bench.ledger.record_interruption()
-    bench.look(("sphere", 0.2, -0.44), ("sphere", 0.22, -0.39), view="full")
-    bench.ledger.record_bin_contents()
-    reason = "found in red_bin when the run was resumed"
-    assert [row.reason for row in bench.ledger.list_items()] == [reason, reason]
-    assert {state for state, _ in bench.end().values()} == {"rejected"}

@@ -84,20 +84,6 @@ def test_the_workspace_reaches_as_far_as_half_an_object_over_its_edge(
     assert coverage.is_in_workspace(np.array([*place, 0.03])) is inside
 
 
-def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_for(
-    coverage: Coverage,
-) -> None:
-    coverage.update(look())
-    coverage.reset_near(MIDDLE, math.inf, change_number=1)
-    # The workspace is in the middle columns; on the left the arm stays in the way from now on.
-    worst = []
-    for _ in range(8):
-        coverage.update(look(change_count=1, hidden=slice(0, 180)))
-        worst.append(coverage.max_object_probability)
-    assert worst[2] == PRIOR_OUTSIDE_WORKSPACE, "hidden on the left"
-    assert worst[4] <= 0.2**5 * 1.01
-
-
 @pytest.mark.parametrize(
     ("y", "counts"),
     [(0.0, True), (0.24, True), (0.33, True), (0.345, False), (0.40, False)],
@@ -106,11 +92,3 @@ def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_
 def test_a_place_counts_if_all_places_around_it_do(coverage: Coverage, y: float, counts: bool) -> None:
     coverage.update(look(hidden=slice(0, 174)))
     assert coverage.is_visible(np.array([0.53, y, 0.025])) is counts
-
-
-def test_a_place_beyond_the_table_or_near_something_unsure_does_not_count(coverage: Coverage) -> None:
-    coverage.update(look(), [MIDDLE])
-    assert not coverage.is_visible(np.array([0.53, 2.0, 0.025]))
-    assert coverage.find_miss_probability(np.array([0.53, 2.0, 0.025])) == PRIOR_OUTSIDE_WORKSPACE
-    missed = [coverage.find_miss_probability(np.add(MIDDLE, (x, 0, 0))) for x in (0.0, 0.04)]
-    assert missed == [1.0, pytest.approx(0.2)]

@@ -94,15 +94,6 @@ def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) ->
     assert bench.end() == {"cube-1": ("skipped", "the mission was completed without it")}
 
 
-def test_given_up_after_a_failed_grasp_it_stays_so(bench: Bench) -> None:
-    bench.look(THERE)
-    bench.ledger.record_failed_pick("cube-1")
-    for _ in range(MIN_UNCERTAIN_LOOKS_TO_REJECT):
-        bench.look(unsure=[THERE])
-    bench.look(THERE)
-    assert bench.states() == {"cube-1": UNSURE}
-
-
 def test_a_known_item_that_waits_its_turn_is_not_rejected_for_uncertain_looks(bench: Bench) -> None:
     for _ in range(3):
         bench.look(THERE, ("cube", 0.55, 0.0))
@@ -155,13 +146,6 @@ def test_an_item_whose_class_a_touch_can_prove_is_sure_enough_to_be_touched_afte
         bench.look(THERE, by=DOUBTFUL)
         sure.append(bench.ledger.is_certain("cube-1"))
     assert sure == [False, False, True]
-
-
-def test_another_detector_at_the_same_pose_is_second_evidence(bench):
-    bench.look(THERE, by=DOUBTFUL)
-    bench.look(THERE, by=DOUBTFUL, detector="other")
-    record = record_of(bench)
-    assert 1 / record.belief.class_error - 1 == pytest.approx(19**2)
 
 
 def test_an_item_that_was_moved_is_looked_at_as_if_for_the_first_time(bench):

@@ -103,20 +103,6 @@ def test_an_item_that_was_still_in_doubt_or_contradicted_is_not_skipped(bench: B
     assert {state for state, _ in bench.end().values()} == {"rejected"}
 
 
-def test_labels_that_the_cell_does_not_know_are_counted_by_the_look_with_most_of_them(bench: Bench) -> None:
-    bench.look(CUBE, unknown=("rubber-duck", "mug", "rubber-duck"))
-    bench.look(CUBE, unknown=("rubber-duck",))
-    assert bench.ledger.unknown_labels == {"rubber-duck": 2, "mug": 1}
-
-
-def test_a_rejection_after_a_contradiction_contains_it(bench: Bench) -> None:
-    bench.look(CUBE)
-    bench.ledger.record_touch("cube-1", "it was touched 60 mm above the table, and a cube is 50 mm high")
-    bench.ledger.reject("cube-1", "could not be picked")
-    ((_, why),) = bench.end().values()
-    assert why == "could not be picked: it was touched 60 mm above the table, and a cube is 50 mm high"
-
-
 def test_three_looks_that_contradict_the_class_of_an_item_reject_it(bench: Bench) -> None:
     for _ in range(3):
         assert bench.states().get("cube-1", ("seen", ""))[0] == "seen"
@@ -156,14 +142,6 @@ def test_an_item_that_is_given_up_in_the_tool_stays_there_until_it_is_released(b
     bench.ledger.record_placement("cube-1", "red_bin")
     (row,) = bench.ledger.list_items()
     assert (row.state, row.bin, row.reason) == ("placed", "red_bin", "")
-
-
-def test_an_item_that_is_given_up_in_the_tool_and_put_back_is_rejected(bench: Bench) -> None:
-    bench.look(CUBE)
-    bench.ledger.record_grasp("cube-1")
-    bench.ledger.reject("cube-1", "slippery")
-    bench.ledger.record_put_down("cube-1", np.array([0.5, 0.0, 0.025]))
-    assert bench.end() == {"cube-1": ("rejected", "slippery")}
 
 
 def test_the_tool_holds_one_item_at_a_time(bench: Bench) -> None:
@@ -247,15 +225,6 @@ def test_an_ignored_object_stands_on_the_table_as_long_as_looks_show_it(bench: B
         assert shown == [("cube", 0.0), ("", 0.0)], "neither at an item nor beside the workspace"
 
 
-def test_an_ignored_box_as_wide_as_the_table_is_no_object(bench: Bench) -> None:
-    bench.ledger.ignored_labels = ("dining table",)
-    shown = Bench()
-    shown.look(("dining table", 0.5, 0.0))
-    look, (seen,) = shown.last_look
-    bench.ledger.observe(look, [replace(seen, detection=replace(seen.detection, box=look.area))])
-    assert bench.ledger.find_objects_on_table() == []
-
-
 def test_what_is_put_down_stands_there_and_waits_for_a_look(bench: Bench) -> None:
     bench.look(CUBE)
     bench.ledger.record_grasp("cube-1")
@@ -309,17 +278,6 @@ def test_an_item_is_a_phantom_if_the_tool_found_only_the_table_there_three_times
     assert bench.end()["cube-1"] == final
 
 
-def test_a_phantom_that_the_tool_tried_to_pick_may_turn_up_elsewhere(bench: Bench) -> None:
-    bench.look(CUBE)
-    bench.ledger.record_failed_pick("cube-1")
-    for _ in range(4):
-        bench.look()
-    assert bench.states() == {"cube-1": PHANTOM}
-    for _ in range(2):
-        bench.look(("cube", 0.55, 0.05))
-    assert (bench.states()["cube-1"], bench.ledger.describe("cube-1").attempts) == (("seen", ""), 1)
-
-
 def put_away(bench: Bench, *still_there: Thing) -> None:
     """Look until the items that are not still there count as gone, and at what is still there."""
     for _ in range(4):
@@ -348,14 +306,6 @@ def test_an_item_that_appeared_while_the_tool_held_another_does_not_explain_its_
     bench.place("cube-2")
     put_away(bench)
     assert bench.end()["cube-1"] == LOST
-
-
-def test_an_item_that_appeared_explains_one_lost_item_only(bench: Bench) -> None:
-    for _ in range(2):
-        bench.look(CUBE, FAR, view="full")
-    put_away(bench)
-    put_away(bench, ("cube", 0.45, -0.2))
-    assert list(bench.end().values()) == [("phantom", "it is cube-3"), LOST, LEFT]
 
 
 def test_an_item_first_seen_where_nobody_had_looked_explains_no_lost_item(bench: Bench) -> None:
@@ -398,9 +348,3 @@ def test_every_change_is_reported(bench: Bench) -> None:
     seen = DetectedObject("cube", 0.9, [0.0, 0.0, 1.0, 1.0], [0.5, 0.0, 0.025], "")
     looks = [event for event in bench.events if isinstance(event, FrameSearched)]
     assert looks[-1] == FrameSearched(2, "camera", "eye", "full", [seen], [], [])
-
-
-def test_an_item_nobody_entered_is_a_fault(bench: Bench) -> None:
-    bench.look(CUBE)
-    with pytest.raises(Fault, match='no item "cube-9"; it knows: cube-1'):
-        bench.ledger.record_grasp("cube-9")

@@ -56,12 +56,6 @@ def test_no_number_of_misses_from_one_viewpoint_proves_that_an_item_is_gone_that
     assert placed.states() == {"cube-1": ("placed", "red_bin")}
 
 
-def test_a_detection_between_two_misses_refutes_the_first_one(placed: Bench) -> None:
-    assert placed.verify("cube-1") == "unsure"
-    assert placed.verify("cube-1", SLOT_1) == "present"
-    assert placed.verify("cube-1") == "unsure"
-
-
 def test_an_item_that_is_gone_is_open_and_not_placed(gone: Bench) -> None:
     assert gone.states() == {"cube-1": ("dropped", "")}
     assert gone.ledger.describe("cube-1").state == "lost"
@@ -83,16 +77,6 @@ def test_an_object_at_a_place_that_no_look_searched_before_is_another_item(place
     for _ in range(2):
         placed.look(("cube", 0.5, 0.36), view="full")
     assert placed.states() == {"cube-1": ("dropped", ""), "cube-2": ("seen", "")}
-
-
-def test_an_item_that_was_sorted_again_under_another_name_counts_once(placed: Bench) -> None:
-    placed.look(view="full")
-    for _ in range(3):
-        placed.look(ELSEWHERE)
-    placed.place("cube-2")
-    answers = [placed.verify("cube-1", SLOT_2) for _ in range(2)]
-    assert (answers, placed.verify("cube-2", SLOT_2)) == (["unsure", "gone"], "present")
-    assert placed.end() == {"cube-1": ("phantom", "it is cube-2"), "cube-2": ("placed", "red_bin")}
 
 
 def test_a_doubtful_detection_of_its_class_at_its_slot_shows_the_item(placed: Bench) -> None:
@@ -122,17 +106,6 @@ def test_an_item_on_the_table_is_there_unsure_or_gone(bench: Bench) -> None:
     assert bench.verify("cube-1", CUBE) == "present"
     assert [bench.verify("cube-1") for _ in range(2)] == ["unsure", "gone"]
     assert bench.states() == {"cube-1": ("dropped", "")}
-
-
-def test_a_rejected_item_stays_rejected_after_it_was_gone(bench: Bench) -> None:
-    for _ in range(3):
-        bench.look(CUBE, view="full")
-    bench.ledger.reject("cube-1", "no")
-    for _ in range(2):
-        bench.verify("cube-1")
-    for _ in range(2):
-        bench.look(ELSEWHERE)
-    assert bench.states()["cube-1"] == ("rejected", "no")
 
 
 def test_what_no_look_can_show_is_hidden(placed: Bench) -> None:

@@ -12,7 +12,7 @@ from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.record.diagnosis.diagnose import diagnose
 from executive.record.diagnosis.diagnosis import Diagnosis
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 
 HEAD = """\

@@ -7,7 +7,6 @@ import re
 import pytest
 from failed_runs import PICK, FailedRun
 
-from executive.events import OperatorAsked
 from executive.plugins import load_skills
 
 CUBE = [("cube", 0.5, 0.1)]
@@ -62,19 +61,6 @@ def test_every_control_node_says_why_it_did_not_stop_a_failure(tree: str, expect
     assert [f"{link.name}: {link.explanation}" for link in chain if link.explanation] == [expected]
 
 
-def test_a_recovery_that_failed_in_an_earlier_round_explains_nothing() -> None:
-    run = FailedRun(
-        "  repeat:\n    times: 2\n    do:\n      try:\n        retry:\n          attempts: 2\n"
-        "          on: [IsHolding.empty]\n          recover: {invert: succeed}\n"
-        "          do: [MoveToScan, Detect, IsHolding]\n"
-        "      catch: [{on: [IsHolding.empty], do: succeed}]\n",
-        objects=CUBE,
-    )
-    run.fake.detector.make_answer = lambda look, true: "gone" if look == 2 else true
-    story = run.tell()
-    assert story.passed_nodes[2].explanation == "runs again only after IsHolding.empty"
-
-
 def test_an_undeclared_reason_is_reported_at_the_line_of_its_skill() -> None:
     run = FailedRun(PICK, objects=CUBE)
 
@@ -109,25 +95,3 @@ def test_a_fault_says_where_it_was_raised_and_what_is_known_of_the_arm(at_rest, 
     assert story.advice[0].startswith(first)
     assert re.fullmatch(r"record/test_diagnosis\.py:\d+, in broken", story.raised_at)
     assert story.node.path == "tree/5:retry/do/Grasp"
-
-
-def test_what_was_let_go_as_the_run_ended_is_to_be_looked_for() -> None:
-    run = FailedRun("sort_overhead", objects=CUBE)
-
-    def let_go_and_stop() -> None:
-        if run.fake.world.held_object and run.height > 0.1:
-            run.fake.tool.break_seal()
-            run.run.control.stop()
-
-    run.at_every_step(let_go_and_stop)
-    story = run.tell()
-    said = ["find cube-1 in the cell: the tool released it at the end of the run"]
-    assert (story.held_item, story.unsorted_items, story.advice) == ("", ["cube-1"], said)
-
-
-def test_a_halt_at_a_question_says_so() -> None:
-    run = FailedRun("pick_on_request", requests=None)
-    run.run.add_observer(
-        lambda timed: run.run.control.stop() if isinstance(timed.event, OperatorAsked) else None
-    )
-    assert run.tell().verdict == "halted by the user while the operator was asked"

@@ -19,13 +19,12 @@ from events import (
     run_started,
     skill_ended,
 )
-from jsonschema import Draft7Validator
 
 from executive import events as kinds
 from executive.errors import Fault, InputError, RecordLost
 from executive.events import InputRead, NodeEnded, NodeStarted, RunResumed, TargetSelected, ToolCommanded
 from executive.record import journal_format
-from executive.record.journal import Journal, find_run_end, find_run_start, read_journal
+from executive.record.journal import Journal, find_run_end, read_journal
 from executive.record.journal_format import EVENT_CLASSES, encode_event, make_journal_schema
 from executive.record.recorder import Trace
 
@@ -132,24 +131,13 @@ def test_an_answer_that_cannot_be_replayed_is_refused(path, name, value):
         read_journal(path)
 
 
-def test_a_line_the_disk_takes_in_parts_is_whole(path, monkeypatch):
-    take = os.write
-    monkeypatch.setattr(os, "write", lambda file, line: take(file, line[:5]))
-    write(path, at(0, run_started()), at(1, END))
-    assert find_run_end(read_journal(path)) == END
-
-
 LAST = encode_event(at(2, NodeStarted("ä")))[:-1]
 ENDS = {
-    b"": 0,
     FIRST: 1,
     FIRST + LAST: 2,
     FIRST + LAST + b"\n": 2,
     FIRST + LAST + b"\0\0\0": 2,
-    FIRST + LAST + b"\n\0\0\0": 2,
-    FIRST + b"\0": 1,
     b"\0" * 5000: 0,
-    FIRST + LAST[:1]: 1,
     FIRST + LAST[:-1]: 1,
     FIRST + LAST[:9] + b"\0" * 9: 1,
     LAST[:5]: 0,
@@ -196,16 +184,12 @@ HALTED = '{"kind": "RunHalted", "tick": 1, "clock": 0.1, "is_tree_ticked": true}
     [
         (b'{"tick"', "EOF while parsing"),
         (b"[1]", "it contains no JSON object"),
-        (b"[" * 100_000, "recursion limit exceeded"),
         (HALTED.replace("RunHalted", "status").encode(), "allowed are BranchChosen"),
         (HALTED.replace("is_tree", "is_pine").encode(), '"is_tree_ticked" of RunHalted'),
-        (HALTED.replace("true", "1").encode(), '"is_tree_ticked" of RunHalted'),
         (HALTED.replace('"tick": 1', '"tick": 1.0').encode(), '"tick" is 1.0'),
-        (HALTED.replace('"tick": 1', '"tick": true').encode(), '"tick" is True'),
         (HALTED.replace('"tick": 1', '"tick": 1000000001').encode(), '"tick" is 1000000001'),
         (HALTED.replace("0.1", '"0"').encode(), "\"clock\" is '0'"),
         (HALTED.replace("0.1", "-0.1").encode(), '"clock" is -0.1'),
-        (HALTED.replace("0.1", "NaN").encode(), "expected value"),
         (HALTED.replace("0.1", "3.0").encode(), '"tick" 1 and "clock" 3.0 contradict'),
         (encode_event(at(1, read("clock", "now"))), "the clock is 'now'"),
         (encode_event(at(1, skill_ended("a"))).replace(b"SUCC", b"ODDN"), '"status" of NodeEnded'),
@@ -252,32 +236,10 @@ def test_every_kind_of_event_comes_back_as_it_was(path):
     assert {type(event).__name__ for event in events} == EVENT_CLASSES.keys()
 
 
-def test_a_text_that_is_not_unicode_is_kept_readable(path):
-    write(path, at(0, run_started(file="caf\udce9.yaml")))
-    assert find_run_start(read_journal(path), path, "").file == "caf?.yaml"
-
-
-@pytest.mark.parametrize("value", [float("nan"), {"a": [float("inf")]}, object(), b"", {1, 2}, {(1,): 2}])
-def test_a_value_that_is_not_json_is_a_fault_and_the_journal_goes_on(path, value):
-    with closing(Journal(path)) as journal:
-        journal(at(0, run_started()))
-        with pytest.raises(Fault, match="JSON cannot represent an event of kind InputRead: "):
-            journal(at(0, read("arm.q", value)))
-        journal(at(1, END))
-    assert find_run_end(read_journal(path)) == END
-
-
 def test_the_schema_that_ships_describes_the_events():
     shipped = Path(journal_format.__file__).with_name("journal.schema.json")
     made = "executive schema --journal > executive/record/journal.schema.json"
     assert json.loads(shipped.read_text(encoding="utf-8")) == make_journal_schema(), f"run: {made}"
-
-
-def test_every_line_of_a_journal_fits_the_schema(path):
-    write(path, at(0, run_started()), at(1, NODE), at(2, frame_searched(detected("cube"))), at(3, END))
-    validator = Draft7Validator(make_journal_schema())
-    for line in path.read_text().splitlines():
-        validator.validate(json.loads(line))
 
 
 FAILED = NodeEnded("sort/Grasp", "FAILURE", "Grasp", "cube-1", "missed", "no seal")
@@ -313,8 +275,3 @@ def digest(*events):
 def test_one_line_of_compact_json_is_hashed_per_decision():
     lines = [json.dumps(line, sort_keys=True, separators=(",", ":")) + "\n" for line in HASHED]
     assert digest(*EVENTS) == hashlib.sha256("".join(lines).encode()).hexdigest()[:16]
-
-
-@pytest.mark.parametrize("event", [run_started(), frame_searched(), ToolCommanded("open"), run_ended()])
-def test_events_that_decide_nothing_do_not_count(event):
-    assert digest(at(3, event)) == digest()

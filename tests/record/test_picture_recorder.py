@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from itertools import chain
 from pathlib import Path
@@ -172,37 +171,11 @@ def test_old_looks_are_forgotten_except_that_of_the_last_selection(tmp_path):
     assert (tmp_path / "b" / "000090_cube-1_missed.jpg").exists()
 
 
-def test_a_long_run_keeps_its_first_pictures_and_reports_the_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "MAX_PICTURES", 3)
-    recorder = record(tmp_path, look(1, CUBE), *(select(tick=tick) for tick in range(5)))
-    assert len(list(tmp_path.glob("00000[0-2]_cube-1.jpg"))) == len(list(tmp_path.iterdir())) == 3
-    assert "3 pictures are drawn" in recorder.problem
-
-
 def test_pictures_that_cannot_be_written_are_reported_and_the_run_continues(tmp_path):
     (tmp_path / "frames").write_text("a file, no folder")
     recorder = record(tmp_path / "frames", look(1, CUBE), select())
     assert recorder.problem.startswith("not every picture was drawn")
     assert str(tmp_path / "frames") in recorder.problem
-
-
-def test_without_waiting_queued_pictures_are_not_drawn(tmp_path, monkeypatch):
-    started, may_finish = threading.Event(), threading.Event()
-
-    def wait(picture: PictureContent) -> np.ndarray:
-        started.set()
-        may_finish.wait()
-        return np.zeros((8, 8, 3), np.uint8)
-
-    monkeypatch.setattr(module, "draw_picture", wait)
-    recorder = PictureRecorder(tmp_path)
-    for event in (*look(1, CUBE), *select(tick=1), *select(tick=2)):
-        recorder(event)
-    started.wait()
-    recorder.close(wait=False)
-    may_finish.set()
-    recorder.close()
-    assert [file.name for file in tmp_path.iterdir()] == ["000001_cube-1.jpg"]
 
 
 @pytest.mark.parametrize(

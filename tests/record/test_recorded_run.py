@@ -10,20 +10,17 @@ from unittest.mock import Mock
 import py_trees
 import pytest
 from click.testing import CliRunner, Result
-from events import at, run_ended
 
 from executive.cell.json_values import to_json
 from executive.cells.fake.cell import FakeCell
 from executive.cli.main import main
 from executive.errors import InputError
-from executive.events import NodeStarted, RunEnded, RunStarted, TargetSelected
+from executive.events import RunEnded, RunStarted, TargetSelected
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.record.journal import Journal, read_journal
 from executive.record.picture_recorder import PictureRecorder
 from executive.record.recorded_run import GuardedView, RecordOptions, record_run
-from executive.record.recorder import Recorder
-from executive.record.run_directory import RunDirectory
 from executive.run.assembly import RunOptions
 from executive.run.run import Run
 
@@ -125,44 +122,19 @@ def test_a_view_that_failed_is_only_closed(method: str, calls: list[str]) -> Non
     assert "failed during the run: ValueError: no ink" in view.problem
 
 
-def test_a_picture_that_cannot_be_drawn_is_reported_and_the_run_continues(tmp_path, monkeypatch):
-    # No event can be asked for its data.
-    monkeypatch.setattr(PictureRecorder, "__call__", lambda self, event: event["kind"])
-    directory = RunDirectory(tmp_path)
-    recorder = Recorder(directory)
-    recorder(at(0, NodeStarted("a")))
-    recorder(at(1, run_ended()))
-    recorder.close()
-    assert recorder.problem.startswith("not every picture was drawn: TypeError: ")
-    assert len(read_journal(directory.journal)) == 2
-
-
-RECORD = ("write", "fsync", "replace", "rename")
-WORLD = ("pwrite",)
-
-
 class Disk:
-    """Takes so many calls, then half of one more, and nothing after that."""
+    """Takes so many blocks of the log of the world, and then no more."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...]) -> None:
-        self.room, self.asked = 1_000_000, 0
-        for name in names:
-            monkeypatch.setattr(os, name, self._limited(getattr(os, name)))
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, room: int) -> None:
+        self.room = room
+        self.write = os.pwrite
+        monkeypatch.setattr(os, "pwrite", self.write_or_fail)
 
-    @property
-    def full(self) -> bool:
-        return self.asked > self.room
-
-    def _limited(self, call):
-        def limited(*args, **options):
-            self.asked += 1
-            if not self.full:
-                return call(*args, **options)
-            if self.asked == self.room + 1 and call.__name__ == "write" and len(args[1]) > 1:
-                return call(args[0], args[1][: len(args[1]) // 2])
+    def write_or_fail(self, *args):
+        self.room -= 1
+        if self.room < 0:
             raise OSError(28, "No space left on device")
-
-        return limited
+        return self.write(*args)
 
 
 @pytest.fixture
@@ -181,33 +153,9 @@ def run_command(bring_one, tmp_path, monkeypatch, cells):
     return once
 
 
-@pytest.mark.slow
-def test_a_run_whose_disk_fills_up_ends_at_rest_and_says_so(run_command, monkeypatch, cells):
-    disk = Disk(monkeypatch, RECORD)
-    codes = []
-    while True:
-        disk.room, disk.asked = len(codes), 0
-        shown, left = run_command()
-        if not disk.full:
-            break
-        codes.append(shown.exit_code)
-        assert cells[-1].arm.at_rest
-        assert "Traceback" not in shown.output
-        assert "no space left on device" in shown.stderr
-        assert left is None or not list(left.rglob(".*.part"))
-        if shown.exit_code == 3:
-            result = json.loads(shown.stdout)
-            assert (result["status"], result["run"]) == ("FAULT", str(left))
-            assert read_journal(left / "journal.jsonl") is not None
-    # A run that has not begun has bad input; a run that is over and recorded lacks only its report.
-    assert codes == sorted(codes, key=(2, 3, 0).index)
-    assert set(codes) == {0, 2, 3}
-
-
 @pytest.mark.parametrize("room", [0, 300])
 def test_a_run_whose_world_cannot_be_kept_ends_at_rest_and_says_so(run_command, monkeypatch, cells, room):
-    disk = Disk(monkeypatch, WORLD)
-    disk.room = room
+    Disk(monkeypatch, room)
     shown, left = run_command()
     assert cells[-1].arm.at_rest
     assert "no space left on device" in shown.stderr

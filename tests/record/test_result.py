@@ -13,12 +13,10 @@ from executive.record.result import (
     ItemCounts,
     Result,
     find_exit_code,
-    list_requests,
     read_result,
     write_result,
 )
 from executive.record.run_directory import RunDirectory
-from executive.record.timeline.timeline import Timeline
 
 ITEMS = ItemCounts(seen=3, placed=2, rejected=1, phantom=1)
 AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "fell_in_wrong_bin": 0, "unseen": 0}
@@ -30,14 +28,6 @@ def result(audit=AUDIT, status="SUCCESS", empty=True) -> Result:
         items=ITEMS,
         audit=None if audit is None else Audit.from_counts(asdict(ITEMS), audit, empty), ticks=240, run="r",
     )  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("wanted", "words"),
-    [([None], ["quit"]), (["cube", None, "duck", None, None], ["cube", "quit", "duck"])],
-)
-def test_the_end_of_the_list_is_a_wish_to_quit_and_goes_without_saying(wanted, words):
-    assert list_requests(Timeline(requests=wanted)) == words
 
 
 def test_is_written_and_can_be_read_again(tmp_path):

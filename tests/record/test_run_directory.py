@@ -50,20 +50,6 @@ def test_what_repeats_a_run_is_on_the_disk_and_libraries_lie_where_the_mission_l
     assert not directory.result.exists()
 
 
-@pytest.mark.parametrize("room", range(2))
-def test_a_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch, full_disk, room):
-    texts = dict.fromkeys(("mission.yaml", "cell.yaml"), "text")
-    create(tmp_path).save_inputs(texts, {})
-    before = (tmp_path / "latest").resolve()
-    directory = create(tmp_path)
-    left = iter(range(room))
-    monkeypatch.setattr(os, "fsync", lambda file: None if next(left, None) is not None else full_disk())
-    with pytest.raises(InputError, match="no space left on device"):
-        directory.save_inputs(texts, {})
-    assert [path.name for path in directory.path.iterdir()] == list(texts)[:room]
-    assert (tmp_path / "latest").resolve() == before
-
-
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
 def test_what_was_there_before_stays_where_the_writing_stops(tmp_path, monkeypatch, error):
     def fails(*args):

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from events import at, detected, frame_searched, item_changed, read, run_started, skill_ended, skill_started
+from events import at, detected, frame_searched, item_changed, run_started, skill_ended, skill_started
 from failed_runs import PICK, FailedRun
 
 from executive.cell.frame import FrameCaptured
@@ -23,12 +23,13 @@ from executive.events import (
     TargetSelected,
 )
 from executive.record.journal import Journal, read_journal
-from executive.record.timeline.activation import (
+from executive.record.timeline import (
+    PlanningTotals,
+    Timeline,
     find_last_failure,
     format_counts,
     group_by_node,
 )
-from executive.record.timeline.timeline import PlanningTotals, Timeline
 
 
 def folded(*events: Event, history: bool = True) -> Timeline:
@@ -91,14 +92,6 @@ def test_the_ends_of_a_node_are_counted_and_its_last_failure_is_found() -> None:
     assert timeline.end_counts == {"tree/Grasp": {"FAILURE": 2, "INVALID": 1, "SUCCESS": 1}}
 
 
-def test_an_activation_is_current_until_an_ancestor_starts_again() -> None:
-    timeline = folded(NodeStarted("tree"), skill_started("tree/do/Grasp"), skill_ended("tree/do/Grasp"))
-    assert timeline.find_current_activation("tree/do/Grasp") == timeline.activation_by_path["tree/do/Grasp"]
-    timeline(at(960, NodeStarted("tree")))
-    assert timeline.find_current_activation("tree/do/Grasp") is None
-    assert timeline.find_current_activation("tree") == timeline.activation_by_path["tree"]
-
-
 def test_the_failures_that_a_control_node_handled_are_counted_with_their_last_message() -> None:
     timeline = folded(
         NodeStarted("tree/retry"), BranchChosen("tree/retry", "attempt 2 of 3", "Grasp.missed", "no seal"),
@@ -120,16 +113,6 @@ def test_a_control_node_knows_the_skills_that_it_halted() -> None:
     assert (timeline.activation_by_path["tree"].halted_skills, timeline.halted_skills) == (("tree/Wait",), ())
 
 
-def test_a_failed_skill_has_the_answers_of_the_cell_until_then_without_lists() -> None:
-    timeline = folded(
-        read("arm.met", None), read("arm.q", [0.0] * 7), skill_started("tree/Approach", "cube-1"),
-        read("arm.met", "a wrench"), skill_ended("tree/Approach", "FAILURE", "cube-1", reason="blocked"),
-        read("tool.holding", True),
-    )  # fmt: skip
-    readings = timeline.activation_by_path["tree/Approach"].readings
-    assert [(each.name, each.value, each.clock) for each in readings] == [("arm.met", "a wrench", 3)]
-
-
 def test_an_item_has_its_last_sighting_and_failure_and_the_number_of_looks_since_then() -> None:
     far, near = detected("cube", position=[0.9, 0.0, 0.0]), detected("cube", confidence=0.8)
     timeline = folded(
@@ -143,12 +126,6 @@ def test_an_item_has_its_last_sighting_and_failure_and_the_number_of_looks_since
     assert (timeline.items.look.frame, timeline.items.look.found) == (9, 1)
     assert list(timeline.items.classes) == ["cube", "ball"]
     assert item.failure == timeline.activation_by_path["tree/Grasp"]
-
-
-def test_an_item_has_the_times_at_which_the_tool_got_and_lost_it() -> None:
-    states = ("seen", "held", "held", "dropped")
-    item = folded(*(item_changed("cube-1", state) for state in states)).items.by_name["cube-1"]
-    assert (item.pick_time, item.drop_time) == (1.0, 3.0)
 
 
 def test_the_accounts_after_the_end_of_the_tree_leave_the_final_states_as_they_were() -> None:

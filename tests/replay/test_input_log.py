@@ -6,7 +6,7 @@ import pytest
 from events import at, read, run_ended, run_started
 
 from executive.events import RunHalted, RunResumed, TimedEvent, ToolCommanded
-from executive.replay.input_log import InputLog, Interruption
+from executive.replay.input_log import InputLog
 
 
 def sense(tick: int, value: object, name: str = "tool.holding", nth: int = 1) -> TimedEvent:
@@ -22,13 +22,6 @@ START = at(0, run_started())
 
 def values(log: InputLog) -> list[object]:
     return [one.reading.value for one in log.inputs["tool.holding"]]
-
-
-def test_answers_are_in_order_by_the_name_of_the_input() -> None:
-    log = InputLog([START, sense(0, False), sense(0, "arm", name="arm.met"), sense(7, True, nth=2)])
-    found = [(one.tick, one.reading.read_number, one.reading.value) for one in log.inputs["tool.holding"]]
-    assert found == [(0, 1, False), (7, 2, True)]
-    assert (len(log.inputs["arm.met"]), log.control_period) == (1, 1 / 240)
 
 
 def test_an_incomplete_control_step_is_void_once_the_run_was_resumed() -> None:
@@ -62,32 +55,9 @@ def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
     assert InputLog([START, sense(8, 1)]).make_final_interruption(steps).kept_step_count == complete
 
 
-@pytest.mark.parametrize(
-    ("last_command", "is_complete", "complete", "action"),
-    [
-        (8, True, 9, "open"),
-        (9, True, 9, "unknown"),
-        (7, False, 8, "open"),
-        (8, False, 8, "unknown"),
-    ],
-)
-def test_a_world_that_did_more_than_the_journal_knows(
-    last_command: int, is_complete: bool, complete: int, action: str
-) -> None:
+def test_a_kill_within_a_control_step_discards_the_step_but_no_action() -> None:
     log = InputLog([START, at(8, ToolCommanded("open"))])
-    interruption = log.make_final_interruption(20, last_command, is_complete=is_complete)
-    assert (interruption.kept_step_count, interruption.last_action) == (complete, action)
-
-
-def test_actions_stay_unknown_if_the_resumption_was_interrupted_at_once() -> None:
-    log = InputLog([START, sense(5, 1), resume(9, 6, "unknown"), sense(9, 2)])
-    interruption = log.make_final_interruption(9, 8)
-    assert (interruption.kept_step_count, interruption.last_action) == (6, "unknown")
-
-
-def test_a_kill_within_a_control_step_loses_no_action() -> None:
-    log = InputLog([START, at(8, ToolCommanded("open"))])
-    interruption = log.make_final_interruption(8, 8, is_complete=False)
+    interruption = log.make_final_interruption(8, is_complete=False)
     assert (interruption.kept_step_count, interruption.last_action) == (8, "open")
 
 
@@ -98,10 +68,3 @@ def test_a_resumption_that_was_interrupted_at_once_is_repeated_from_its_beginnin
     log = InputLog([START, sense(5, 1), resume(9, 6, "close"), sense(9, 2)])
     interruption = log.make_final_interruption(steps)
     assert (interruption.kept_step_count, interruption.resume_tick) == (complete, steps)
-
-
-def test_a_run_that_ended_as_incomplete_is_reopened() -> None:
-    log = InputLog([START, sense(8, 1), at(9, run_ended("INCOMPLETE"))])
-    assert log.make_final_interruption(9) == Interruption(10, "", True, 10)
-    log = InputLog([*log.events, resume(10, 10), sense(11, 2)])
-    assert log.interruptions[10].restarts_tree

@@ -22,7 +22,7 @@ from executive.replay.recording_cell import (
     InputRecorder,
     make_recording_cell,
 )
-from executive.replay.replayed_cell import InputNotRecorded, InputReplayer
+from executive.replay.replayed_cell import InputReplayer
 
 
 def test_every_member_of_a_part_is_a_question_or_a_command() -> None:
@@ -92,13 +92,6 @@ def test_an_exception_of_the_cell_is_raised_again(error: Exception) -> None:
     with pytest.raises(Exception) as raised:
         recording.replayer().read("plan")
     assert (type(raised.value).__name__, raised.value.args[0]) == (type(error).__name__, str(error))
-
-
-def test_a_question_that_was_never_asked_has_no_answer() -> None:
-    replayer = Recording().replayer()
-    with pytest.raises(InputNotRecorded, match="in step 0, but the journal") as raised:
-        replayer.read("arm.q")
-    assert replayer.missing_input_message == str(raised.value)
 
 
 def test_only_answers_unlike_the_one_before_are_recorded() -> None:

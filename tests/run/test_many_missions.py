@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
 import multiprocessing
-import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -51,18 +49,6 @@ def test_one_after_another_each_goes_as_if_alone() -> None:
     assert len({story[2] for story in alone}) == len(RUNS)
     assert [story_of(*run) for run in RUNS] == alone
     assert (Blackboard.storage, Blackboard.metadata, Blackboard.clients) == ({}, {}, {})
-
-
-def test_one_after_another_they_leave_less_than_a_block_of_memory_each() -> None:
-    def blocks_after(runs: int) -> int:
-        for number in range(runs):
-            story_of(*RUNS[number % len(RUNS)])
-        gc.collect()
-        return sys.getallocatedblocks()
-
-    # After so many runs every cache is filled, numpy's too.
-    before = blocks_after(240)
-    assert blocks_after(100) - before < 100
 
 
 def test_a_simulated_run_repeats_itself() -> None:

@@ -5,11 +5,9 @@ import signal
 from pathlib import Path
 from typing import Any
 
-import pytest
 from py_trees.common import Status
 
 from executive.cells.fake.cell import FakeCell
-from executive.errors import InputError
 from executive.events import Event, RequestGiven, RunEnded, TimedEvent, ToolCommanded
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
@@ -90,14 +88,6 @@ def test_requests_are_served_in_order_and_the_rest_is_left(missions: Path) -> No
     requests = [one.event.request for one in events if isinstance(one.event, RequestGiven)]
     assert requests == ["cube", "rescan", "cube", None]
     assert (items["placed"], items["skipped"]) == (2, 1) == (audit["right"], audit["left"])
-
-
-def test_an_unknown_kind_of_cell_names_the_installed_ones(missions: Path) -> None:
-    loaded = load_mission(missions / "sort_overhead.yaml", load_skills(), {"cell.kind": "hardware"})
-    with pytest.raises(
-        InputError, match='no installed package offers cells of kind "hardware"; installed: fake, sim'
-    ):
-        assemble(loaded, RunOptions(1))
 
 
 def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(missions: Path) -> None:

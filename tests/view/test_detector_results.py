@@ -58,11 +58,3 @@ def test_rates_classes_confusions_and_answering_detectors_are_printed(printed):
     assert not any("unavailable" in line or "answered" in line for line in lines)
     other = replace(MEASURED, answered_by={"server": 290, "embedded": 10})
     assert "answered by server (290), embedded (10)" in printed(other)
-
-
-def test_a_detector_that_never_answered_has_nothing_but_its_excuse(printed):
-    silent = Evaluation(
-        threshold=0.5, images=4, objects=0, precision=0, recall=0, map50=0, map50_95=0,
-        unavailable=4, why="the server is gone",
-    )  # fmt: skip
-    assert printed(silent)[-1] == "unavailable for 4 of 4 images (100.0%), last reason: the server is gone"

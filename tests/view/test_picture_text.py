@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.view.text import estimate_text_width, replace_invalid_xml_characters, wrap_and_truncate
+from executive.view.text import replace_invalid_xml_characters, wrap_and_truncate
 
 
 @pytest.mark.parametrize(
@@ -20,15 +20,6 @@ from executive.view.text import estimate_text_width, replace_invalid_xml_charact
 )
 def test_text_is_cut_behind_a_comma_where_it_can_be(text, rows):
     assert wrap_and_truncate(text, 11, 2) == rows
-
-
-def test_long_text_gets_a_longer_box():
-    assert (
-        estimate_text_width("SelectTarget", 13)
-        < estimate_text_width("SelectTarget", 13, bold=True)
-        < estimate_text_width("SelectTargets", 13, bold=True)
-    )
-    assert estimate_text_width("日本", 10) > estimate_text_width("ab", 10)
 
 
 def test_what_xml_cannot_hold_is_replaced():

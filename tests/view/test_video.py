@@ -18,7 +18,6 @@ from executive.cli.main import main
 from executive.cli.options import check_video
 from executive.errors import InputError
 from executive.record.journal import read_journal
-from executive.view.video import write_video
 
 MISSION = """
 mission: look
@@ -86,19 +85,6 @@ def test_an_interrupted_run_has_an_mp4_with_the_same_pictures(run: Path, tmp_pat
     assert (frames[-1][504:] > 128).any()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "problem"), [("world.log", "cannot read the log"), ("journal.jsonl", "start")]
-)
-def test_a_record_that_lacks_a_part_has_no_video(run: Path, tmp_path: Path, name: str, problem: str) -> None:
-    copy = Path(shutil.copytree(run, tmp_path / "copy"))
-    (copy / name).unlink()
-    (copy / "journal.jsonl").touch()
-    with pytest.raises(InputError, match=problem):
-        write_video(copy, tmp_path / "a.gif")
-    assert not list(tmp_path.glob("*a.gif*"))
-
-
 @pytest.mark.parametrize(
     ("cell_kind", "file", "problem"),
     [
@@ -113,13 +99,3 @@ def test_a_video_that_cannot_be_written_is_refused(tmp_path: Path, cell_kind, fi
     with pytest.raises(InputError, match=problem):
         check_video(tmp_path / file, cell_kind, force=False)
     check_video(tmp_path / "exists.gif", "sim", force=True)
-
-
-def test_a_refused_video_stops_the_command_before_the_run_and_the_replay(tmp_path: Path) -> None:
-    runs, video = ("--runs", tmp_path / "runs"), ("--video", tmp_path / "a.mp4")
-    refused = invoke("run", "sort_fruit", *runs, *video)
-    assert (refused.exit_code, "`kind: fake`" in refused.stderr) == (2, True)
-    assert not (tmp_path / "runs").exists()
-    assert invoke("run", "sort_fruit", "--quiet", *runs).exit_code == 0
-    refused = invoke("replay", "latest", *runs, *video)
-    assert (refused.exit_code, "decisions" in refused.stderr) == (2, False)

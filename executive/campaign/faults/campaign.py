@@ -24,8 +24,7 @@ from executive.mission.model.nodes import InnerNode, Node, SubtreeNode
 from executive.record.recorded_run import RecordedRun, make_run_directory
 from executive.record.recorder import Recorder
 from executive.record.result import is_confirmed_by_audit
-from executive.record.timeline.activation import group_by_node
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Timeline, group_by_node
 from executive.run.assembly import RunOptions, assemble
 from executive.skill import Skill
 from executive.testing.faults import FaultyCell, with_faults

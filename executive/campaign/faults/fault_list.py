@@ -10,7 +10,7 @@ from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import detect_and_record_drop
 from executive.mission.model.nodes import SkillNode
-from executive.record.timeline.activation import Activation
+from executive.record.timeline import Activation
 from executive.skill import EMPTY, HOLDING, Skill
 from executive.testing import faults as effects
 from executive.testing.faults import Effect, ObjectChoice, ScheduledFault, after, between, during

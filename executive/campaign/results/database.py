@@ -14,7 +14,7 @@ from typing import Any
 from executive.campaign.results.rows import ItemRow, RunRecord, RunRow, SkillRow, SweepSettings
 from executive.errors import InputError
 from executive.record.result import Audit, ItemCounts
-from executive.record.timeline.timeline import PlanningTotals
+from executive.record.timeline import PlanningTotals
 
 FILE_NAME = "results.sqlite"
 """Name of the database in the folder of a sweep."""

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from executive.cell.json_values import DECIMAL_PLACES
 from executive.record.result import Audit, ItemCounts, Result, describe_disagreement
-from executive.record.timeline.timeline import PlanningTotals, Timeline
+from executive.record.timeline import PlanningTotals, Timeline
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.campaign.results.rows import ItemRow, RunRow, SkillRow, SweepSettings
-from executive.record.timeline.timeline import PlanningTotals
+from executive.record.timeline import PlanningTotals
 
 FloatArray = NDArray[np.float64]
 """Array of floats with 64 bits."""

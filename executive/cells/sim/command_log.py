@@ -78,15 +78,6 @@ class CommandLog(LogFile):
         self._length += len(data)
 
 
-def is_command_log(path: Path) -> bool:
-    """Return True if a file is the command log of a simulated world.
-
-    Raises:
-        InputError: The file cannot be read.
-    """
-    return _read_content(path).startswith(FILE_HEADER)
-
-
 def read_commands(path: Path) -> Iterator[Command]:
     """Yield the commands of a log in order, without an incomplete last command.
 
@@ -105,15 +96,11 @@ def read_commands(path: Path) -> Iterator[Command]:
 
 def _read_complete_lines(path: Path) -> bytes:
     """Return the content of a log up to its last line feed."""
-    content = _read_content(path)
+    consequence = "without it a simulated run can neither be resumed nor shown in a video"
+    with explain_os_errors(InputError, f'cannot read the log of the world "{path}"', consequence):
+        content = path.read_bytes()
     if not content.startswith(FILE_HEADER):
         header = FILE_HEADER.decode().strip()
         raise InputError(f'"{path}" is no log of a world: it does not begin with "{header}"')
     # A power failure may leave zero bytes at the end of the file.
     return content[: content.rfind(b"\n") + 1]
-
-
-def _read_content(path: Path) -> bytes:
-    consequence = "without it a simulated run can neither be resumed nor shown in a video"
-    with explain_os_errors(InputError, f'cannot read the log of the world "{path}"', consequence):
-        return path.read_bytes()

@@ -3,39 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
-from executive.errors import RecordLost, Unavailable
+from executive.errors import RecordLost
 from executive.events import RunEnded
 from executive.mission.load import LoadedMission
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
-from executive.mission.model.values import Literal
-from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, FailureNode, ItemFailure, LostItem
+from executive.record.diagnosis.diagnosis import Diagnosis, FailureNode, LostItem
 from executive.record.picture_recorder import find_picture
 from executive.record.result import is_resumable
 from executive.record.run_directory import RunDirectory
-from executive.record.timeline.activation import Reading, get_skill_name
-from executive.record.timeline.items import ItemHistory, Look, Sighting
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import ItemHistory, Look, Sighting, Timeline, get_skill_name
 from executive.tree.failure import Reason
 from executive.tree.inspection import Advice, PropagatedFailure
 from executive.tree.node_registry import load_control_nodes
 
-DECIDING_INPUTS: Mapping[str, tuple[str, ...]] = {
-    "arm": ("arm.met",),  # Recorded name of `arm.collision`.
-    "tool": ("tool.holding", "tool.touching", "tool.bears"),  # `bears` is the name of `holding_force`.
-    "camera": ("camera.sees_table",),
-}
-"""Inputs that decide whether a skill succeeds, by the part of the cell that the skill `uses`."""
-
 CAMERA_ADVICE = "mount camera and bins as the cell file says, or measure the pose again"
 """Advice about a displaced camera, which no change of the mission corrects."""
-
-MAX_NAMED_ITEMS = 5
-"""Maximum number of item names in a sentence."""
 
 _TRACEBACK_LINE = re.compile(r'File "([^"]+)", line (\d+), in (\S+)')
 """Pattern of a call in a Python traceback: file, line and function."""
@@ -57,12 +44,9 @@ def diagnose(
         return None
     run = _FailedRun(loaded, timeline, end)
     arm_state = _describe_arm(is_at_rest) if end.status == "FAULT" else "at rest"
-    readings = list(run.list_deciding_readings())
     node = run.deciding_node
     is_skill = isinstance(node, SkillNode)
     node_name = run.format_skill_name(end.node) if is_skill else node.path_name if node else ""
-    journal = RunDirectory(run_folder).journal
-    has_journal = journal.exists() and journal.stat().st_size > 0
     items = timeline.items.find_items_in_states("seen", "dropped", "held")
     labels = {name: item.last_change.label for name, item in items.items() if name not in run.lost_items}
     # The last line of a traceback is `module.RecordLost: message`.
@@ -73,14 +57,13 @@ def diagnose(
         clock=end.robot_time,
         mission=loaded.tree.span.source.path,
         verdict=run.describe_cause(),
-        node=DecidingNode(node.path, node_name, _format_source_location(node)) if node else None,
+        node=FailureNode(node.path, node_name, _format_source_location(node)) if node else None,
         item=run.item,
         passed_nodes=[
             FailureNode(entry.node.path, entry.name, _format_source_location(entry.node), entry.explanation)
             for entry in run.failure_path
             if entry.explanation or entry is run.failure_path[-1]
         ],
-        readings=readings,
         last_look=run.find_last_look(),
         lost_items=[_make_lost_item(name, item) for name, item in run.lost_items.items()],
         halted_skills=[run.format_skill_name(path) for path in run.halted_skills],
@@ -89,9 +72,9 @@ def diagnose(
         held_item=end.held_item,
         raised_at=_find_exception_location(timeline.traceback),
         is_recorded=not is_record_lost,
-        can_resume=is_resumable(end.status) and (not is_record_lost or has_journal),
+        can_resume=is_resumable(end.status),
         picture=run.find_picture_file(run_folder),
-        advice=list(_list_advice(run, arm_state, readings, is_record_lost)),
+        advice=list(_list_advice(run, arm_state, is_record_lost)),
     )
 
 
@@ -161,8 +144,7 @@ class _FailedRun:
             return end.message + (" while the operator was asked" if self.timeline.question else skills_text)
         if names := list(self.lost_items):
             subject = "object was" if len(names) == 1 else "objects were"
-            omitted = f" and {len(names) - MAX_NAMED_ITEMS} more" if len(names) > MAX_NAMED_ITEMS else ""
-            return f"{len(names)} {subject} lost: {', '.join(names[:MAX_NAMED_ITEMS])}{omitted}"
+            return f"{len(names)} {subject} lost: {', '.join(names)}"
         if not self.failure_path:
             return end.message
         attempts = (entry.attempt for entry in reversed(self.failure_path) if entry.attempt)
@@ -174,22 +156,6 @@ class _FailedRun:
             reason = end.reason.rpartition(".")[2]
             return f"{self.format_skill_name(end.node)} failed ({reason}){attempt_text}: {end.message}"
         return f"{self.failure_path[-1].name}{attempt_text}: {end.message}{skills_text}"
-
-    def list_deciding_readings(self) -> Iterator[Reading]:
-        """Yield the inputs that explain the failure of a skill, the latest first.
-
-        If inputs raised exceptions in the last control step of the skill, only these inputs are yielded.
-        """
-        node, activation = self.deciding_node, self.deciding_activation
-        if activation is None or not isinstance(node, SkillNode):
-            return
-        exceptions = [
-            each for each in activation.readings if each.raised and each.tick == activation.end_tick
-        ]
-        uses = self.loaded.skills[node.skill].uses
-        names = [name for part in uses for name in DECIDING_INPUTS.get(part, ())]
-        values = [each for each in activation.readings if each.name in names and not each.raised]
-        yield from reversed(exceptions or values)
 
     def find_last_look(self) -> Sighting | Look | None:
         """Return the last look in which `item` was detected; without such a look, the last look."""
@@ -258,10 +224,9 @@ def _format_source_location(node: Node) -> str:
 
 
 def _make_lost_item(name: str, item: ItemHistory) -> LostItem:
-    activation, failure = item.failure, None
-    if activation is not None:
-        failure_name = f"{get_skill_name(activation.node)}.{activation.reason}"
-        failure = ItemFailure(failure_name, activation.message, activation.end)
+    failed, failure = item.failure, ""
+    if failed is not None:
+        failure = f"{get_skill_name(failed.node)}.{failed.reason} at {failed.end:.2f} s: {failed.message}"
     return LostItem(name, item.sighting, item.unseen_look_count, item.pick_time, item.drop_time, failure)
 
 
@@ -284,9 +249,7 @@ def _find_exception_location(traceback: str) -> str:
     return f"{'/'.join(PurePath(file).parts[-2:])}:{line}, in {function}"
 
 
-def _list_advice(
-    run: _FailedRun, arm_state: str, readings: Sequence[Reading], is_record_lost: bool
-) -> Iterator[str]:
+def _list_advice(run: _FailedRun, arm_state: str, is_record_lost: bool) -> Iterator[str]:
     """Yield sentences with advice, the most urgent first."""
     end = run.end
     if arm_state != "at rest":
@@ -299,11 +262,6 @@ def _list_advice(
     else:
         for name in run.timeline.items.find_items_in_states("held"):
             yield f"find {name} in the cell: the tool released it at the end of the run"
-    for reading in readings:
-        if reading.raised == Unavailable.__name__:
-            yield f"make sure that {reading.name} answers again"
-        elif reading.name == "arm.met":  # Recorded name of `arm.collision`.
-            yield f"find what the arm collided with: {reading.value}"
     if is_record_lost:
         yield "free some space on the disk of the run directory, or name another folder with --runs DIR"
     elif end.status == "FAULT":
@@ -335,15 +293,8 @@ def _list_changes(run: _FailedRun) -> Iterator[str]:
 
 
 def _format_advice(run: _FailedRun, entry: _FailurePathNode, advice: Advice) -> str:
-    """Return advice with the place of the change: option `--set` for a param, else the line of the node."""
     changed_node = get_mission_node(advice.child) if advice.child else entry.node
-    value = entry.node.values.get(advice.key) if isinstance(entry.node, InnerNode) else None
-    params = run.loaded.mission.params.items() if isinstance(value, Literal) else ()
-    # If a value comes from a param, its span is the span of the value of the param.
-    name = next((name for name, param in params if param.value.span == getattr(value, "span", None)), "")
-    return (
-        f"{advice.text} {f'with --set {name}=...' if name else f'at {_format_location(run, changed_node)}'}"
-    )
+    return f"{advice.text} at {_format_location(run, changed_node)}"
 
 
 def _format_location(run: _FailedRun, node: Node) -> str:

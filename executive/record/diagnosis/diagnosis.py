@@ -8,58 +8,33 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from executive.record.timeline.activation import Reading
-from executive.record.timeline.items import Look, Sighting
+from executive.record.timeline import Look, Sighting
 
 MAX_LINE_WIDTH = 110
 """Maximum length of a line [characters]."""
 
-_MAX_READINGS = _MAX_LOST_ITEMS = 3
-"""Maximum number of readings, and maximum number of lost items, in the text."""
+_MAX_LOST_ITEMS = 3
+"""Maximum number of lost items in the text."""
 
 _LABEL_WIDTH = 12
 """Width of the column of labels [characters]."""
 
 
 @dataclass(frozen=True)
-class DecidingNode:
-    """Node that determined the status of a run.
+class FailureNode:
+    """Node that determined the status of a run, or control node that did not handle its failure.
 
     Attributes:
         path: Path of the node in the tree.
         name: Name of the node with its item or subtree: `Grasp of cube-1`, `look: retry`.
         place: File and line of the node.
+        explanation: Reason why the node did not handle the failure; "" for the origin of the failure.
     """
 
     path: str
     name: str
     place: str
-
-
-@dataclass(frozen=True)
-class FailureNode(DecidingNode):
-    """Control node that did not handle a failure, or node in which the failure began (origin).
-
-    Attributes:
-        explanation: Reason why the node did not handle the failure; "" for the origin.
-    """
-
-    explanation: str
-
-
-@dataclass(frozen=True)
-class ItemFailure:
-    """Last failure of a skill that worked on an item.
-
-    Attributes:
-        failure: Name of the failure: `Transit.dropped`.
-        message: Message of the failure.
-        clock: Time of the failure [s].
-    """
-
-    failure: str
-    message: str
-    clock: float
+    explanation: str = ""
 
 
 @dataclass(frozen=True)
@@ -71,7 +46,7 @@ class LostItem:
         look: Last look (image with its detections) in which the item was detected, or None.
         later_looks: Number of looks after `look`.
         held_at, dropped_at: Times of the last pick and the last drop of the item [s], or None.
-        last_failure: Last failure of a skill that worked on the item, or None.
+        last_failure: Reason, time and message of the last failure of a skill that worked on the item, or "".
     """
 
     item: str
@@ -79,7 +54,7 @@ class LostItem:
     later_looks: int
     held_at: float | None
     dropped_at: float | None
-    last_failure: ItemFailure | None
+    last_failure: str
 
 
 @dataclass(frozen=True)
@@ -95,7 +70,6 @@ class Diagnosis:
         node: Node that determined the status, or None.
         item: Name of the item of `node`, else of a halted skill, else of the first lost item; "" for none.
         passed_nodes: Failure path: nodes that did not handle the failure, from the root down, and the origin.
-        readings: Inputs that the failed skill read from the cell, the latest first.
         last_look: Last look with a detection of `item`, else the last look of the run; None without a look.
         lost_items: Items whose loss made the run fail.
         halted_skills: Names of the halted skills with their items: `Grasp of cube-1`.
@@ -114,10 +88,9 @@ class Diagnosis:
     clock: float
     mission: str
     verdict: str
-    node: DecidingNode | None
+    node: FailureNode | None
     item: str
     passed_nodes: Sequence[FailureNode]
-    readings: Sequence[Reading]
     last_look: Sighting | Look | None
     lost_items: Sequence[LostItem]
     halted_skills: Sequence[str]
@@ -159,9 +132,6 @@ def list_labelled_sentences(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
     if diagnosis.raised_at:
         note = '; the whole traceback is in the journal, event "FaultRaised"' if diagnosis.is_recorded else ""
         yield "raised at", diagnosis.raised_at + note
-    if diagnosis.readings:
-        readings = diagnosis.readings[:_MAX_READINGS]
-        yield "readings", ", ".join(_format_reading(reading, diagnosis.verdict) for reading in readings)
     for item in diagnosis.lost_items[:_MAX_LOST_ITEMS]:
         yield "lost", _format_lost_item(item)
     # The text of a lost item already contains its last look.
@@ -201,22 +171,13 @@ def wrap_lines(text: str, first_indent: str, other_indent: str, *, max_lines: in
     )  # fmt: skip
 
 
-def _format_reading(reading: Reading, verdict: str) -> str:
-    """Return a reading as text; the message of an exception is omitted if the verdict contains it."""
-    value = f"{reading.value:g}" if isinstance(reading.value, float) else str(reading.value)
-    if not reading.raised:
-        return f"{reading.name} = {value} ({reading.clock:.2f} s)"
-    message = "" if value in verdict else f": {value}"
-    return f"{reading.name} raised {reading.raised} ({reading.clock:.2f} s){message}"
-
-
 def _format_look(look: Sighting | Look | None) -> str:
     """Return image, detection and counts of the last look as text."""
     if look is None:
         return "none so far"
     image = f"frame {look.frame}, camera {look.camera}, by {look.detector}, at {look.clock:.2f} s"
     if isinstance(look, Look):
-        return f"{image}: {_format_count(look.found, 'box', 'boxes')}"
+        return f"{image}: {_format_count(look.found, 'object')}"
     detection = "" if look.confidence is None else f" as {look.label} {look.confidence:.2f}"
     counts = f"{_format_count(look.looks, 'look')}, {_format_count(look.attempts, 'failed attempt')} in all"
     return f"{look.item}{detection}{_format_position(look.position)}: {image}; {counts}"
@@ -225,19 +186,17 @@ def _format_look(look: Sighting | Look | None) -> str:
 def _format_lost_item(item: LostItem) -> str:
     """Return last look, drop and last failure of a lost item as text."""
     text = item.item
-    look = item.look
-    failure = item.last_failure
-    if look is not None:
-        text += f" last detected{_format_position(look.position)} at {look.clock:.2f} s"
+    if item.look is not None:
+        text += f" last detected{_format_position(item.look.position)} at {item.look.clock:.2f} s"
         text += f", not detected in the {_format_count(item.later_looks, 'later look')}"
-    if item.dropped_at is not None and (failure is None or failure.clock != item.dropped_at):
+    if item.dropped_at is not None and not item.last_failure:
         text += f"; dropped at {item.dropped_at:.2f} s"
-    return text + (f"; {failure.failure} at {failure.clock:.2f} s: {failure.message}" if failure else "")
+    return text + (f"; {item.last_failure}" if item.last_failure else "")
 
 
 def _format_position(position: Sequence[float] | None) -> str:
     return "" if position is None else " at ({:.3f}, {:.3f}, {:.3f}) m".format(*position)
 
 
-def _format_count(count: int, singular: str, plural: str = "") -> str:
-    return f"{count} {singular if count == 1 else plural or singular + 's'}"
+def _format_count(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -25,7 +25,7 @@ from executive.processes import build_command
 from executive.record.result import Result
 from executive.run.run import Run
 from executive.run.versions import DISTRIBUTION
-from executive.view.live import messages
+from executive.view.live import page_state
 from executive.view.tree.svg import NodeResult, make_svg
 
 LOOPBACK = "127.0.0.1"
@@ -73,7 +73,7 @@ class LivePage:
                 # In a separate session the server gets no Ctrl-C, and can still show the result of the run.
                 start_new_session=True,
             )  # fmt: skip
-        self._queue: queue.SimpleQueue[tuple[str, int] | messages.Message | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[tuple[str, int] | page_state.Message | None] = queue.SimpleQueue()
         self._run: Run | None = None
         self._visuals: Visuals | None = None
         self._has_server_ended = False
@@ -82,7 +82,7 @@ class LivePage:
         self._pose_period = POSE_PERIOD
         self._was_paused = False
         self._last_frame: Frame | None = None
-        self._last_camera_image: messages.CameraImage | None = None
+        self._last_camera_image: page_state.CameraImage | None = None
         self.problem = ""
         """Description of the first error of the page, or ""."""
         # The token is sent through the pipe, because every user of the machine can read process arguments.
@@ -103,8 +103,8 @@ class LivePage:
         # In the empty line of each node, the page writes how often the node succeeded, failed and was halted.
         empty_results = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
-        self._enqueue(messages.SceneChange(shapes=shapes))
-        self._enqueue(messages.PageChange(tree=make_svg(nodes, run.mission, empty_results)))
+        self._enqueue(page_state.SceneChange(shapes=shapes))
+        self._enqueue(page_state.PageChange(tree=make_svg(nodes, run.mission, empty_results)))
         run.control.call_between_ticks(self._send_state)
         self._send_state()
 
@@ -116,7 +116,7 @@ class LivePage:
                 # The page does not show the depth image, which is the largest part of a frame.
                 self._last_frame = replace(event.frame, depth=None)
             elif isinstance(event, FrameSearched) and self._last_frame is not None:
-                self._last_camera_image = messages.CameraImage(self._last_frame, event)
+                self._last_camera_image = page_state.CameraImage(self._last_frame, event)
                 if self._can_send_images:
                     self._enqueue(self._last_camera_image)
             elif not isinstance(event, InputRead):
@@ -127,7 +127,7 @@ class LivePage:
 
     def show_message(self, message: str) -> None:
         """Show a message about the record of the run."""
-        self._enqueue(messages.PageChange(note=message))
+        self._enqueue(page_state.PageChange(note=message))
 
     def finish(self, result: Result | None = None, report_path: str = "") -> None:
         """Show the result of the run, and end the server; a second call does nothing."""
@@ -135,7 +135,7 @@ class LivePage:
             return
         if result is not None:
             outcome = {"status": result.status, "message": result.verdict, "run": result.run}
-            self._enqueue(messages.PageChange(result={**outcome, "report": report_path}))
+            self._enqueue(page_state.PageChange(result={**outcome, "report": report_path}))
         self._queue.put(None)
         try:
             if self._server.wait(SHUTDOWN_TIMEOUT) != 0:
@@ -157,17 +157,19 @@ class LivePage:
         with self._catch_errors():
             if self._run.control.is_paused != self._was_paused:
                 self._was_paused = not self._was_paused
-                self._enqueue(messages.PageChange(is_paused=self._was_paused))
+                self._enqueue(page_state.PageChange(is_paused=self._was_paused))
             if self._can_send_images and self._visuals is not None:
-                self._enqueue(messages.PageChange(clock=self._run.now))
-                self._enqueue(messages.SceneChange(body_poses=messages.encode_poses(self._visuals.poses())))
+                self._enqueue(page_state.PageChange(clock=self._run.now))
+                self._enqueue(
+                    page_state.SceneChange(body_poses=page_state.encode_poses(self._visuals.poses()))
+                )
 
     @property
     def _can_send_images(self) -> bool:
         """True if a browser shows the page and the queue is short enough for images and poses."""
         return self._browser_count > 0 and self._queue.qsize() < MAX_QUEUED_MESSAGES
 
-    def _enqueue(self, message: messages.Message) -> None:
+    def _enqueue(self, message: page_state.Message) -> None:
         """Queue a message for the server, unless the server has ended."""
         if not self._has_server_ended:
             self._queue.put(message)
@@ -207,10 +209,10 @@ class LivePage:
         assert self._server.stdout is not None
         for line in self._server.stdout:
             with self._catch_errors():
-                self._run_command(messages.PageCommand(**json.loads(line)))
+                self._run_command(page_state.PageCommand(**json.loads(line)))
         self._browser_count, self._has_server_ended = 0, True
 
-    def _run_command(self, command: messages.PageCommand) -> None:
+    def _run_command(self, command: page_state.PageCommand) -> None:
         """Run a command of a browser; most command names are the names of methods of `RunControl`."""
         control = None if self._run is None else self._run.control
         if command.name == "browsers":

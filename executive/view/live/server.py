@@ -12,8 +12,7 @@ from importlib.resources import files
 from aiohttp import WSMsgType, web
 from aiohttp.typedefs import Handler
 
-from executive.view.live.messages import PageCommand
-from executive.view.live.page_state import PageState
+from executive.view.live.page_state import PageCommand, PageState
 from executive.view.live.scene_proxy import SceneProxy
 
 MESSAGE_PERIOD = 1 / 8

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from executive.mission.outline import OutlineNode
-from executive.record.timeline.activation import Activation
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Activation, Timeline
 
 LOOK = "look"
 """Activity: detection of the next item while the tool is empty."""

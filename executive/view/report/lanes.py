@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from math import ceil
 
 from executive.mission.outline import OutlineNode
-from executive.record.timeline.activation import Activation, find_last_failure, format_counts, group_by_node
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Activation, Timeline, find_last_failure, format_counts, group_by_node
 from executive.view.text import estimate_text_width, render_template, wrap_and_truncate
 
 MIN_AXIS_LENGTH, MAX_AXIS_LENGTH = 900.0, 6000.0

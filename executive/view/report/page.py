@@ -24,8 +24,7 @@ from executive.record.picture_recorder import PALETTE
 from executive.record.recorded_mission import read_tree
 from executive.record.result import is_resumable, list_requests, read_result
 from executive.record.run_directory import RunDirectory, convert_os_errors
-from executive.record.timeline.activation import find_last_failure, format_counts, group_by_node
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Timeline, find_last_failure, format_counts, group_by_node
 from executive.view.report.activity_times import FAILED_ATTEMPTS, LOOK, WAITING, compute_activity_times
 from executive.view.report.lanes import draw_lanes
 from executive.view.terminal.summary import describe_place_on_table, format_repeat_command

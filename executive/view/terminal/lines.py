@@ -6,8 +6,7 @@ from typing import TextIO
 
 from executive import events
 from executive.mission.outline import make_outline
-from executive.record.timeline.activation import STATUS_TEXTS
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import STATUS_TEXTS, Timeline
 from executive.run.run import Run
 from executive.view.tree.tree_text import find_skill_names
 

@@ -102,25 +102,6 @@ def test_a_browser_shows_and_controls_a_run_up_to_its_result(page: LivePage, run
 
 
 @pytest.mark.slow
-def test_the_page_listens_at_one_port_of_loopback(page: LivePage) -> None:
-    async def fetch() -> None:
-        async with aiohttp.ClientSession() as session, session.get(page.address) as answer:
-            assert answer.status == 200
-
-    asyncio.run(fetch())
-    process = Path("/proc") / find_server()
-    sockets = {os.readlink(file) for file in (process / "fd").iterdir()}
-    listening = []
-    for table in ("tcp", "tcp6"):
-        for line in (process / "net" / table).read_text().splitlines()[1:]:
-            fields = line.split()
-            if fields[3] == "0A" and f"socket:[{fields[9]}]" in sockets:
-                listening.append(fields[1])
-    port = int(page.address.split(":")[2].partition("/")[0])
-    assert listening == [f"0100007F:{port:04X}"]
-
-
-@pytest.mark.slow
 def test_a_run_goes_on_without_its_page(page: LivePage, run: Run) -> None:
     os.kill(int(find_server()), signal.SIGKILL)
     assert run.execute().status == "SUCCESS"

@@ -19,10 +19,9 @@ from events import (
     skill_started,
 )
 
-from executive.events import Event, OperatorAsked, RequestGiven, RunResumed, TargetSelected
+from executive.events import Event, OperatorAsked, RequestGiven, TargetSelected
 from executive.geometry import Pose
-from executive.view.live.messages import CameraImage, PageChange, encode_poses
-from executive.view.live.page_state import PageState
+from executive.view.live.page_state import CameraImage, PageState, encode_poses
 
 
 @pytest.mark.parametrize(
@@ -35,7 +34,6 @@ from executive.view.live.page_state import PageState
         (OperatorAsked(["cube", "duck"]), {"choices": ["cube", "duck"]}),
         (RequestGiven("cube"), {"choices": None}),
         (run_ended(), {"choices": None, "has_ended": True}),
-        (RunResumed(3, "", {}), {}),
     ],
 )  # fmt: skip
 def test_the_news_of_an_event_is_its_change_of_the_page(event: Event, news: dict) -> None:
@@ -67,26 +65,6 @@ def test_every_end_of_a_node_is_counted() -> None:
 def test_poses_are_places_and_quaternions_that_begin_with_w() -> None:
     pose = Pose.of((1.0, 2.0, 3.0), (0.0, 0.0, 1.0, 0.0))
     assert encode_poses({"tool": pose}) == {"tool": (1, 2, 3, 0, 0, 0, 1)}
-
-
-def test_who_comes_late_is_shown_everything_and_then_only_news() -> None:
-    page_state = PageState()
-    for message in (
-        PageChange(tree="<svg/>"), at(120, skill_started("a")), at(240, skill_started("b")),
-        at(240, item_changed("cube-1", "held")),
-    ):  # fmt: skip
-        page_state.apply(message)
-    assert page_state.take_changes()["tree"] == "<svg/>"
-    page_state.apply(at(360, skill_ended("b", "FAILURE")))
-    fresh = page_state.take_changes()
-    assert (list(fresh), list(fresh["nodes"])) == (["clock", "nodes"], ["b"])
-    assert page_state.take_changes() == {}
-    shown = page_state.values
-    assert {name: node["status"] for name, node in shown.pop("nodes").items()} == {
-        "a": "running", "b": "failure",
-    }  # fmt: skip
-    assert list(shown.pop("items")) == ["cube-1"]
-    assert shown == {"is_paused": False, "has_ended": False, "tree": "<svg/>", "clock": 1.5}
 
 
 def test_an_image_is_shown_with_what_the_arm_hides_darker() -> None:

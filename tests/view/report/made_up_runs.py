@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from executive.mission.outline import OutlineNode
-from executive.record.timeline.activation import Activation
+from executive.record.timeline import Activation
 
 
 def skill(name: str, *uses: str, senses: bool = False) -> OutlineNode:

@@ -51,8 +51,3 @@ class Page(HTMLParser):
     def shape(self) -> set[tuple[str, frozenset[str]]]:
         """The kinds of elements, each with the names of its attributes."""
         return {(tag, frozenset(attributes)) for tag, attributes in self.elements}
-
-    def linked(self) -> list[str]:
-        """Return everything that the page has a browser fetch or follow."""
-        names = ("src", "href", "srcset", "action", "data", "poster", "xlink:href", "background")
-        return [attributes[name] for _, attributes in self.elements for name in names if name in attributes]

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import pytest
-from made_up_runs import TREE, ran, skill
+from made_up_runs import TREE, ran
 
 from executive.mission.outline import OutlineNode
-from executive.record.timeline.activation import Activation
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Activation, Timeline
 from executive.view.report.activity_times import (
     FAILED_ATTEMPTS,
     LOOK,
@@ -61,11 +60,6 @@ def test_a_failed_attempt_a_look_ahead_and_a_wait_are_distinguished():
         ([ran("Wait", 0.0, 4.0), ran("Transit", 1.0, 3.0, "cube-1"), ran("Approach", 2.0, 4.0, "duck-1")],
          [(1.0, "cube-1"), (2.0, "duck-1")], 4.0,
          {"cube-1": {WAITING: 1.0, "transit": 2.0}, "duck-1": {"approach": 1.0}}),
-        # A failed attempt without a later attempt ends with the failure.
-        ([ran("Approach", 0.5, 1.0, "cube-1"), ran("Grasp", 1.0, 1.2, "cube-1", "FAILURE"),
-          ran("Detect", 1.2, 1.3)],
-         [(0.5, "cube-1")], 1.3,
-         {"cube-1": {WAITING: 0.5, FAILED_ATTEMPTS: 0.7}, NO_ITEM: {LOOK: 0.1}}),
         # The time after the last skill belongs to the run.
         ([ran("Transit", 1.0, 2.0, "cube-1", "INVALID")], [(1.0, "cube-1")], 2.4,
          {"cube-1": {WAITING: 1.0, "transit": 1.0}, NO_ITEM: {WAITING: 0.4}}),
@@ -74,10 +68,3 @@ def test_a_failed_attempt_a_look_ahead_and_a_wait_are_distinguished():
 def test_time_belongs_to_an_object_or_to_the_run(course, decisions, end, expected):
     times = times_of(course, TREE, decisions, end)
     assert times.times_by_item == {item: near(row) for item, row in expected.items()}
-
-
-def test_a_skill_that_is_called_like_another_activity_has_no_column_of_its_own():
-    tree = [*TREE, skill("Look", "arm")]
-    times = times_of([ran("Look", 0.0, 1.0, "cube-1"), ran("Detect", 1.0, 2.0)], tree, [], 2.0)
-    assert times.activities == (LOOK,)
-    assert times.times_by_item == {"cube-1": near({LOOK: 1.0}), NO_ITEM: near({LOOK: 1.0})}

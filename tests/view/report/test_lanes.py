@@ -9,11 +9,10 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import pytest
-from made_up_runs import TREE, activation, picks, ran
+from made_up_runs import TREE, picks, ran
 
 from executive.mission.outline import OutlineNode
-from executive.record.timeline.activation import Activation
-from executive.record.timeline.timeline import Timeline
+from executive.record.timeline import Activation, Timeline
 from executive.view.report.lanes import MAX_AXIS_LENGTH, MAX_BAR_COUNT, MIN_AXIS_LENGTH, draw_lanes
 
 THINNEST = 1.5
@@ -39,15 +38,6 @@ def said(lane: Element) -> list[str]:
     return [bar.findtext(f"{SVG}title") or "" for bar in lane.findall(f"{SVG}rect")]
 
 
-def test_every_node_that_ran_has_a_lane_in_the_order_of_the_tree():
-    found = lanes([ran("Wait", 0.0, 1.0), ran("Detect", 1.0, 2.0), activation("tree", 0.0, 2.0)], 2.0)
-    shown = [(path, lane.attrib["class"], lane.findtext(f"{SVG}text")) for path, lane in found.items()]
-    assert shown == [
-        ("tree", "lane control", "tree"), ("tree/Detect", "lane skill", "Detect"),
-        ("tree/Wait", "lane skill", "Wait"),
-    ]  # fmt: skip
-
-
 def test_a_bar_is_as_long_as_it_took_and_says_what_happened():
     course = [
         ran("Approach", 0.0, 1.0, "cube-1"),
@@ -67,12 +57,6 @@ def test_indistinguishable_activations_share_a_bar_in_the_colour_of_the_worst():
     lane = lanes([*course, ran("Detect", 1.0, 1.01)], 90.0)["tree/Detect"]
     assert bars(lane) == [("failure", 2.2), ("success", THINNEST)]
     assert said(lane)[0] == "Detect: 2 done, 1 failed\n0.00 s to 0.05 s (0.05 s)\nunsure: too dark"
-
-
-def test_distinguishable_bars_stay_separate_and_short_activations_are_visible():
-    course = [ran("Wait", 0.0, 1.0), ran("Wait", 1.0, 2.0), ran("Wait", 2.0, 2.0), ran("Wait", 2.1, 2.1)]
-    widths = [width for _, width in bars(lanes(course, 90.0)["tree/Wait"])]
-    assert widths == [45.0, 45.0, THINNEST, THINNEST]
 
 
 def test_however_long_the_run_its_timeline_has_a_bound():

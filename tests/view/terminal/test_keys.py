@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import pty
 import termios
-import threading
 import time
 import tty
 from collections.abc import Iterator
@@ -14,7 +13,7 @@ from dataclasses import dataclass
 import pytest
 
 from executive.run.run_control import RunControl
-from executive.view.terminal.keyboard import KeyReader
+from executive.view.terminal.screen import KeyReader
 
 PATIENCE = 10.0
 
@@ -57,14 +56,6 @@ def test_a_key_pauses_the_run_and_lets_it_go_on_and_others_mean_nothing(keyboard
     keyboard.press("xqé\n\tp", True)
     keyboard.press(" ", False)
     keyboard.press("p", True)
-
-
-def test_a_key_takes_one_step(keyboard: Keyboard) -> None:
-    keyboard.press("s", True)
-    keyboard.control.wait_while_paused()
-    threading.Timer(0.1, keyboard.control.stop).start()
-    keyboard.control.wait_while_paused()
-    assert keyboard.control.is_stopped
 
 
 def test_the_keyboard_is_given_back_as_it_was(keyboard: Keyboard) -> None:

@@ -13,13 +13,11 @@ from py_trees.behaviour import Behaviour
 from rich.console import Console
 
 from executive.events import BranchChosen, NodeEnded, NodeStarted, TimedEvent
-from executive.mission.outline import make_outline
 from executive.record.result import Result
 from executive.run.run_control import RunControl
 from executive.view.terminal.lines import LineView
 from executive.view.terminal.screen import TerminalView
 from executive.view.terminal.summary import format_repeat_command, format_summary
-from executive.view.tree.tree_text import find_skill_names, select_active_nodes
 
 GRASP = "tree/sort/repeat/Grasp"
 
@@ -46,20 +44,6 @@ def started(node: str, item: str = "", clock: float = 1.0) -> TimedEvent:
 
 def failed(node: str, clock: float = 1.0, **fields) -> TimedEvent:
     return at(1, NodeEnded(node, "FAILURE", "Grasp" if node == GRASP else "", **fields), clock)
-
-
-def test_skills_are_the_leaves_and_what_rests_is_folded():
-    nodes = make_outline(TREE)
-    leaves = {"tree/sort/repeat/Detect": "Detect", GRASP: "Grasp", "tree/sort/Release": "Release"}
-    assert find_skill_names(nodes) == leaves
-    assert [node.path for node in select_active_nodes(nodes, set())] == ["tree/sort"]
-    assert [node.name for node in select_active_nodes(nodes, {"tree/sort"})] == [
-        "sort",
-        "repeat",
-        "Release",
-    ]
-    assert select_active_nodes(nodes, {"tree/sort", "tree/sort/repeat"}) == nodes
-    assert [node.name for node in select_active_nodes(nodes, {"tree/sort/repeat"})] == ["sort"]
 
 
 MISSED = {"item": "cube-1", "reason": "missed", "message": "no seal 0.1 s after contact"}
@@ -134,15 +118,3 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_
     result = replace(RESULT, status="SUCCESS", reason="", node="", message="")
     shown = format_summary(result, [], repeat, "runs/x/report.html").splitlines()
     assert shown == ["SUCCESS", *lines[1:3], "report: runs/x/report.html"]
-
-
-def test_the_keys_are_named_beside_the_clock_where_there_is_a_keyboard(monkeypatch):
-    control = RunControl()
-    keys = SimpleNamespace(start=lambda: None, stop=lambda: None, control=control)
-    monkeypatch.setattr("executive.view.terminal.screen.KeyReader", lambda file, control: keys)
-    view = TerminalView(Console(file=io.StringIO(), force_terminal=True), keyboard=0)
-    view.open(SimpleNamespace(root=TREE, control=control))
-    for words in ("p pause, s step, Ctrl-C stop", "paused: p continue, s step, Ctrl-C stop"):
-        assert page(view).splitlines()[0].rstrip() == f"  0.0 s   {words}"
-        control.pause()
-    view.close()

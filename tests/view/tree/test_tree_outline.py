@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from py_trees.behaviour import Behaviour
 
-from executive.mission.outline import Connection, list_child_indices, make_outline
+from executive.mission.outline import list_child_indices, make_outline
 from executive.skill import In, Metres, Out, Skill, param, port
 from executive.tree.failure import Reason
 from executive.tree.retry import Retry
@@ -15,7 +15,7 @@ from executive.tree.sequences import Sequence
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 from executive.tree.tree_node import NodeContext, make_inspection_context
 from executive.tree.try_catch import Catch, TryCatch
-from executive.view.tree.tree_text import MAX_LINE_LENGTH, draw_text, fold_subtrees
+from executive.view.tree.tree_text import draw_text, fold_subtrees
 
 CELL: Any = SimpleNamespace()
 MISSED = (Reason("Pick", "missed"),)
@@ -63,15 +63,6 @@ def tree() -> Behaviour:
     return TryCatch(make_site("tree/try"), do=retry, catch=catch, finally_=look("tree/try/finally/look"))
 
 
-def test_a_skill_tells_what_the_mission_connects_and_what_it_declares():
-    (node,) = make_outline(pick("tree/Pick"))
-    assert (node.kind, node.title, node.skill, node.doc) == ("skill", "Pick", "Pick", "Take something.")
-    assert node.params == {"height": 0.2}
-    assert node.reads == (Connection("seen", "seen", True), Connection("only", "item", False))
-    assert node.writes == (Connection("held", "thing", True),)
-    assert node.reasons == ("missed", "blocked")
-
-
 def test_every_node_knows_its_children_what_it_is_to_its_parent_and_which_subtree_begins_with_it():
     nodes = make_outline(tree())
     look, taken = ("sequence", ("look",)), ("", "Pick", ())
@@ -93,23 +84,6 @@ def test_ports_and_reasons_stand_below_the_skill():
         "      reads $seen, only <- $item?; writes held -> $thing",
         "      may fail: missed, blocked",
     ]
-
-
-def test_the_failures_that_start_a_catch_are_listed_with_the_reasons():
-    lines = draw_text(make_outline(tree()), shows_reasons=True).splitlines()
-    number = lines.index("├─ catch 1: look")
-    assert lines[number + 1].strip("│ ") == "on Pick.missed"
-
-
-def test_long_lines_are_wrapped_under_their_node():
-    wiring = Wiring(inputs={"seen": "a_rather_long_name"}, outputs={"held": "b" * 60})
-    body = pick("tree/retry/do/Pick", wiring=wiring)
-    on = [Reason("Pick", reason) for reason in ("missed", "blocked", "unreachable", "dropped", "slipped")]
-    root = Retry(make_site("tree/retry"), attempts=3, on=on, do=body)
-    lines = draw_text(make_outline(root), shows_ports=True).splitlines()
-    assert max(map(len, lines)) <= MAX_LINE_LENGTH
-    assert lines[1] == "│    Pick.slipped)"
-    assert lines[-1].startswith("        ") and lines[-1].endswith("b")
 
 
 def test_a_folded_tree_shows_every_subtree_once():

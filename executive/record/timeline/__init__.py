@@ -1,1 +1,0 @@
-"""Timeline of a run: state and history of nodes and items, computed from the events."""
