@@ -12,7 +12,7 @@ from executive.testing import faults as effects
 from executive.testing.faults import after, during
 from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_mission import run_mission
-from executive.testing.world_access import open_world
+from executive.testing.world_access import WorldAccess
 
 pytestmark = pytest.mark.slow
 MOVE = (0.0, -0.06)
@@ -38,7 +38,7 @@ def test_a_fault_changes_the_world_and_the_ledger_agrees(
         name = type(timed.event).__name__
         if isinstance(timed.event, NodeEnded) and timed.event.reason in reasons:
             name = "failed"
-        states.setdefault(name, {one.body: one.position for one in open_world(cells[0]).objects})
+        states.setdefault(name, {one.body: one.position for one in WorldAccess(cells[0]).objects})
 
     result = run_mission(
         "sort_overhead", make_oracle_kind(), faults=[fault], arrange=cells.append, observers=[watch]

@@ -17,6 +17,7 @@ PERMITTED = {
     ("record/diagnosis/diagnosis.py", '"repeat"'),  # label before the command that repeats a run
 }
 """The words that belong to the grammar, and words that mean something else."""
+TABLE_OF_FORMER_WORDS = "mission/other_words.py"
 
 
 def test_no_other_file_names_a_control_node() -> None:
@@ -28,7 +29,7 @@ def test_no_other_file_names_a_control_node() -> None:
     found = {
         (file.relative_to(package).as_posix(), word)
         for file in sorted(package.rglob("*.py"))
-        if file not in own
+        if file not in own and file != package / TABLE_OF_FORMER_WORDS
         for word in words
         if word in file.read_text(encoding="utf-8")
     }
