@@ -9,8 +9,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.mission.findings import MissionError
-from executive.mission.parse.cell_file import load_cell, read_cell
-from executive.mission.parse.cell_layout import find_overlaps
+from executive.mission.parse.cell_file import find_overlaps, load_cell, read_cell
 
 
 @pytest.fixture(autouse=True)
@@ -63,7 +62,7 @@ def test_a_finding_shows_line_and_caret(small_cell: str) -> None:
     [
         ("cell.table.objects", "[5]", "--set:1:20: error[wrong-length]: table.objects needs 2 values, not 1\n"),
         ("cell.tool.force", "yes", 'cell.tool.force=yes\n     |                 ^^^'),
-        ("cell.tabel.x", "1", 'the cell has no key "tabel"'),
+        ("cell.tabel.x", "1", 'has no key "tabel"'),
         ("cell.kind.x", "5", 'there is no key "x", because'),
         ("cell.arm.limits.jerk", "[1e308, 9, 9, 9, 9, 9, 9]", "arm.limits.jerk[0] must be at most 100000"),
     ],
