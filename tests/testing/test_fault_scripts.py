@@ -102,19 +102,6 @@ def test_a_fault_of_a_node_is_recorded_with_node_item_and_object() -> None:
     assert (result.status, result.agrees) == ("SUCCESS", True)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: during("*", effects.seal_fails(), activations=0), "at least 1, not 0"),
-        (lambda: between(5, 5, effects.seal_fails()), "0 <= start < end, not 5 s and 5 s"),
-        (lambda: after(-1, effects.seal_fails()), "not -1 s and inf s"),
-    ],
-)
-def test_a_time_that_never_comes_is_refused(make: Callable[[], ScheduledFault], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        make()
-
-
 def test_the_world_of_an_unknown_cell_cannot_be_changed() -> None:
     strange: Any = SimpleNamespace(cell=FakeCell().cell, accounts=None, advance=lambda: None)
     with pytest.raises(InputError, match="not a SimpleNamespace"):

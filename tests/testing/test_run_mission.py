@@ -46,11 +46,6 @@ def test_a_shipped_mission_runs_by_its_name_on_the_fake_cell() -> None:
     assert (result.agrees, result.list_injected_faults()) == (True, [])
 
 
-def test_a_mission_file_runs_with_other_values(look: Path) -> None:
-    later = run_mission(look, set={"wait": "2.0", "cell.detectors.embedded.latency": "0.5"})
-    assert later.robot_time == pytest.approx(2.5, abs=0.01)
-
-
 def test_the_cell_is_arranged_before_the_run_and_closed_after_it(look: Path) -> None:
     closed: list[str] = []
 

@@ -118,11 +118,6 @@ def test_a_halt_that_leaves_the_arm_in_motion_shows(fake: FakeCell, monkeypatch:
     assert fake.cell.clock.now == pytest.approx(start + 2.0, abs=0.01)
 
 
-def test_a_skill_that_does_not_end_is_left_running(fake: FakeCell) -> None:
-    result = run_skill(Wait, fake, inputs={"seconds": 60.0}, max_ticks=400)
-    assert (result.status, result.ticks) == ("RUNNING", 400)
-
-
 def test_a_substitute_fails_the_first_times_and_then_does_its_work(fake: FakeCell, target: Target) -> None:
     run_skill(Approach, fake, inputs={"target": target})
     slippery = make_failing(Grasp, "missed", start_count=2, message="it slips")
