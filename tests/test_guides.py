@@ -157,15 +157,6 @@ def test_every_piece_of_python_shown_runs_with_its_tests(text: str, tmp_path: Pa
             member()
 
 
-def test_the_skill_to_copy_declares_a_part_of_the_shipped_one(tmp_path: Path) -> None:
-    (text,) = (block.text for block in shown("python") if "class WeighItem" in block.text)
-    skill, shipped = module_of(text, tmp_path / "weigh_item.py").WeighItem, load_skills()["Weigh"]
-    assert skill.ports.items() <= shipped.ports.items()
-    assert skill.params.items() <= shipped.params.items()
-    assert {*skill.reasons} < {*shipped.reasons}
-    assert (skill.tool_state, skill.uses, skill.waits) == (shipped.tool_state, shipped.uses, shipped.waits)
-
-
 def test_every_file_and_folder_that_a_guide_links_to_exists() -> None:
     for guide in (*GUIDES, "skills/reference.md", "executive/README.md", "CONTRIBUTING.md"):
         folder = (ROOT / guide).parent

@@ -63,15 +63,6 @@ def test_a_skill_of_the_project_is_found_beside_the_installed_ones(project: Writ
     assert list(found) == sorted(found)
 
 
-def test_its_folder_is_the_last_place_where_modules_are_looked_for(project: Write) -> None:
-    file = project("hall_two", WAVE, skills='Wave = "hall_two.part:Wave"')
-    list_entries("executive.cells", "kind of cell")
-    assert str(file.parent) not in sys.path, "it registers none of these"
-    for _ in range(2):
-        list_entries("executive.skills", "skill")
-    assert (sys.path[-1], sys.path.count(str(file.parent))) == (str(file.parent), 1)
-
-
 def test_kinds_of_cells_and_detectors_are_found_likewise(project: Write) -> None:
     project(
         "hall_four", "class Bench:\n    pass\n\n\nclass Eye:\n    pass\n",

@@ -55,14 +55,6 @@ def test_it_is_that_of_the_nearest_file_upwards(write: Write, monkeypatch: pytes
     assert (found := find_project()) is not None and found.file == nearer
 
 
-def test_a_working_directory_that_is_gone_has_none(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = write("").parent / "gone"
-    folder.mkdir()
-    monkeypatch.chdir(folder)
-    folder.rmdir()
-    assert find_project() is None
-
-
 @pytest.mark.parametrize(("mode", "counts"), [(0o1777, False), (0o777, True), (0o755, True)])
 def test_a_file_in_a_folder_that_is_everybodys_does_not_count(write: Write, mode: int, counts: bool) -> None:
     file = write("")

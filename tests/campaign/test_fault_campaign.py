@@ -119,10 +119,7 @@ def test_a_reason_is_caused_in_the_cell_or_else_by_the_skill(campaign: Campaign)
         ("Grasp", "missed", "first", "ok"),
         ("Detect", "unavailable", "lasting", "FAILURE Detect.unavailable"),
         pytest.param("Grasp", "missed", "lasting", "ok -6", marks=SLOW),
-        pytest.param("Release", "stuck", "lasting", "FAILURE Release.stuck", marks=SLOW),
         pytest.param("Approach", "target: object_removed", "middle", "FAILURE lost", marks=SLOW),
-        pytest.param("Approach", "unreachable", "middle", "ok -1", marks=SLOW),
-        pytest.param("detector", "dead for 0.5 s", "first", "ok", marks=SLOW),
         pytest.param("object", "object_removed", "late", "FAILURE lost", marks=SLOW),
     ],
 )
@@ -284,16 +281,9 @@ class BrokenCell(FakeCell):
         raise RuntimeError("broken")
 
 
-def test_a_mission_that_fails_without_a_fault_is_refused(small: MissionUnderTest, tmp_path: Path) -> None:
+def test_a_mission_that_fails_without_a_fault_is_refused(small: MissionUnderTest) -> None:
     with pytest.raises(InputError, match=r"without a fault, small with seed 0 ends as FAULT .* another seed"):
         Campaign(replace(small, make_cell=BrokenCell))
-    shutil.copytree(small.loaded.path.parent / "cells", tmp_path / "cells")
-    file = tmp_path / "blind.yaml"
-    file.write_text(
-        "mission: blind\ncell: cells/fruit.yaml\nroutes: {apple: premium_crate}\ntree: MoveToScan\n"
-    )
-    with pytest.raises(InputError, match="observes the whole table"):
-        Campaign(replace(small, loaded=load_mission(file, load_skills())))
 
 
 FAULT = PlannedFault(

@@ -143,17 +143,6 @@ class GraspSecretly(Skill):
             raise self.failure("missed", "no seal")
 
 
-class HoldOn(GraspSecretly):
-    """Keep the object after a halt."""
-
-    def run(self, cell: Cell) -> Steps:  # type: ignore[override]
-        cell.tool.close()
-        yield
-        if not cell.tool.holding:
-            raise self.failure("missed", "no seal")
-        cell.ledger.record_grasp(self.target.item)
-
-
 class NeedWords(Pause):
     """Need a text that nobody can guess."""
 
@@ -168,10 +157,8 @@ FAULTY = [
     (ChooseNumber, "has_outputs_of_declared_types", r"targets is \['cube-1'\], not a list of Target"),
     (ChangeInput, "leaves_inputs_unchanged", "an input has changed"),
     (UseSecretly, "uses_only_declared_parts", "camera.capture and does not declare the camera"),
-    (UseSecretly, "uses_only_declared_parts", "operator.ask and does not declare that it senses"),
     (ChangeBelief, "uses_only_declared_parts", "ledger.invalidate_positions, and declares is_condition"),
     (LetGo, "leaves_tool_as_declared", "SUCCESS at tick 0, and the tool is empty"),
-    (HoldOn, "leaves_tool_as_declared", "HALTED at tick 1, and the tool holds something"),
     (GraspSecretly, "leaves_tool_as_declared", "the ledger knows no held item"),
     (RunOn, "leaves_arm_at_rest", r"HALTED at tick \d+, and the arm still moves"),
 ]

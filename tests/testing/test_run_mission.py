@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,6 @@ import pytest
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
 from executive.events import RunEnded, RunStarted, TimedEvent
-from executive.testing import run_skill as skills
 from executive.testing.faults import FaultyCell, after, detector_dead, during, seal_fails
 from executive.testing.run_mission import run_mission
 from executive.testing.substitutes import make_failing
@@ -109,14 +107,6 @@ def test_patterns_that_fit_no_node_are_refused(look: Path) -> None:
         run_mission(look, substitutes={"Wait": failing})
     with pytest.raises(InputError, match="tree/Detect runs Detect, but FailingFail is not a subclass"):
         run_mission(look, substitutes={"tree/*": failing})
-
-
-def test_the_fixtures_are_the_functions_of_the_kit_and_an_empty_cell(request: pytest.FixtureRequest) -> None:
-    assert request.getfixturevalue("run_skill") is skills.run_skill
-    assert request.getfixturevalue("run_mission") is run_mission
-    assert request.getfixturevalue("fake_cell").world.objects == []
-    (entry,) = (entry for entry in entry_points(group="pytest11") if entry.name == "executive")
-    assert entry.value == "executive.testing.plugin"
 
 
 def test_pytest_starts_without_anything_heavy(tmp_path: Path) -> None:

@@ -138,14 +138,6 @@ def test_a_bug_comes_up_in_mid_work_and_the_skill_cleans_up(fake: FakeCell, targ
     assert fake.arm.commands == ["start", "stop"]
 
 
-def test_a_bug_is_raised_at_the_given_times(fake: FakeCell) -> None:
-    late = make_raising(Wait, ValueError("a bug"), delay_steps=1000)
-    once = make_raising(Wait, ValueError("a bug"), start_count=1)
-    with pytest.raises(ValueError, match="a bug"):
-        run_skill(once, fake, inputs={"seconds": 0.1})
-    assert [run_skill(skill, fake, inputs={"seconds": 0.1}).ticks for skill in (late, once)] == [24, 24]
-
-
 def test_a_bug_in_finally_comes_up_in_a_halt_and_not_without_one(fake: FakeCell, target: Target) -> None:
     broken = make_raising_when_halted(Approach, ValueError("in finally"))
     with pytest.raises(Fault, match="ValueError while it was halted: in finally"):
