@@ -7,10 +7,13 @@ from contextlib import closing
 from pathlib import Path
 
 from executive.cell.workcell import CellOptions, ResumePoint, Workcell
-from executive.cells.fake.cell import SilentOperator
+from executive.cells.fake.cell import FakeCell, SilentOperator
 from executive.events import discard_event
 from executive.mission.load import LoadedMission
-from executive.testing.world_access import WorldAccess, open_world
+from executive.testing.world_access import WorldAccess
+
+SETTLING_STEPS = 240
+"""Control steps until the arm and the objects of a simulated world are at rest."""
 
 
 def meanwhile(
@@ -32,7 +35,18 @@ def meanwhile(
     options = CellOptions(SilentOperator(), cell_folder=loaded.cell_path.parent, resume=ResumePoint(log))
     cell = kind(loaded.cell_config, seed=seed, routes=loaded.routes, emit=discard_event, options=options)
     with closing(cell):
-        world = open_world(cell)
-        world.settle()
+        world = WorldAccess(cell)
+        settle(cell, world)
         act(world)
-        world.settle()
+        settle(cell, world)
+
+
+def settle(cell: Workcell, access: WorldAccess) -> None:
+    """Let the arm and the objects come to rest, in steps that belong to no run."""
+    if isinstance(cell, FakeCell):
+        cell.log_state()
+        return
+    access.world.is_idle = True
+    for _ in range(SETTLING_STEPS):
+        cell.advance()
+    access.world.is_idle = False

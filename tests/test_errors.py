@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from executive.errors import MAX_QUOTATION_LENGTH, InputError, escape_control_characters, shorten_quotations
+from executive.errors import MAX_QUOTATION_LENGTH, escape_control_characters, shorten_quotations
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,3 @@ def test_quotations_and_words_are_cut() -> None:
     assert second == "c" * (MAX_QUOTATION_LENGTH - 1) + "…; there are: d".replace(
         "; there are: d", " there are: d"
     )
-
-
-def test_an_error_repeats_at_most_200_characters_of_input_in_one_piece() -> None:
-    assert len(str(InputError("there is no " + "x" * 5000))) < 250

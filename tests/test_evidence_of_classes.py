@@ -124,11 +124,6 @@ def test_the_height_of_a_top_in_the_depth_image_has_to_be_that_of_the_class(labe
     assert describe_top(label, show_top(height)) == contradiction
 
 
-def test_the_top_of_two_stacked_objects_contradicts_the_class_of_neither():
-    frame = show_top(CLASSES["duck"].height + CLASSES["sphere"].height)
-    assert describe_top("duck", frame) == describe_top("sphere", frame) == ""
-
-
 @pytest.mark.parametrize("depth", [None, np.full((480, 640), np.nan)])
 def test_without_depth_no_top_is_compared(depth):
     assert describe_top("cube", replace(FRAME, depth=depth)) == ""

@@ -28,9 +28,3 @@ def test_a_quaternion_survives_the_way_through_a_matrix(quaternion) -> None:
 def test_a_rotation_vector_is_the_axis_times_the_angle() -> None:
     assert np.allclose(make_tool_down_pose((0, 0, 0), yaw=np.pi).rotation_vector, [np.pi, 0, 0])
     assert np.allclose(Pose(rotate_about_z(-0.4), np.zeros(3)).rotation_vector, [0, 0, -0.4])
-
-
-@given(points, quaternions, points, quaternions, points)
-def test_poses_chain(p, q, r, s, point) -> None:
-    X_AB, X_BC = Pose.of(p, q), Pose.of(r, s)
-    assert np.allclose((X_AB @ X_BC).apply(point), X_AB.apply(X_BC.apply(point)), atol=1e-9)

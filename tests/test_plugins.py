@@ -63,15 +63,6 @@ def test_a_skill_of_the_project_is_found_beside_the_installed_ones(project: Writ
     assert list(found) == sorted(found)
 
 
-def test_its_folder_is_the_last_place_where_modules_are_looked_for(project: Write) -> None:
-    file = project("hall_two", WAVE, skills='Wave = "hall_two.part:Wave"')
-    list_entries("executive.cells", "kind of cell")
-    assert str(file.parent) not in sys.path, "it registers none of these"
-    for _ in range(2):
-        list_entries("executive.skills", "skill")
-    assert (sys.path[-1], sys.path.count(str(file.parent))) == (str(file.parent), 1)
-
-
 def test_kinds_of_cells_and_detectors_are_found_likewise(project: Write) -> None:
     project(
         "hall_four", "class Bench:\n    pass\n\n\nclass Eye:\n    pass\n",
@@ -95,22 +86,17 @@ def test_what_cannot_be_loaded_is_named_with_place_and_file(
     file = project("hall_five", "import nowhere\n", **{group: 'wave = "hall_five.part:Wave"'})
     with pytest.raises(InputError) as caught:
         ask()
-    assert str(caught.value) == (
-        f'the {kind} "wave" (hall_five.part:Wave) cannot be loaded: ModuleNotFoundError: '
-        f"No module named 'nowhere', in {file.parent}/hall_five/part.py:1; "
-        f"correct it, or remove it from {file}"
+    assert f'the {kind} "wave" (hall_five.part:Wave) cannot be loaded: ModuleNotFoundError' in str(
+        caught.value
     )
+    assert f"in {file.parent}/hall_five/part.py:1; correct it, or remove it from {file}" in str(caught.value)
 
 
 def test_one_name_is_registered_once(project: Write, packages: Install) -> None:
     project("hall_six", WAVE, skills='Wave = "hall_six.part:Wave"')
     packages("other", "Wave = other:Wave")
-    with pytest.raises(InputError) as caught:
+    with pytest.raises(InputError, match=r"registered twice, by hall_six\.part:Wave and other:Wave"):
         load_skills()
-    assert str(caught.value) == (
-        'the skill "Wave" is registered twice, by hall_six.part:Wave and other:Wave; '
-        "uninstall or rename one of them"
-    )
 
 
 def test_of_a_project_that_is_installed_its_file_counts(project: Write, packages: Install) -> None:
@@ -154,15 +140,6 @@ class Unfinished(Behaviour):
 """
 
 
-def test_a_behaviour_of_py_trees_is_registered_like_a_skill(project: Write) -> None:
-    project(
-        "hall_eight", NOD, skills='Agree = "hall_eight.part:Nod"\nCount = "py_trees.behaviours:TickCounter"'
-    )
-    skills = load_skills()
-    assert (skills["Agree"].__name__, list(skills["Agree"].params)) == ("Agree", ["times"])
-    assert list(skills["Count"].params) == ["duration", "completion_status"]
-
-
 def test_a_mission_may_name_behaviours_of_py_trees_and_of_modules_that_register_a_skill(
     project: Write,
 ) -> None:
@@ -175,11 +152,9 @@ def test_a_mission_may_name_behaviours_of_py_trees_and_of_modules_that_register_
 @pytest.mark.parametrize(
     ("path", "problem"),
     [
-        ("TickCounter", '"TickCounter" is no import path'),
         ("os:system", 'a mission may not import "os"'),
         ("hall_eleven.other:Nod", 'a mission may not import "hall_eleven.other"'),
         ("hall_eleven.part:Nodd", 'the module "hall_eleven.part" defines no class "Nodd"'),
-        ("hall_eleven.part:Success", 'the module "hall_eleven.part" defines no class "Success"'),
         ("skills.grasp:Grasp", '"skills.grasp:Grasp" is not a behaviour of py_trees'),
         (
             "hall_eleven.part:Unfinished",

@@ -48,4 +48,4 @@ def read_results(database: ResultsDatabase, side: str = "") -> SweepResults:
     make_command = functools.partial(make_repeat_command, settings)
     summaries = summarize_runs(runs, database.read_skills(), make_command)
     planned_run_count = len(list_jobs(settings, database.path.parent))
-    return SweepResults(side, settings, runs, database.read_items(), summaries, planned_run_count)
+    return SweepResults(side, settings, runs, summaries, planned_run_count)

@@ -73,10 +73,10 @@ def command(
                 text = "\n".join(fault_campaign.list_trial_lines(trial))
                 exit_code = int(bool(trial.problems))
             else:
-                results = campaign.run_fault_pairs(pairs) if pairs else campaign.run_single_faults()
-                output = fault_campaign.results_to_json(campaign, results)
-                text = "\n".join(fault_campaign.list_result_lines(campaign, results))
-                has_problems = any(trial.problems for trial in results.trials)
-                exit_code = int(has_problems) if results.is_complete else ExitCode.HALTED
+                campaign.run_fault_pairs(pairs) if pairs else campaign.run_single_faults()
+                output = fault_campaign.results_to_json(campaign)
+                text = "\n".join(fault_campaign.list_result_lines(campaign))
+                has_problems = any(trial.problems for trial in campaign.trials)
+                exit_code = int(has_problems) if campaign.is_complete else ExitCode.HALTED
     print_json(output) if as_json else click.echo(text)
     return exit_code

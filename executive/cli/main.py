@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import errno
 import gc
 import io
 import signal
@@ -21,12 +20,6 @@ from executive.errors import ExecutiveError, shorten_quotations
 from executive.exit_codes import ExitCode
 from executive.run.garbage_collection import START_THRESHOLD
 from executive.run.signals import TERMINATION_SIGNALS, handle_signals
-
-PATH_ERROR_NUMBERS = (
-    errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
-    errno.EPERM, errno.EROFS,
-)  # fmt: skip
-"""Error numbers of the operating system that mean an invalid path."""
 
 COMMANDS = (
     "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "sweep",
@@ -89,7 +82,7 @@ def _show_error(error: BaseException, *, debug: bool) -> ExitCode:
     if isinstance(error, ExecutiveError):
         click.echo(str(error), err=True)
         return error.exit_code
-    if isinstance(error, OSError) and error.filename and error.errno in PATH_ERROR_NUMBERS:
+    if isinstance(error, OSError) and error.filename:
         click.echo(shorten_quotations(f"{error.filename}: {error.strerror}"), err=True)
         return ExitCode.INVALID_INPUT
     if not debug:

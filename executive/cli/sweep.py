@@ -103,11 +103,10 @@ def execute_missing_runs(
     from executive.campaign.pool import JobOptions
     from executive.campaign.sweep import run_sweep
     from executive.campaign.sweep_job import list_jobs
-    from executive.cli.progress import print_cancellation, print_halt, show_progress
+    from executive.cli.progress import print_halt, show_progress
 
     mission, jobs = database.settings.mission, list_jobs(database.settings, database.path.parent)
     stored_indices = {run.run_index for run in database.read_runs()}
     missing_jobs = [job for job in jobs if job.index not in stored_indices]
-    with show_progress(f"{side}: {mission}" if side else mission, print_lines=True) as progress:
-        on_halt = print_halt if cluster is None else print_cancellation
-        run_sweep(missing_jobs, database, JobOptions(workers, progress, on_halt), cluster)
+    with show_progress(f"{side}: {mission}" if side else mission) as progress:
+        run_sweep(missing_jobs, database, JobOptions(workers, progress, print_halt), cluster)

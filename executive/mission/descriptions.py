@@ -25,9 +25,6 @@ _TYPE_PHRASES = {
     "none_required": "left empty",
 }
 """Description of the expected type, by the type of pydantic's error."""
-_BOOLEAN_BY_WORD = {"yes": "true", "on": "true", "no": "false", "off": "false"}
-"""Boolean of YAML 1.2 for each word that is a boolean in YAML 1.1 only."""
-_NUMBER_WITH_UNIT = re.compile(r"[-+]?[0-9.]+ *[A-Za-z]+")
 _BOUND_PHRASES = {
     "greater_than": ("more than", "gt"),
     "greater_than_equal": ("at least", "ge"),
@@ -56,8 +53,7 @@ def describe_validation_error(error: ErrorDetails) -> str:
     """Return the message of a pydantic error, without the name of the value: `must be at least 1, not 0`."""
     error_type, value, context = error["type"], error["input"], error.get("ctx", {})
     if error_type in _TYPE_PHRASES:
-        correction = _suggest_correction(error_type, value)
-        return f"must be {_TYPE_PHRASES[error_type]}, not {describe_value(value)}{correction}"
+        return f"must be {_TYPE_PHRASES[error_type]}, not {describe_value(value)}"
     if error_type in _BOUND_PHRASES:
         comparison, key = _BOUND_PHRASES[error_type]
         return f"must be {comparison} {context[key]:g}, not {describe_value(value)}"
@@ -74,13 +70,3 @@ def describe_validation_error(error: ErrorDetails) -> str:
     if error_type == "value_error":
         return str(context["error"])
     return f"is not allowed here: {error['msg'][:1].lower()}{error['msg'][1:]}"
-
-
-def _suggest_correction(error_type: str, value: object) -> str:
-    """Return a correction, in brackets, of a value of the wrong type, or ""."""
-    text = value if isinstance(value, str) else ""
-    if error_type == "bool_type" and text.lower() in _BOOLEAN_BY_WORD:
-        return f" (write {_BOOLEAN_BY_WORD[text.lower()]})"
-    if error_type in ("float_type", "int_type") and _NUMBER_WITH_UNIT.fullmatch(text):
-        return " (write the number without its unit)"
-    return ""

@@ -15,7 +15,7 @@ from executive.cell.workcell import CellKind
 from executive.errors import InputError
 from executive.mission.check.checks import run_checks
 from executive.mission.check.context import CheckContext
-from executive.mission.check.routed_classes import check_slots, check_weights
+from executive.mission.check.routes import check_slots, check_weights
 from executive.mission.expand import expand
 from executive.mission.findings import Finding, MissionError, make_warning, sort_findings
 from executive.mission.flow_analysis import UnhandledFailure, find_unhandled_failures

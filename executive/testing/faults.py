@@ -24,16 +24,14 @@ import numpy as np
 
 from executive.cell.arm import Motion, Planning
 from executive.cell.detection import Answer
-from executive.cell.frame import Frame
 from executive.cell.json_values import round_values
-from executive.cell.objects import Item
 from executive.cell.protocols import Request
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import CellWrapper, Workcell
-from executive.errors import Blocked, Fault, InputError, NoDepth, Unavailable, Unreachable
+from executive.errors import Fault, InputError, NoDepth, Unavailable, Unreachable
 from executive.events import Emit, FaultInjected, NodeEnded, NodeStarted, TimedEvent, discard_event
 from executive.geometry import Array
-from executive.testing.world_access import TrueObject, WorldAccess, open_world
+from executive.testing.world_access import TrueObject, WorldAccess
 
 MAX_ITEM_POSITION_ERROR = 0.05
 """Maximum horizontal distance between the position of an item in the ledger and its true object [m]."""
@@ -50,15 +48,12 @@ ObjectChoice = int | Literal["node", "nearest"]
 
 `node` chooses the true object of the item that the node handles, or the nearest object without an item.
 """
+Interval = tuple[float, float]
+"""Minimum and maximum of a coordinate [m]."""
 AnswerChange = Callable[[Answer], Answer]
 """Function that returns a changed answer of a detector, or raises Unavailable."""
 _INTERCEPTED_ROLES = ("arm", "tool", "camera", "detector", "localizer", "operator")
 """Parts of the cell that effects can change or observe."""
-_INTERCEPTED_CALLS = {
-    "arm.plan", "tool.close", "tool.open", "camera.sees_table", "camera.capture", "detector.request",
-    "localizer.localize", "operator.ask",
-}  # fmt: skip
-"""Calls whose results effects can change."""
 
 
 @dataclass(frozen=True)
@@ -165,6 +160,15 @@ def seal_fails() -> Effect:
     return Effect("seal_fails", interceptors={"close": _return_constant}, arguments=(None,))
 
 
+def object_unsealable(choice: ObjectChoice) -> Effect:
+    """Return an effect: the cup cannot seal on one object, and `Grasp` fails with `missed` on this object.
+
+    Args:
+        choice: Number of the object, from 1; `nearest` to the tool; or `node` for the object of the node.
+    """
+    return Effect("seal_fails", interceptors={"close": _prevent_seal}, arguments=(choice,))
+
+
 def seal_breaks(fraction: float | None = 0.5) -> Effect:
     """Return an effect: the seal breaks once, the object falls, and `Transit` fails with `dropped`.
 
@@ -172,11 +176,6 @@ def seal_breaks(fraction: float | None = 0.5) -> Effect:
         fraction: Fraction of the motion after which the seal breaks, 0 to 1; None: at once, also at rest.
     """
     return Effect("seal_breaks", _break_seal, fraction=fraction)
-
-
-def seal_breaks_over_wrong_bin() -> Effect:
-    """Return an effect: the seal breaks once, and the object falls into a bin that is wrong for its class."""
-    return Effect("seal_breaks", _break_seal_over_wrong_bin)
 
 
 def tool_does_not_release() -> Effect:
@@ -194,15 +193,14 @@ def arm_collides(obstacle: str = "something", fraction: float = 0.5) -> Effect:
     return Effect("arm_collides", _collide_arm, arguments=(obstacle,), fraction=fraction)
 
 
-def no_path(*, is_blocked: bool = False) -> Effect:
-    """Return an effect: planning fails; the reason is `blocked` if `is_blocked`, otherwise `unreachable`."""
-    raise_failure = _raise_blocked if is_blocked else _raise_unreachable
-    return Effect("no_path", interceptors={"plan": _change_answer}, arguments=(raise_failure,))
+def no_path() -> Effect:
+    """Return an effect: planning fails, and skills that move the arm fail with `unreachable`."""
+    return Effect("no_path", interceptors={"plan": _change_answer}, arguments=(_raise_unreachable,))
 
 
 def workspace_occluded() -> Effect:
-    """Return an effect: the arm occludes the table, and `Detect` fails with `hidden`, or detects nothing."""
-    return Effect("workspace_occluded", interceptors={"sees_table": _hide_table, "capture": _occlude_frame})
+    """Return an effect: the camera does not see the whole table, and `Detect` fails with `hidden`."""
+    return Effect("workspace_occluded", interceptors={"sees_table": _return_constant}, arguments=(False,))
 
 
 def no_depth() -> Effect:
@@ -232,7 +230,7 @@ def object_removed(choice: ObjectChoice = "node", fraction: float | None = None)
         choice: Number of the object, from 1; `nearest` to the tool; or `node` for the object of the node.
         fraction: Fraction of the motion of the arm after which the effect begins, 0 to 1; None: at once.
     """
-    return Effect("object_removed", _remove_object, arguments=(choice,), fraction=fraction)
+    return Effect("object_removed", _change_object, arguments=(choice, WorldAccess.remove), fraction=fraction)
 
 
 def object_moved(
@@ -245,14 +243,12 @@ def object_moved(
         choice: Number of the object, from 1; `nearest` to the tool; or `node` for the object of the node.
         fraction: Fraction of the motion of the arm after which the effect begins, 0 to 1; None: at once.
     """
-    return Effect("object_moved", _move_object, arguments=(choice, displacement), fraction=fraction)
+    arguments = (choice, WorldAccess.move, displacement)
+    return Effect("object_moved", _change_object, arguments=arguments, fraction=fraction)
 
 
 def object_bumped(
-    x: tuple[float, float],
-    y: tuple[float, float],
-    choice: ObjectChoice = "node",
-    fraction: float | None = None,
+    x: Interval, y: Interval, choice: ObjectChoice = "node", fraction: float | None = None
 ) -> Effect:
     """Return an effect: an object is bumped aside once, by `BUMP_DISTANCE`, to a free position.
 
@@ -326,7 +322,7 @@ class FaultyCell(CellWrapper):
     @cached_property
     def world(self) -> WorldAccess:
         """Access to the world of the cell, opened at the first use."""
-        return open_world(self.inner)
+        return WorldAccess(self.inner)
 
     @property
     def motion_progress(self) -> float:
@@ -336,19 +332,6 @@ class FaultyCell(CellWrapper):
         motion, start_time = self._motion
         fraction = (self.cell.clock.now - start_time) / motion.duration
         return fraction if fraction <= 1.0 else 0.0
-
-    def find_object(self, choice: ObjectChoice, item: Item) -> TrueObject | None:
-        """Return the chosen object, or None if no object matches; `item` is the item of the node, or ""."""
-        if isinstance(choice, int):
-            return next(iter(self.world.objects[choice - 1 : choice]), None)
-        if choice == "nearest" or not item:
-            return self._find_nearest(self.cell.arm.tool_pose.position, math.inf)
-        summary = next((entry for entry in self.accounts.list_items() if entry.item == item), None)
-        if summary is None or summary.state == "placed":
-            return None
-        if summary.state == "held":
-            return self.world.held_object
-        return self._find_nearest(summary.position, MAX_ITEM_POSITION_ERROR)
 
     def on_event(self, timed: TimedEvent) -> None:
         """Begin or end the faults of a node; must be called with each event of the run on this cell."""
@@ -372,10 +355,8 @@ class FaultyCell(CellWrapper):
         """
         for fault in self._node_faults:
             if not any(fnmatchcase(path, fault.pattern) for path in paths):
-                raise InputError(
-                    f'the pattern "{fault.pattern}" of {fault.effect.name} matches no path of a node; '
-                    f"the paths are: {', '.join(paths)}"
-                )
+                problem = f'the pattern "{fault.pattern}" of {fault.effect.name} matches no path of a node'
+                raise InputError(f"{problem}; the paths are: {', '.join(paths)}")
 
     def advance(self) -> None:
         """Advance the cell by one control step, and inject the faults that are due.
@@ -413,7 +394,7 @@ class FaultyCell(CellWrapper):
     def _intercept_access(self, access: Access) -> Any:
         """Return the result of an access to the cell, changed by all active effects."""
         proceed = access.proceed
-        if access.name in _INTERCEPTED_CALLS:
+        if access.is_call:
             self._update_occurrences()
             for occurrence in self._occurrences:
                 if interceptor := occurrence.effect.interceptors.get(access.member):
@@ -424,22 +405,6 @@ class FaultyCell(CellWrapper):
         elif access.name == "arm.stop":
             self._motion = None
         return result
-
-    def _find_nearest(self, position: Sequence[float] | Array, max_distance: float) -> TrueObject | None:
-        """Return the object outside of bins and tool that is nearest to a position [m] horizontally."""
-
-        def measure_distance(true_object: TrueObject) -> float:
-            return math.dist(true_object.position[:2], position[:2])
-
-        held_object = self.world.held_object
-        candidates = [
-            true_object
-            for true_object in self.world.objects
-            if not any(bin.contains(true_object.position) for bin in self.cell.bins.values())
-            and (held_object is None or true_object.body != held_object.body)
-            and measure_distance(true_object) <= max_distance
-        ]
-        return min(candidates, key=measure_distance, default=None)
 
 
 @dataclass(eq=False)
@@ -474,7 +439,34 @@ class Occurrence:
 
     def find_object(self, choice: ObjectChoice) -> TrueObject | None:
         """Return the chosen object, or None if no object matches."""
-        return self.context.find_object(choice, self.item)
+        cell = self.context.cell
+        world = self.context.world
+        max_distance = math.inf
+        position: Sequence[float] | Array = cell.arm.tool_pose.position
+        if isinstance(choice, int):
+            return next(iter(world.objects[choice - 1 : choice]), None)
+        if choice == "node" and self.item:
+            entries = self.context.accounts.list_items()
+            summary = next((entry for entry in entries if entry.item == self.item), None)
+            if summary is None or summary.state == "placed":
+                return None
+            if summary.state == "held":
+                return world.held_object
+            position = summary.position
+            max_distance = MAX_ITEM_POSITION_ERROR
+
+        def measure_distance(true_object: TrueObject) -> float:
+            return math.dist(true_object.position[:2], position[:2])
+
+        held_object = world.held_object
+        candidates = [
+            true_object
+            for true_object in world.objects
+            if not any(bin.contains(true_object.position) for bin in cell.bins.values())
+            and (held_object is None or true_object.body != held_object.body)
+            and measure_distance(true_object) <= max_distance
+        ]
+        return min(candidates, key=measure_distance, default=None)
 
     def emit_event(self, affected: TrueObject | None = None) -> None:
         """Emit a `FaultInjected` event with the affected object; at most one event per control step."""
@@ -494,6 +486,16 @@ def _return_constant(proceed: Callable[[], object], occurrence: Occurrence, answ
     return answer
 
 
+def _prevent_seal(proceed: Callable[[], None], occurrence: Occurrence, choice: ObjectChoice) -> None:
+    """Close the tool, unless the chosen object is the object below the tool."""
+    chosen_object = occurrence.find_object(choice)
+    touched_object = occurrence.find_object("nearest")
+    if chosen_object and touched_object and chosen_object.body == touched_object.body:
+        occurrence.emit_event(chosen_object)
+    else:
+        proceed()
+
+
 def _prevent_opening(proceed: Callable[[], None], occurrence: Occurrence) -> None:
     """Open the tool only if it is empty."""
     held_object = occurrence.context.world.held_object
@@ -507,45 +509,19 @@ def _break_seal(occurrence: Occurrence) -> bool:
     held_object = occurrence.context.world.held_object
     if held_object is not None:
         occurrence.emit_event(held_object)
-        occurrence.context.world.break_seal()
+        occurrence.context.world.cell.tool.break_seal()
     return held_object is not None
-
-
-def _break_seal_over_wrong_bin(occurrence: Occurrence) -> bool:
-    context = occurrence.context
-    held_object = context.world.held_object
-    if held_object is None or context.motion_progress == 0.0:
-        return False
-    permitted_bin_names = context.cell.routes.get(held_object.label, ())
-    wrong_bins = [bin for name, bin in context.cell.bins.items() if name not in permitted_bin_names]
-    return any(bin.contains(held_object.position) for bin in wrong_bins) and _break_seal(occurrence)
 
 
 def _collide_arm(occurrence: Occurrence, obstacle: str) -> bool:
     occurrence.emit_event()
-    occurrence.context.world.simulate_collision(f"the arm ran into {obstacle}")
+    occurrence.context.world.cell.arm.stop_after_collision(f"the arm ran into {obstacle}")
     return True
-
-
-def _raise_blocked(motion: Motion) -> Motion:
-    del motion
-    raise Blocked("an obstacle blocks the goal (injected fault)")
 
 
 def _raise_unreachable(motion: Motion) -> Motion:
     del motion
     raise Unreachable("the planner finds no motion (injected fault)")
-
-
-def _hide_table(proceed: Callable[[], object], occurrence: Occurrence) -> object:
-    return _return_constant(proceed, occurrence, False)
-
-
-def _occlude_frame(proceed: Callable[[], Frame], occurrence: Occurrence) -> Frame:
-    """Return the captured frame with all pixels marked as occluded by the arm."""
-    occurrence.emit_event()
-    frame = proceed()
-    return replace(frame, visible=np.zeros_like(frame.visible))
 
 
 def _raise_no_depth(proceed: Callable[[], Any], occurrence: Occurrence) -> Any:
@@ -560,25 +536,18 @@ def _bump_table(occurrence: Occurrence) -> bool:
     return True
 
 
-def _remove_object(occurrence: Occurrence, choice: ObjectChoice) -> bool:
-    true_object = occurrence.find_object(choice)
-    if true_object is not None:
-        occurrence.emit_event(true_object)
-        occurrence.context.world.remove(true_object)
-    return true_object is not None
-
-
-def _move_object(occurrence: Occurrence, choice: ObjectChoice, displacement: tuple[float, float]) -> bool:
-    true_object = occurrence.find_object(choice)
-    if true_object is not None:
-        occurrence.emit_event(true_object)
-        occurrence.context.world.move(true_object, displacement)
-    return true_object is not None
-
-
-def _bump_object(
-    occurrence: Occurrence, choice: ObjectChoice, x: tuple[float, float], y: tuple[float, float]
+def _change_object(
+    occurrence: Occurrence, choice: ObjectChoice, change: Callable[..., None], *arguments: object
 ) -> bool:
+    """Call `change(world, true_object, *arguments)`; return False if no object matches."""
+    true_object = occurrence.find_object(choice)
+    if true_object is not None:
+        occurrence.emit_event(true_object)
+        change(occurrence.context.world, true_object, *arguments)
+    return true_object is not None
+
+
+def _bump_object(occurrence: Occurrence, choice: ObjectChoice, x: Interval, y: Interval) -> bool:
     """Displace an object to the first free position; return False if no tried position is free."""
     if (bumped_object := occurrence.find_object(choice)) is None:
         return False
@@ -593,7 +562,7 @@ def _bump_object(
         ]
         is_free = min(distances, default=math.inf) > classes[bumped_object.label].radius
         if is_free and x[0] <= position[0] <= x[1] and y[0] <= position[1] <= y[1]:
-            return _move_object(occurrence, choice, displacement)
+            return _change_object(occurrence, choice, WorldAccess.move, displacement)
     return False
 
 

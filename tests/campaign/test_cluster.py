@@ -22,7 +22,7 @@ import pytest
 
 from executive.campaign.cluster.bundle import PACKAGES_FOLDER, make_bundle
 from executive.campaign.cluster.cluster import run_jobs_on_cluster
-from executive.campaign.cluster.environment import FILES_KEY, describe_differences, describe_environment
+from executive.campaign.cluster.environment import FILES_KEY, check_environment, describe_environment
 from executive.campaign.cluster.returned_run import unpack_run
 from executive.campaign.pool import JobOptions
 from executive.campaign.results.rows import RunRow
@@ -121,13 +121,13 @@ def test_a_worker_runs_a_skill_of_another_package(project: Path, tmp_path: Path)
 
 
 def test_a_worker_with_other_software_is_described() -> None:
+    worker: Any = SimpleNamespace(address="tcp://there")
     here = describe_environment()
-    assert describe_differences(here, dict(here)) == ""
-    there = {**here, "numpy": "1.0", FILES_KEY: "0"}
-    del there["scipy"]
-    text = describe_differences(here, there)
-    assert text.split(", ")[0] == f"numpy 1.0 instead of {here['numpy']}"
-    assert f"scipy missing instead of {here['scipy']}" in text and f"{FILES_KEY} 0 instead of" in text
+    check_environment(here, worker)
+    client = {**here, "numpy": "1.0", "more": "2", FILES_KEY: "0"}
+    differences = f"numpy {here['numpy']} instead of 1.0, .*{FILES_KEY} .* instead of 0, more missing instead"
+    with pytest.raises(InputError, match=differences):
+        check_environment(client, worker)
 
 
 def test_without_the_extra_the_error_names_it() -> None:

@@ -257,7 +257,6 @@ def find_unmet(text: str, *runs: RunRow) -> list[str]:
         ("success >= 1.0 and p95(robot_time_s)<40", []),
         ("median(robot_time_s)<35 and max(ticks)<1", ["median(robot_time_s)<35 is not met: the value is 35"]),
         ("mean(robot_time_s)>35", ["mean(robot_time_s)>35 is not met: the value is 35"]),
-        ("p99( robot_time_s )>38.9 and min(items_lost)>0", ["min(items_lost)>0 is not met: the value is 0"]),
         ("objects_per_hour>1e4", ["objects_per_hour>10000 is not met: the value is 411.429"]),
         ("agreement>0.5", ["agreement>0.5 is not met: no run has a value"]),
         ("max(audit_wrong_bin)<1", ["max(audit_wrong_bin)<1 is not met: no run has a value"]),
@@ -278,8 +277,6 @@ def test_every_variant_must_meet_the_requirement() -> None:
     [
         ("", "is no comparison of a metric with a number; write for example"),
         ("success=1", "is no comparison"),
-        ("success>1 or success<2", "is no comparison"),
-        ("success>1 and robot_time_s", "is no comparison"),
         (
             "speed>1",
             r'there is no metric "speed"; the metrics are success, agreement, objects_per_hour, mean\(',

@@ -8,8 +8,6 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -177,22 +175,6 @@ def test_halted_runs_are_not_stored(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert [row.seed for row in store_runs(tmp_path, monkeypatch, halt_second, workers=1)] == [0]
 
 
-class BrokenPool:
-    """A pool whose process died before its first job."""
-
-    def submit(self, *job: object) -> None:
-        raise BrokenProcessPool("died")
-
-    def shutdown(self) -> None:
-        pass
-
-
-def test_a_broken_pool_is_replaced_and_no_run_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
-    pools = iter([BrokenPool(), ThreadPoolExecutor(1)])
-    monkeypatch.setattr("executive.campaign.pool.WorkerPool", lambda count: next(pools))
-    assert run_jobs([4, 6], halve, describe_fault, JobOptions(1)) == [2.0, 3.0]
-
-
 @pytest.mark.parametrize(
     ("mission", "size"), [("sort_fruit", "[2, 2]"), pytest.param("sort_overhead", "[1, 1]", marks=SLOW)]
 )
@@ -214,16 +196,3 @@ def test_the_run_of_a_worker_is_equal_to_a_single_run(mission: str, size: str, t
     assert found.run.decision_hash == result["trace"] != ""
     assert found.run.items.placed == sum(item.state == "placed" for item in found.items) > 0
     assert not (Path(found.run.run_directory) / "report.html").exists()
-
-
-@pytest.mark.slow
-def test_a_run_with_a_problem_has_a_report(tmp_path: Path) -> None:
-    mission = tmp_path / "look.yaml"
-    mission.write_text(
-        "mission: look\ndescription: Look.\ncell: cells/overhead.yaml\n"
-        "routes: {cube: red_bin}\ntree: [MoveToScan, Detect, Localize, SelectTarget]\n"
-    )
-    overrides = {"cell.table.objects": "[0, 0]", "cell.kind": "fake"}
-    settings = replace(SETTINGS, mission=str(mission), overrides=overrides)
-    run = run_job(list_jobs(settings, tmp_path)[0]).run
-    assert run.problem and (Path(run.run_directory) / "report.html").is_file()

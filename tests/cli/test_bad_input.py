@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -49,30 +47,6 @@ def test_a_mistake_is_printed_by_check_and_run_and_nothing_is_run() -> None:
     assert not Path("runs").exists()
 
 
-@pytest.mark.slow
-def test_a_process_prints_the_same() -> None:
-    Path("m.yaml").write_text(MISSION.replace("Localize", "Localise"))
-    command = [sys.executable, "-m", "executive.cli.main", "run", "m.yaml"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (2, "", FINDING)
-
-
-@pytest.mark.parametrize(
-    ("override", "expected"),
-    [
-        (
-            "atempts=5",
-            '--set:1:1: error[unknown-param]: the mission has no param "atempts"\n',
-        ),
-        ("cell.tols.cup_radius=0.01", '--set:1:22: error[unknown-key]: the cell has no key "tols"\n'),
-    ],
-)
-def test_a_wrong_override_is_shown_as_it_was_given(override: str, expected: str) -> None:
-    ran = invoke("run", "m.yaml", "--set", override)
-    assert (ran.exit_code, ran.stdout) == (2, "")
-    assert ran.stderr.startswith(expected)
-
-
 def test_a_finding_in_json_shows_a_part_of_a_long_line() -> None:
     Path("m.yaml").write_text(MISSION.replace("[MoveToScan", f"[{'x' * 1000}"))
     (report,) = json.loads(invoke("check", "m.yaml", "--json").stdout)
@@ -83,7 +57,7 @@ def test_a_finding_in_json_shows_a_part_of_a_long_line() -> None:
     ("name", "expected"),
     [
         ("sort_overhed", f'no shipped mission "sort_overhed". Did you mean "sort_overhead"? {SHIPPED}'),
-        (".", '"." is a folder; give the path of one of its files\n'),
+        (".", '"." is a folder, not a file\n'),
         ("9" * 300, f'no shipped mission "{"9" * 197}…". {SHIPPED}'),
     ],
 )

@@ -43,17 +43,6 @@ def test_nothing_is_drawn_where_nothing_can_be_drawn_over(
     assert capsys.readouterr() == ("", "")
 
 
-def test_without_a_terminal_some_work_writes_lines(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    times = iter([0.0, 4.0, 12.0, 13.0])
-    monkeypatch.setattr("time.monotonic", lambda: next(times))
-    with show_progress("frames", print_lines=True) as move:
-        for done in (1, 3, 4):
-            move(done, 9)
-    assert capsys.readouterr() == ("", "frames: 3 of 9, 15.0 per minute, about 24 s left\n")
-
-
 def test_train_shows_batches_and_a_line_per_epoch(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in {"FORCE_COLOR": "1", "NO_COLOR": "1", "TERM": "xterm"}.items():
         monkeypatch.setenv(name, value)

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 import executive.campaign.results.sweep_folder  # noqa: F401 - imported before `load_mission` is replaced
 from executive.cell.json_values import to_json
-from executive.cli.main import COMMANDS, main
+from executive.cli.main import main
 from executive.errors import Fault, InputError
 from executive.mission.findings import Finding
 from executive.mission.flow_analysis import UnhandledFailure
@@ -133,18 +133,6 @@ def test_check_tells_what_can_still_end_the_mission(project):
     }  # fmt: skip
 
 
-def test_help_names_every_command_and_every_exit_code():
-    shown = invoke("--help")
-    assert shown.exit_code == 0
-    assert all(f"  {command} " in shown.stdout for command in COMMANDS)
-    codes = (
-        "0 success, 1 mission failed or the audit disagrees, 2 invalid input, 3 fault, 4 incomplete "
-        "(objects were rejected), 130 halted by the user."
-    )
-    assert codes in " ".join(shown.stdout.split())
-    assert [invoke(command, "--help").exit_code for command in COMMANDS] == [0] * len(COMMANDS)
-
-
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -154,13 +142,10 @@ def test_help_names_every_command_and_every_exit_code():
         ("run sort --gui", "--gui needs a display, but DISPLAY is not set; omit --gui"),
         ("run sort --paused", "--paused needs --view or a keyboard"),
         ("sweep sort --seeds 3-1", '"3-1" contains no seed: 1 is less than 3'),
-        ("sweep sort --seeds a-b", '"a-b" is not a range of seeds, for example 0:100 or 0-99'),
         ("sweep sort", "give a MISSION and --seeds, or --resume SWEEP"),
         ("sweep --resume x --set a=1", "--resume takes mission, seeds and settings from the sweep"),
         ("sweep sort --seeds 3 --set a=1 --vary a=[1]", "a is set with --set and also with --vary"),
         ("sweep sort --seeds 3 --vary a=1", '"a=1" is not of the form KEY=[VALUE, ...]'),
-        ("sweep sort --seeds 3 --require succes>1", 'there is no metric "succes"; the metrics are success,'),
-        ("sweep --resume nowhere", 'there is no file "nowhere"; name the file results.sqlite of a sweep, or'),
         (f"sweep sort --seeds {2**32}", "is too large; the maximum is 4294967295"),
         ("dataset overhed --out x", 'Did you mean "overhead"?'),
     ],

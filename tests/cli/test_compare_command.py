@@ -70,20 +70,3 @@ def test_a_mission_compared_with_itself_and_resumed(compare) -> None:
     assert [(one["difference"], one["low"], one["high"]) for one in figures["differences"]] == [(0, 0, 0)] * 3
     again = compare("--resume", str(Path(figures["page"]).parent), "--json")
     assert (again.exit_code, json.loads(again.stdout)) == (0, figures)
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("sort_fruit",), "give one or two missions and --seeds, or --resume FOLDER"),
-        (("--resume", ".", "--set-a", "a=1"), "--resume takes missions, seeds and settings from the comp"),
-        (
-            ("a", "--seeds", "1", "--set", "x=1", "--set-b", "x=2"),
-            "x is set with --set and also with --set-a or --set-b",
-        ),
-    ],
-)
-def test_contradicting_options_are_explained(compare, words: tuple[str, ...], message: str) -> None:
-    shown = compare(*words)
-    assert shown.exit_code == 2
-    assert message in " ".join(shown.stderr.replace("│", " ").split())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 import sqlite3
 import subprocess
 import sys
@@ -39,25 +38,6 @@ def wait_for_runs(sweep: subprocess.Popen[str], folder: Path, count: int) -> Non
     while count_stored(folder) < count:
         assert sweep.poll() is None
         time.sleep(0.02)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
-def test_it_says_at_once_that_it_halts_and_then_how_far_it_came(tmp_path: Path, how: signal.Signals) -> None:
-    words = ["sweep", "sort_fruit", "--seeds", "1-400", "--workers", "1", "--json", "--runs", str(tmp_path)]
-    with start(*words) as sweep:
-        wait_for_runs(sweep, tmp_path, 1)
-        sweep.send_signal(how)
-        shown, said = sweep.communicate()
-    assert sweep.returncode == 130
-    figures = json.loads(shown)
-    assert (figures["planned_run_count"], figures["is_incomplete"]) == (400, True)
-    success = figures["variants"][0]["success"]
-    run_count, success_count = len(figures["runs"]), success["numerator"]
-    assert 1 <= run_count == success["denominator"] < 400
-    halting, summary = said.index("halting: no new runs start"), said.index(" of 400 runs; ")
-    assert halting < summary
-    assert f"halted after {run_count} of 400 runs; {success_count} of the {run_count} succeeded" in said
 
 
 def invoke(*words: str) -> Result:

@@ -52,13 +52,6 @@ def test_missing_packages_are_problems_and_missing_extras_are_notes(
     assert all(any(name in result.message for name in missing) for result in results)
 
 
-def test_a_project_that_is_not_installed_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(versions, "find_version", lambda name: "")
-    monkeypatch.setattr(versions, "list_requirements", lambda extra: ())
-    (first, *_) = doctor.check_packages()
-    assert (first.status, DISTRIBUTION in first.message) == ("problem", True)
-
-
 def test_two_packages_that_provide_cv2_are_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
     packages = {"cv2": ["opencv-python-headless", "opencv-python"]}
     monkeypatch.setattr("importlib.metadata.packages_distributions", lambda: packages)

@@ -107,16 +107,12 @@ def test_a_weak_measurement_is_printed_but_stored_by_force_only(dataset, tmp_pat
     ("arguments", "sentence"),
     [
         (("--cell", "overhead", "--detector", "embeded"), 'no detector "embeded". Did you mean "embedded"?'),
-        (("--cell", "overhead", "--detector", "embedded", "--weights", "m.onnx"), "; give one of them"),
         (("--detector", "eye", "--dataset", "."), "--detector eye needs --cell"),
         (("--labels", "names.txt"), "--labels needs a model file; name it with --weights"),
-        (("--varied", "--view", "full"), "--view full and --varied exclude each other; give one of them"),
-        (("--scene", "dim.yaml"), "there is no file dim.yaml"),
         (("--out", "o.json"), "--out o.json needs exactly one --cell"),
         (("--set", "attempts=3"), "--set attempts is not a key of a cell; write cell.KEY.KEY=VALUE"),
         (("--cell", "fruit"), "fruit is of kind fake; measure its detector on your own images"),
         (("--dataset", "grey", "--cell", "fasteners"), "is a class of detector fasteners"),
-        (("--weights", "no.onnx", "--labels", LABELS_PATH, "--dataset", "grey"), "there is no model file"),
         (("--sheet", "sheet.gif"), "must end in .png, .jpg, .jpeg"),
     ],
 )

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
-from executive.campaign.faults.campaign import Campaign, CampaignResults, Trial
+from executive.campaign.faults.campaign import Campaign, Trial
 from executive.campaign.faults.fault_list import PlannedFault, SkillFault
 from executive.cli.main import main
 
@@ -31,11 +31,8 @@ def test_faults_are_listed_and_one_is_repeated_and_recorded(tmp_path: Path) -> N
     number = next(entry["fault"] for entry in listed if "Grasp missed, first: seal" in entry["description"])
     shown = invoke(*FAKE, "--fault", str(number), "--runs", str(tmp_path))
     lines = shown.stdout.splitlines()
-    assert (shown.exit_code, lines[0].startswith(f"fault {number}: tree/"), lines[1]) == (
-        0,
-        True,
-        "  SUCCESS",
-    )
+    assert (shown.exit_code, lines[1]) == (0, "  SUCCESS")
+    assert lines[0].startswith(f"fault {number}: tree/")
     assert (Path(lines[-1]) / "result.json").is_file()
 
 
@@ -55,7 +52,7 @@ def test_contradicting_options_are_refused(words: tuple[str, ...], expected: str
 @pytest.mark.parametrize(
     ("words", "problems", "is_complete", "code", "expected"),
     [
-        ((), (), True, 0, "never entered: sort.yaml:14: recover"),
+        ((), (), True, 0, "never entered: "),
         (("--pairs", "7"), ("the arm is not at rest",), True, 1, "wrong: the arm is not at rest"),
         ((), (), False, 130, "ended by the user"),
         (("--json",), (), True, 0, '"verdict": "ok"'),
@@ -67,10 +64,10 @@ def test_the_exit_code_depends_on_the_trials(
 ) -> None:  # fmt: skip
     asked: list[Any] = []
 
-    def run(campaign: Campaign, *count: int) -> CampaignResults:
+    def run(campaign: Campaign, *count: int) -> None:
         asked.append((campaign.mission.seed, *count))
-        trial = Trial(**{**vars(TRIAL), "problems": problems})
-        return CampaignResults([trial], {"sort.yaml:14: recover": 0}, is_complete)
+        campaign.trials = [Trial(**{**vars(TRIAL), "problems": problems})]
+        campaign.is_complete = is_complete
 
     monkeypatch.setattr(Campaign, "run_single_faults", run)
     monkeypatch.setattr(Campaign, "run_fault_pairs", run)

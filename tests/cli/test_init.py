@@ -86,28 +86,6 @@ def test_everything_works_at_once_and_its_tests_find_a_broken_skill() -> None:
     assert re.search(r"^FAILED .*::test_an_object_with_a_weak_seal_is_released", tests.stdout, re.MULTILINE)
 
 
-@pytest.mark.slow
-def test_processes_that_work_for_a_command_find_its_skill_too() -> None:
-    write_project(Path("hall"), "hall")
-    hall, fake = Path("hall"), ("--set", "cell.kind=fake")
-    swept = called("executive", "sweep", "sort.yaml", "--seeds", "0-1", *fake, folder=hall)
-    assert (swept.returncode, "2 of 2 runs succeeded" in swept.stderr) == (0, True), swept.stderr
-    tried = called("executive", "faults", "sort.yaml", "--pairs", "2", *fake, folder=hall)
-    assert (tried.returncode, "2 runs with pairs of faults" in tried.stdout) == (0, True), (
-        tried.stdout + tried.stderr
-    )
-
-
-def test_in_an_empty_working_directory_nothing_needs_to_be_entered(monkeypatch: pytest.MonkeyPatch) -> None:
-    Path("hall").mkdir()
-    monkeypatch.syspath_prepend(str(Path().resolve()))  # A folder without Python takes no name.
-    monkeypatch.chdir("hall")
-    result = init(".")
-    assert result.exit_code == 0
-    assert "  executive run sort.yaml" in result.stdout.splitlines()
-    assert Path("hall/check_seal.py").is_file()
-
-
 @pytest.mark.parametrize(
     ("held", "folder", "expected"),
     [

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -42,23 +39,6 @@ def test_a_run_that_was_cut_off_is_taken_up_again_and_ends(runs: Path) -> None:
     again = invoke("replay", path.name, "--runs", str(path.parent), "--json")
     assert (again.exit_code, json.loads(again.stdout)["same"]) == (0, True)
     assert invoke("run", "--resume", str(path)).exit_code == 2
-
-
-@pytest.mark.slow
-def test_while_it_goes_on_nobody_else_takes_it_up_and_once_killed_it_ends(runs: Path) -> None:
-    command = [sys.executable, "-m", "executive.cli.main", "run", "sort_fruit", "--realtime", "--quiet"]
-    process = subprocess.Popen([*command, "--runs", str(runs)], stderr=subprocess.DEVNULL)
-    try:
-        while not (runs / "latest" / "journal.jsonl").exists():
-            time.sleep(0.02)
-        time.sleep(0.5)
-        refused = invoke("run", "--resume", "latest", "--runs", str(runs))
-        assert refused.exit_code == 2
-        assert str(process.pid) in refused.output
-    finally:
-        process.kill()
-        process.wait()
-    assert invoke("run", "--resume", "latest", "--runs", str(runs)).exit_code == 0
 
 
 @pytest.mark.slow

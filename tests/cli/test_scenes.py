@@ -80,15 +80,3 @@ def test_a_cell_that_is_not_simulated_takes_no_scene(command: str, scene: Path, 
         "fake; leave --scene out, or name a mission on a cell of kind sim\n"
     )
     assert not (tmp_path / "runs").exists()
-
-
-@pytest.mark.parametrize("command", ["run {sort}", "sweep {sort} --seeds 0-3"])
-def test_a_mistake_in_a_scene_is_reported_once_and_nothing_runs(
-    command: str, sort: str, scene: Path, tmp_path: Path
-) -> None:
-    scene.write_text("scene: wrong\nlight: {brightnes: 1}\n")
-    refused = invoke(*command.format(sort=sort).split(), "--scene", str(scene), "--runs", str(tmp_path / "r"))
-    assert (refused.exit_code, refused.stdout) == (2, "")
-    assert refused.stderr.startswith(f'{scene}:2:9: error[unknown-key]: light has no key "brightnes"\n')
-    assert refused.stderr.count("error[") == 1
-    assert not (tmp_path / "r").exists()

@@ -96,21 +96,3 @@ def test_the_text_tells_the_same():
     ):
         assert line in text.splitlines()
     assert max(map(len, text.splitlines())) <= 100
-
-
-def test_a_skill_that_needs_nothing_says_so():
-    assert shown("Rest").stdout.splitlines() == [
-        "Rest", "", "Do nothing.", "",
-        "reads:", "  nothing",
-        "writes:", "  nothing",
-        "params:", "  none",
-        "may fail with: nothing",
-        "uses: nothing",
-        "tool: any before, any after",
-    ]  # fmt: skip
-
-
-def test_an_unknown_skill_is_refused_in_either_form():
-    result = shown("Rets", "--json")
-    assert (result.exit_code, result.stdout) == (2, "")
-    assert 'there is no skill "Rets". Did you mean "Rest"?' in result.stderr

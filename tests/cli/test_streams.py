@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.record.journal import find_run_end, read_journal
 
 EXECUTIVE = f'"{sys.executable}" -m executive.cli.main'
 
@@ -38,44 +34,6 @@ def test_a_stream_that_fails_changes_neither_run_nor_exit_code(streams: str, tmp
     expected = run_with(">/dev/null 2>/dev/null", tmp_path)
     assert expected["exit_code"] == 0
     assert run_with(streams, tmp_path) == expected
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("streams, error", [(">&-", ""), (">/dev/full", "No space left on device")])
-def test_output_that_cannot_be_written_is_reported_once(streams: str, error: str, tmp_path: Path) -> None:
-    done = shell(f"{EXECUTIVE} schema {streams}", tmp_path)
-    assert done.returncode == 0
-    assert done.stderr.count("note: ") == bool(error)
-    assert error in done.stderr
-
-
-@pytest.mark.slow
-def test_an_error_is_an_error_although_nobody_can_read_it(tmp_path: Path) -> None:
-    assert shell(f"{EXECUTIVE} run nowhere 2>&-", tmp_path).returncode == 2
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("ignored", [False, True])
-def test_a_hangup_halts_a_run_unless_it_was_ignored_at_the_start(ignored: bool, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "executive.cli.main", "run", "sort_overhead", "--runs", str(tmp_path)]
-    options = ["--set", "cell.kind=fake", "--realtime", "--quiet"]
-    prefix = ["nohup"] if ignored else ["env", "--default-signal=HUP"]
-    with subprocess.Popen([*prefix, *command, *options], stderr=subprocess.PIPE) as run:
-        while not (journal := tmp_path / "latest/journal.jsonl").is_file() or len(journal.read_text()) < 5000:
-            assert run.poll() is None
-            time.sleep(0.05)
-        run.send_signal(signal.SIGHUP)
-        if ignored:
-            time.sleep(0.3)
-            assert run.poll() is None
-            run.send_signal(signal.SIGTERM)
-        assert run.wait(30) == 130
-    end = find_run_end(read_journal(tmp_path / "latest/journal.jsonl"))
-    assert end is not None and end.status == "HALTED"
-    assert (
-        json.loads(Path(os.path.realpath(tmp_path / "latest"), "result.json").read_text())["status"]
-        == "HALTED"
-    )
 
 
 def test_control_characters_of_a_file_are_shown_escaped(

@@ -101,16 +101,3 @@ def test_a_built_tree_runs_and_moves_values_along(built: Any) -> None:
     assert [event.node for event in events if isinstance(event, NodeEnded) and event.status == "SUCCESS"] == [
         "tree/Look", "tree/Pick", "tree/Drop", "tree",
     ]  # fmt: skip
-
-
-def test_two_trees_of_one_mission_share_nothing(
-    load: Callable[..., LoadedMission], skills: dict[str, type[Skill]]
-) -> None:
-    loaded = load(HEAD + "tree: Look\n")
-    first, second = Blackboard(), Blackboard()
-    cell: Any = SimpleNamespace(clock=None, ledger=None)
-    one, two = (build_tree(loaded, skills, cell, scope, discard_event) for scope in (first, second))
-    one.tick_once()
-    one.tick_once()
-    assert (dict(first), dict(second)) == ({"seen": [1]}, {})
-    assert two.status is Status.INVALID

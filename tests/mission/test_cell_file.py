@@ -9,8 +9,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.mission.findings import MissionError
-from executive.mission.parse.cell_file import load_cell, read_cell
-from executive.mission.parse.cell_layout import find_overlaps
+from executive.mission.parse.cell_file import find_overlaps, load_cell, read_cell
 
 
 @pytest.fixture(autouse=True)
@@ -47,23 +46,12 @@ def test_findings_say_what_and_where(old: str, new: str, expected: str, small_ce
     assert expected in complaint(small_cell.replace(old, new, 1))
 
 
-def test_a_finding_shows_line_and_caret(small_cell: str) -> None:
-    text = small_cell.replace("source: a test\n    position", "sorce: a test\n    position")
-    assert complaint(text).endswith(
-        'c.yaml:4:5: error[unknown-key]: arm.limits has no key "sorce"\n'
-        "   4 |     sorce: a test\n"
-        "     |     ^^^^^\n"
-        '  Did you mean "source"? Keys of arm.limits: source, min_position_deg, position_deg, velocity_deg, '
-        "acceleration, jerk, stop_acceleration, stop_jerk."
-    )
-
-
 @pytest.mark.parametrize(
     ("key", "value", "expected"),
     [
         ("cell.table.objects", "[5]", "--set:1:20: error[wrong-length]: table.objects needs 2 values, not 1\n"),
         ("cell.tool.force", "yes", 'cell.tool.force=yes\n     |                 ^^^'),
-        ("cell.tabel.x", "1", 'the cell has no key "tabel"'),
+        ("cell.tabel.x", "1", 'has no key "tabel"'),
         ("cell.kind.x", "5", 'there is no key "x", because'),
         ("cell.arm.limits.jerk", "[1e308, 9, 9, 9, 9, 9, 9]", "arm.limits.jerk[0] must be at most 100000"),
     ],
@@ -72,17 +60,6 @@ def test_findings_about_overrides_show_the_override(
     key: str, value: str, expected: str, small_cell: str
 ) -> None:
     assert expected in complaint(small_cell + "kind: sim\n", {key: value})
-
-
-def test_the_name_of_a_class_becomes_part_of_file_names(small_cell: str) -> None:
-    text = small_cell + "kind: sim\n"
-    assert (
-        complaint(text.replace("  cube:", "  a/b:", 1))
-        .splitlines()[0]
-        .endswith(
-            'error[bad-name]: objects.a/b must be a name of at most 64 letters, digits, blanks, "_" and "-"'
-        )
-    )
 
 
 def test_a_cell_takes_from_its_base_every_key_that_it_has_not_itself(small_cell: str) -> None:
@@ -123,11 +100,9 @@ CHANGED = {**FIRST, "threshold": 0.7, "class_map": {"c": "cube"}}
     [
         ("cell: c", [("first", FIRST), ("second", SECOND)]),
         ("detectors: {first: {threshold: 0.7, class_map: {c: cube}}}", [("first", CHANGED), ("second", SECOND)]),
-        ("detectors: {second: {kind: embedded, floor: 0.2}}", [("second", {**SECOND, "floor": 0.2}), ("first", FIRST)]),
         ("detectors: {first: {kind: fake}}", [("first", {"kind": "fake"}), ("second", SECOND)]),
         ("detectors: {third: {kind: fake}, first: {}}", [("third", {"kind": "fake"}), ("first", FIRST), ("second", SECOND)]),
         ("detectors: {third: {kind: fake}, second: }", [("third", {"kind": "fake"}), ("first", FIRST)]),
-        ("detector: second\ndetectors: {third: {kind: fake}}", [("second", SECOND), ("third", {"kind": "fake"}), ("first", FIRST)]),
     ],
 )  # fmt: skip
 def test_the_detectors_of_a_base_are_merged_by_name(
@@ -140,7 +115,6 @@ def test_the_detectors_of_a_base_are_merged_by_name(
     ("base", "text", "expected"),
     [
         ("{kind: fake}", "{first: {floor: 2}}", "c.yaml:2:28: error[out-of-range]: detectors.first.floor must be less than 1, not 2\n"),
-        ("{kind: fake, threshold: 0.6}", "{first: {floor: 0.7}}", "c.yaml:2:13: error[wrong-value]: detectors.first needs a floor of at most its threshold, 0.6, not 0.7\n"),
         ("{kind: fake, latency: -1}", "{first: {floor: 0.2}}", "base.yaml:26:42: error[out-of-range]: detectors.first.latency must be at least 0, not -1\n"),
         ("{kind: fake, latency: -1}", "{first: {kind: rfdetr}, other: {floor: 0.2}}", 'c.yaml:2:36: error[missing-key]: detectors.other needs the key "kind"\n'),
         ("{kind: fake}", "{first: }", "c.yaml:2:1: error[wrong-length]: detectors has 0 entries, but needs at least 1\n"),
@@ -161,7 +135,6 @@ def test_a_finding_about_a_merged_detector_stands_in_the_file_that_writes_the_va
         ("bse.yaml", {"base.yaml": ""}, 'c.yaml:1:7: error[no-base]: there is no file "bse.yaml" in . or '),
         ("5", {}, "c.yaml:1:7: error[wrong-type]: base must be a text, not 5\n"),
         ("b.yaml", {"b.yaml": "cell: b\nbase: a.yaml", "a.yaml": "base: b.yaml"}, 'a.yaml:1:7: error[no-base]: "b.yaml" is itself based on this file: c.yaml -> b.yaml -> a.yaml -> b.yaml\n'),
-        ("b.yaml", {"b.yaml": "- cell"}, "c.yaml:1:7: error[no-base]: b.yaml must be a mapping, not a list of length 1\n"),
         ("1.yaml", {f"{n}.yaml": f"base: {n + 1}.yaml" for n in range(1, 7)}, "5.yaml:1:7: error[no-base]: the chain of bases of c.yaml has more than 5 files\n"),
     ],
 )  # fmt: skip

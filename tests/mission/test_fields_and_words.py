@@ -11,9 +11,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.events import NodeEnded
 from executive.mission.findings import MissionError
 from executive.mission.load import load_mission
-from executive.mission.outline import make_outline
 from executive.plugins import load_skills
-from executive.run.assembly import RunOptions, assemble
 from executive.testing.run_mission import MissionResult, run_mission
 
 HEAD = """\
@@ -116,17 +114,6 @@ def test_a_word_stands_for_a_list_of_names(execute: Execute, word: str, elements
     )
     messages = [end.message for end in list_ends(result, "IsEqual")]
     assert sorted(messages) == sorted(f"the value is {element}, not no" for element in elements)
-
-
-def test_a_field_is_shown_in_drawings(write: Callable[[str], Path]) -> None:
-    loaded = load_mission(write(compare("$target.label", "cube")), load_skills())
-    run = assemble(loaded, RunOptions(0, make_cell=FakeCell), [])
-    try:
-        (node,) = (node for node in make_outline(run.root) if node.skill == "IsEqual")
-    finally:
-        run.close()
-    assert node.detail == "to: cube, value: $target.label"
-    assert [(read.port, read.variable) for read in node.reads] == [("value", "target.label")]
 
 
 def test_a_word_is_no_mistake_if_the_cell_file_has_errors(tmp_path: Path) -> None:

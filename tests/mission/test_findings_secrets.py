@@ -18,7 +18,6 @@ CELL = "base: cells/overhead.yaml\ncell: own\ndetectors:\n  eye: {kind: roboflow
     "key",
     [
         "api_key: rf_SECRET123",
-        'api_key: "rf and SECRET123"',
         "token: rf_SECRET123",
         "url: 'https://serverless.roboflow.com/?api_key=SECRET123'",
         "url: 'https://me:SECRET123@serverless.roboflow.com'",

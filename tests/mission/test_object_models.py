@@ -39,24 +39,12 @@ def test_a_mesh_is_found_beside_the_cell_file_wherever_the_command_is_given() ->
     assert (washer.urdf, washer.mass, washer.ring) == ("", None, 0.017)
 
 
-def test_a_mesh_is_found_beside_the_base_that_names_it() -> None:
-    load(WASHER)
-    Path("mine/cells").mkdir(parents=True)
-    Path("mine/cells/base.yaml").write_text(Path("cells/base.yaml").read_text())
-    Path("mine/cells/named.yaml").write_text(f"base: base.yaml\n{WASHER}")
-    Path("mine/cells/parts").mkdir()
-    Path("mine/cells/parts/washer.obj").write_text("v 0 0 0\n")
-    washer = load("cell: c\n", "mine", "cells/named.yaml").objects["washer"]
-    assert washer.mesh == str(Path("mine/cells/parts/washer.obj").resolve())
-
-
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
         ("mesh: parts/washer.obj, ", "", "objects.washer needs either a urdf or a mesh\n"),
         ("mesh:", "urdf: cube_small.urdf, mesh:", "objects.washer needs either a urdf or a mesh, not both\n"),
         ("ring: 0.017", "ring: 0.03", "objects.washer has a ring of 0.03 m, which must be smaller than the radius, 0.025 m\n"),
-        ("parts/washer.obj", "../washer.obj", 'error[outside]: "../washer.obj" must be a relative path without ".."\n'),
     ],
 )  # fmt: skip
 def test_findings_say_what_an_object_needs(old: str, new: str, expected: str) -> None:

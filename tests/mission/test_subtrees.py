@@ -62,16 +62,6 @@ WIRED = {
             "Drop held<-$held", "Drop held<-$outer.inner.held",
         ],
     ),
-    "a closed subtree keeps what another returns to it": (
-        "tree: {use: outer}\n"
-        "trees:\n"
-        "  outer: {returns: [], do: [use: inner, Pick, {Drop: {bin: red_bin}}]}\n"
-        "  inner: {returns: [seen], do: Look}\n",
-        [
-            "Look seen->$outer.seen", "Pick seen<-$outer.seen only<-$only held->$outer.held",
-            "Drop held<-$outer.held",
-        ],
-    ),
     "an argument may stand for a variable by default": (
         "tree: [Look, Pick, use: drop]\n"
         "trees: {drop: {args: {which: $held}, do: {Drop: {held: $which, bin: red_bin}}}}\n",

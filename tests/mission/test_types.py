@@ -9,7 +9,7 @@ import pytest
 
 from executive.cell.detection import Detection
 from executive.cell.objects import Target
-from executive.mission.model.port_types import describe_type, find_element_type, is_assignable
+from executive.mission.model.port_types import find_element_type, is_assignable
 
 
 class Special(Target):
@@ -43,14 +43,3 @@ def test_these_do_not_fit(given: Any, wanted: Any) -> None:
 def test_a_list_has_elements_and_a_text_has_none() -> None:
     types = (list[Target], Sequence[int], tuple[int, ...], list, str, Target)
     assert [find_element_type(one) for one in types] == [Target, int, int, Any, None, None]
-
-
-@pytest.mark.parametrize(
-    ("declared", "word"),
-    [
-        (str, "a text"), (Target, "Target"), (list[Target], "a list of Target"), (list, "a list"),
-        (list[str], "a list of text"), (str | None, "a text or nothing"),
-    ],
-)  # fmt: skip
-def test_types_have_words(declared: Any, word: str) -> None:
-    assert describe_type(declared) == word

@@ -59,28 +59,11 @@ class AlwaysFail(Pause):
         raise self.failure("tired", "after 0 steps")
 
 
-class FailInSilence(Pause):
-    """Fail without a message."""
-
-    def run(self, cell: Cell) -> None:
-        raise self.failure("tired", " ")
-
-
 class WaitForEver(Pause):
     """Wait without a limit."""
 
     def run(self, cell: Cell) -> Steps:
         while True:
-            yield
-
-
-class WaitInFinally(Pause):
-    """Wait during a halt."""
-
-    def run(self, cell: Cell) -> Steps:
-        try:
-            yield
-        finally:
             yield
 
 
@@ -127,12 +110,6 @@ class UseSecretly(Skill):
         cell.operator.ask(())
 
 
-class MoveSecretly(Push):
-    """Push the target without a declaration of the motion."""
-
-    moves: ClassVar = False
-
-
 class ChangeBelief(Skill):
     """Change the ledger in a condition."""
 
@@ -166,17 +143,6 @@ class GraspSecretly(Skill):
             raise self.failure("missed", "no seal")
 
 
-class HoldOn(GraspSecretly):
-    """Keep the object after a halt."""
-
-    def run(self, cell: Cell) -> Steps:  # type: ignore[override]
-        cell.tool.close()
-        yield
-        if not cell.tool.holding:
-            raise self.failure("missed", "no seal")
-        cell.ledger.record_grasp(self.target.item)
-
-
 class NeedWords(Pause):
     """Need a text that nobody can guess."""
 
@@ -187,18 +153,12 @@ FAULTY = [
     (AlwaysFail, "can_succeed", "AlwaysFail never succeeded; with an empty tool: FAILURE at tick 0 tired"),
     (NeedWords, "leaves_arm_at_rest", r'no value can be generated for "words" \(a text\)'),
     (WaitForEver, "ends_as_declared", "RUNNING at tick 14400. Limit the duration of each wait"),
-    (FailInSilence, "ends_as_declared", "FAILURE at tick 0 tired has no message"),
     (TrustDetector, "ends_as_declared", "while nothing is detected: FAULT at tick 12  IndexError"),
-    (WaitInFinally, "ends_as_declared", "FAULT at tick 1  Fault: it yielded while it was halted"),
     (ChooseNumber, "has_outputs_of_declared_types", r"targets is \['cube-1'\], not a list of Target"),
-    (ChooseNumber, "has_outputs_of_declared_types", "chosen is 3, not a text"),
     (ChangeInput, "leaves_inputs_unchanged", "an input has changed"),
     (UseSecretly, "uses_only_declared_parts", "camera.capture and does not declare the camera"),
-    (UseSecretly, "uses_only_declared_parts", "operator.ask and does not declare that it senses"),
-    (MoveSecretly, "uses_only_declared_parts", "arm.start and does not declare that it moves"),
     (ChangeBelief, "uses_only_declared_parts", "ledger.invalidate_positions, and declares is_condition"),
     (LetGo, "leaves_tool_as_declared", "SUCCESS at tick 0, and the tool is empty"),
-    (HoldOn, "leaves_tool_as_declared", "HALTED at tick 1, and the tool holds something"),
     (GraspSecretly, "leaves_tool_as_declared", "the ledger knows no held item"),
     (RunOn, "leaves_arm_at_rest", r"HALTED at tick \d+, and the arm still moves"),
 ]

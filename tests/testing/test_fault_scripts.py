@@ -14,7 +14,7 @@ from events import at
 from executive.cell.detection import Observation
 from executive.cell.protocols import Request
 from executive.cells.fake.cell import FakeCell
-from executive.errors import Blocked, InputError, NoDepth, Unavailable, Unreachable
+from executive.errors import InputError, NoDepth, Unavailable, Unreachable
 from executive.events import FaultInjected, NodeEnded, NodeStarted, ToolCommanded
 from executive.testing import faults as effects
 from executive.testing.faults import Effect, FaultyCell, ScheduledFault, after, between, during
@@ -102,22 +102,9 @@ def test_a_fault_of_a_node_is_recorded_with_node_item_and_object() -> None:
     assert (result.status, result.agrees) == ("SUCCESS", True)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: during("*", effects.seal_fails(), activations=0), "at least 1, not 0"),
-        (lambda: between(5, 5, effects.seal_fails()), "0 <= start < end, not 5 s and 5 s"),
-        (lambda: after(-1, effects.seal_fails()), "not -1 s and inf s"),
-    ],
-)
-def test_a_time_that_never_comes_is_refused(make: Callable[[], ScheduledFault], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        make()
-
-
 def test_the_world_of_an_unknown_cell_cannot_be_changed() -> None:
     strange: Any = SimpleNamespace(cell=FakeCell().cell, accounts=None, advance=lambda: None)
-    with pytest.raises(InputError, match="not that of a SimpleNamespace"):
+    with pytest.raises(InputError, match="not a SimpleNamespace"):
         FaultyCell(strange, [after(0.0, effects.object_removed(1))]).advance()
 
 
@@ -194,15 +181,19 @@ def test_a_seal_breaks_once_and_only_if_an_object_is_held() -> None:
         assert (case.fake.tool.holding, len(case.events)) == (is_holding, 1)
 
 
-def test_a_seal_breaks_over_a_wrong_bin() -> None:
-    case = Case(effects.seal_breaks_over_wrong_bin())
-    case.start_motion()
-    case.cell.advance()
-    case.hold()
-    for name, is_holding in (("red_bin", True), ("blue_bin", False)):
-        case.fake.world.objects[0].position[:2] = case.parts.bins[name].slots[0][:2]
-        case.parts.camera.sees_table()
-        assert case.fake.tool.holding is is_holding
+@pytest.mark.parametrize(
+    ("effect", "is_holding"),
+    [
+        (effects.seal_fails(), False),
+        (effects.object_unsealable(2), True),
+        (effects.object_unsealable(1), False),
+    ],
+)
+def test_nothing_seals_or_one_object_does_not(effect: Effect, is_holding: bool) -> None:
+    case = Case(effect)
+    case.fake.arm.set_tool_position(np.array([*PLACES["cube"], 0.05]))
+    case.parts.tool.close()
+    assert (case.fake.tool.holding, len(case.events)) == (is_holding, int(not is_holding))
 
 
 def test_a_tool_that_sticks_opens_after_the_fault() -> None:
@@ -217,13 +208,12 @@ def test_a_tool_that_sticks_opens_after_the_fault() -> None:
     assert not case.fake.tool.holding
 
 
-@pytest.mark.parametrize(("is_blocked", "error"), [(False, Unreachable), (True, Blocked)])
-def test_no_path_is_found_after_the_usual_time(is_blocked: bool, error: type[Exception]) -> None:
-    case = Case(effects.no_path(is_blocked=is_blocked))
+def test_no_path_is_found_after_the_usual_time() -> None:
+    case = Case(effects.no_path())
     planning = case.parts.arm.plan("aside")
     assert not planning.ready
     case.wait(lambda: planning.ready)
-    with pytest.raises(error, match="injected fault"):
+    with pytest.raises(Unreachable, match="injected fault"):
         planning.result()
     result = run_skill(MoveToScan, case.cell, inputs={"pose": "aside"})
     assert (result.status, case.fake.arm.commands) == ("FAILURE", [])
@@ -232,10 +222,9 @@ def test_no_path_is_found_after_the_usual_time(is_blocked: bool, error: type[Exc
 def test_an_occluded_table_is_not_seen_and_is_recorded_once_per_control_step() -> None:
     case = Case(effects.workspace_occluded(), effects.no_depth())
     assert run_skill(Detect, case.cell).reason == "hidden"
-    assert not case.parts.camera.sees_table() and not case.parts.camera.capture().visible.any()
+    assert not case.parts.camera.sees_table()
     assert [one.name for one in case.events] == ["workspace_occluded"]
     detections: Any = run_skill(Detect, case.cell, inputs={"hidden": "pass"}).outputs["detections"]
-    assert detections.confident == ()
     with pytest.raises(NoDepth, match="injected fault"):
         case.parts.localizer.localize(detections)
 

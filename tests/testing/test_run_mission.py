@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,6 @@ import pytest
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
 from executive.events import RunEnded, RunStarted, TimedEvent
-from executive.testing import run_skill as skills
 from executive.testing.faults import FaultyCell, after, detector_dead, during, seal_fails
 from executive.testing.run_mission import run_mission
 from executive.testing.substitutes import make_failing
@@ -44,11 +42,6 @@ def test_a_shipped_mission_runs_by_its_name_on_the_fake_cell() -> None:
     assert (type(result.events[0].event), type(result.events[-1].event)) == (RunStarted, RunEnded)
     assert result.robot_time == result.events[-1].clock > 5.0
     assert (result.agrees, result.list_injected_faults()) == (True, [])
-
-
-def test_a_mission_file_runs_with_other_values(look: Path) -> None:
-    later = run_mission(look, set={"wait": "2.0", "cell.detectors.embedded.latency": "0.5"})
-    assert later.robot_time == pytest.approx(2.5, abs=0.01)
 
 
 def test_the_cell_is_arranged_before_the_run_and_closed_after_it(look: Path) -> None:
@@ -114,14 +107,6 @@ def test_patterns_that_fit_no_node_are_refused(look: Path) -> None:
         run_mission(look, substitutes={"Wait": failing})
     with pytest.raises(InputError, match="tree/Detect runs Detect, but FailingFail is not a subclass"):
         run_mission(look, substitutes={"tree/*": failing})
-
-
-def test_the_fixtures_are_the_functions_of_the_kit_and_an_empty_cell(request: pytest.FixtureRequest) -> None:
-    assert request.getfixturevalue("run_skill") is skills.run_skill
-    assert request.getfixturevalue("run_mission") is run_mission
-    assert request.getfixturevalue("fake_cell").world.objects == []
-    (entry,) = (entry for entry in entry_points(group="pytest11") if entry.name == "executive")
-    assert entry.value == "executive.testing.plugin"
 
 
 def test_pytest_starts_without_anything_heavy(tmp_path: Path) -> None:

@@ -118,11 +118,6 @@ def test_a_halt_that_leaves_the_arm_in_motion_shows(fake: FakeCell, monkeypatch:
     assert fake.cell.clock.now == pytest.approx(start + 2.0, abs=0.01)
 
 
-def test_a_skill_that_does_not_end_is_left_running(fake: FakeCell) -> None:
-    result = run_skill(Wait, fake, inputs={"seconds": 60.0}, max_ticks=400)
-    assert (result.status, result.ticks) == ("RUNNING", 400)
-
-
 def test_a_substitute_fails_the_first_times_and_then_does_its_work(fake: FakeCell, target: Target) -> None:
     run_skill(Approach, fake, inputs={"target": target})
     slippery = make_failing(Grasp, "missed", start_count=2, message="it slips")
@@ -141,14 +136,6 @@ def test_a_bug_comes_up_in_mid_work_and_the_skill_cleans_up(fake: FakeCell, targ
         run_skill(broken, fake, inputs={"target": target})
     assert fake.steps >= 40
     assert fake.arm.commands == ["start", "stop"]
-
-
-def test_a_bug_is_raised_at_the_given_times(fake: FakeCell) -> None:
-    late = make_raising(Wait, ValueError("a bug"), delay_steps=1000)
-    once = make_raising(Wait, ValueError("a bug"), start_count=1)
-    with pytest.raises(ValueError, match="a bug"):
-        run_skill(once, fake, inputs={"seconds": 0.1})
-    assert [run_skill(skill, fake, inputs={"seconds": 0.1}).ticks for skill in (late, once)] == [24, 24]
 
 
 def test_a_bug_in_finally_comes_up_in_a_halt_and_not_without_one(fake: FakeCell, target: Target) -> None:

@@ -33,26 +33,21 @@ def describe_environment() -> Mapping[str, str]:
     return {**list_versions(), **cluster_versions, FILES_KEY: _hash_files()}
 
 
-def describe_differences(client_versions: Mapping[str, str], worker_versions: Mapping[str, str]) -> str:
-    """Return the versions that differ between client and worker as text, "" if all are equal."""
-    differences: list[str] = []
-    for name in {**client_versions, **worker_versions}:
-        worker_version = worker_versions.get(name, "missing")
-        client_version = client_versions.get(name, "none")
-        if worker_version != client_version:
-            differences.append(f"{name} {worker_version} instead of {client_version}")
-    return ", ".join(differences)
-
-
 def check_environment(client_versions: Mapping[str, str], dask_worker: Worker) -> None:
     """Compare the software of the client with the software of this worker.
 
     Raises:
         InputError: The software differs.
     """
-    if differences := describe_differences(client_versions, describe_environment()):
-        subject = f"the software of the worker {dask_worker.address}"
-        raise InputError(f"{subject} differs from this computer: {differences}; {INSTALLATION_ADVICE}")
+    worker_versions = describe_environment()
+    differences = [
+        f"{name} {worker_versions.get(name, 'missing')} instead of {client_versions.get(name, 'none')}"
+        for name in {**client_versions, **worker_versions}
+        if worker_versions.get(name) != client_versions.get(name)
+    ]
+    if differences:
+        subject = f"the software of the worker {dask_worker.address} differs from this computer"
+        raise InputError(f"{subject}: {', '.join(differences)}; {INSTALLATION_ADVICE}")
 
 
 def _hash_files() -> str:

@@ -6,13 +6,13 @@ import math
 import random
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 
-from executive.campaign.faults.fault_list import INJECTED_MESSAGE, PlannedFault, SkillFault, list_faults
+from executive.campaign.faults.fault_list import INJECTED_MESSAGE, FaultLister, PlannedFault, SkillFault
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.campaign.pool import JobOptions, run_jobs
 from executive.errors import InputError
@@ -20,7 +20,7 @@ from executive.events import RunEnded
 from executive.ledger.outcomes import is_balanced
 from executive.mission.flow_analysis import UnhandledFailure
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
-from executive.mission.model.nodes import InnerNode, Node, SubtreeNode
+from executive.mission.model.nodes import InnerNode, SubtreeNode
 from executive.record.recorded_run import RecordedRun, make_run_directory
 from executive.record.recorder import Recorder
 from executive.record.result import is_confirmed_by_audit
@@ -89,22 +89,6 @@ class Trial(RunEnded):
         return f"FAILURE {self.reason}" if self.status == "FAILURE" else self.status
 
 
-@dataclass(frozen=True)
-class CampaignResults:
-    """Results of a fault campaign on one mission.
-
-    Attributes:
-        trials: All trials, in the order of the faults.
-        branches: Number of trials that entered a branch of the tree that runs only after a failure or at the
-            end, by file, line and name of the branch (`catch on Grasp.missed`, `recover`, `finally`).
-        is_complete: False if the user ended the campaign before its last run.
-    """
-
-    trials: Sequence[Trial]
-    branches: Mapping[str, int]
-    is_complete: bool
-
-
 class Campaign:
     """A fault campaign; the constructor executes the mission without a fault and lists the faults.
 
@@ -116,6 +100,8 @@ class Campaign:
         mission: The mission and its cell.
         nominal_run: The run without a fault.
         faults: All single faults; the number of a fault is its position in this list, from 1.
+        trials: All trials, in the order of the faults.
+        is_complete: False if the user ended the campaign before its last run.
 
     Raises:
         InputError: The mission does not succeed without a fault, or ledger and ground truth disagree.
@@ -130,11 +116,12 @@ class Campaign:
             raise KeyboardInterrupt
         if run.status != "SUCCESS" or run.problems or (run.audit and run.audit["unseen"]):
             end_text = " ".join((run.status, run.reason, run.message, *run.problems))
-            raise InputError(
-                f"without a fault, {mission.name} with seed {mission.seed} ends as {end_text}; a campaign "
-                "needs a run that succeeds and observes the whole table: choose another seed or mission"
-            )
-        self.faults = list_faults(mission, run.steps_by_path, run.robot_time)
+            problem = f"without a fault, {mission.name} with seed {mission.seed} ends as {end_text}"
+            advice = "choose another seed or mission, whose run succeeds and observes the whole table"
+            raise InputError(f"{problem}; {advice}")
+        self.faults = list(FaultLister(mission, run.steps_by_path, run.robot_time).list_faults())
+        self.trials: list[Trial] = []
+        self.is_complete = True
 
     def select_faults(self, numbers: FaultNumbers) -> dict[int, PlannedFault]:
         """Return the faults with these numbers, by number.
@@ -144,28 +131,22 @@ class Campaign:
         """
         for number in numbers:
             if not 1 <= number <= len(self.faults):
-                raise InputError(
-                    f"{self.mission.name} has no fault {number}; "
-                    f"the numbers are 1 to {len(self.faults)}, and --list shows them"
-                )
+                numbers_text = f"the numbers are 1 to {len(self.faults)}, and --list shows them"
+                raise InputError(f"{self.mission.name} has no fault {number}; {numbers_text}")
         return {number: self.faults[number - 1] for number in numbers}
 
-    def run_single_faults(self) -> CampaignResults:
-        """Execute a run for each single fault and return the results.
+    def run_single_faults(self) -> None:
+        """Execute a run for each single fault.
 
         If a node runs only after other faults, the smallest combination of faults that activates the node is
         injected, too. If a fault of the cell does not let the node fail, the skill fails in another run.
         """
-        trials: list[Trial] = []
-        is_complete = True
-        while is_complete and (combinations := self._list_next_combinations(trials)):
-            ended_trials, is_complete = self._run_trials(combinations, len(trials))
-            trials += ended_trials
-        trials.sort(key=lambda trial: tuple(reversed(trial.faults)))
-        return CampaignResults(trials, count_branch_entries(self.mission.loaded.tree, trials), is_complete)
+        while self.is_complete and (combinations := self._list_next_combinations()):
+            self._run_trials(combinations)
+        self.trials.sort(key=lambda trial: tuple(reversed(trial.faults)))
 
-    def run_fault_pairs(self, count: int) -> CampaignResults:
-        """Execute a run for each of `count` random pairs of faults and return the results.
+    def run_fault_pairs(self, count: int) -> None:
+        """Execute a run for each of `count` random pairs of faults.
 
         The seed of the mission determines the pairs; bugs, conditional and replacing faults are excluded.
         """
@@ -178,15 +159,14 @@ class Campaign:
         pairs: dict[FaultNumbers, None] = {}
         while len(pairs) < min(count, math.comb(len(numbers), 2)):
             pairs[tuple(sorted(random_generator.sample(numbers, 2)))] = None
-        trials, is_complete = self._run_trials(list(pairs), 0)
-        return CampaignResults(trials, count_branch_entries(self.mission.loaded.tree, trials), is_complete)
+        self._run_trials(list(pairs))
 
-    def _list_next_combinations(self, trials: Sequence[Trial]) -> list[FaultNumbers]:
-        """Return the combinations of faults for the next trials, which can occur according to `trials`."""
+    def _list_next_combinations(self) -> list[FaultNumbers]:
+        """Return the combinations for the next trials, which can occur according to the trials so far."""
         # The smallest combination of faults that activated a node, by path of the node.
         triggers_by_path: dict[str, FaultNumbers] = {}
         trials_by_number: dict[int, Trial] = {}
-        for trial in sorted(trials, key=lambda trial: (len(trial.faults), tuple(trial.faults))):
+        for trial in sorted(self.trials, key=lambda trial: (len(trial.faults), tuple(trial.faults))):
             number = list(trial.faults)[-1]
             trials_by_number[number] = trial
             if not self.faults[number - 1].is_bug:
@@ -203,20 +183,13 @@ class Campaign:
                 combinations.append((*triggers, number))
         return combinations
 
-    def _run_trials(self, combinations: Sequence[FaultNumbers], offset: int) -> tuple[list[Trial], bool]:
-        """Execute a trial for each combination of faults; `offset` is the number of earlier trials.
-
-        Return the complete trials, and True if all trials are complete.
-        """
-
-        def report(ended_count: int, total: int) -> None:
-            self._options.on_progress(offset + ended_count, offset + total)
-
+    def _run_trials(self, combinations: Sequence[FaultNumbers]) -> None:
         jobs = list(map(self.select_faults, combinations))
         run_job = partial(run_trial, self.mission, nominal_run=self.nominal_run)
-        trials = run_jobs(jobs, run_job, _make_aborted_trial, replace(self._options, on_progress=report))
+        trials = run_jobs(jobs, run_job, _make_aborted_trial, self._options)
         complete_trials = [trial for trial in trials if trial is not None and trial.status != "HALTED"]
-        return complete_trials, len(complete_trials) == len(combinations)
+        self.trials += complete_trials
+        self.is_complete = len(complete_trials) == len(combinations)
 
 
 def _make_aborted_trial(faults: FaultsByNumber, error: BaseException) -> Trial:
@@ -356,9 +329,8 @@ def check_ledger(
     unnoticed_count = min(max(audit["elsewhere"] - items["lost"], 0), effects.count("object_removed"))
     left_count = audit["left"] + unnoticed_count
     if end.status == "FAULT" or end.node or items["lost"]:
-        is_confirmed = (
-            items["placed"] <= audit["right"] and items["rejected"] + items["skipped"] <= left_count
-        )
+        unplaced_count = items["rejected"] + items["skipped"]
+        is_confirmed = items["placed"] <= audit["right"] and unplaced_count <= left_count
     else:
         places = {**audit, "left": left_count, "elsewhere": audit["elsewhere"] - unnoticed_count}
         is_confirmed = is_confirmed_by_audit(items, places, end.is_table_empty)
@@ -366,14 +338,14 @@ def check_ledger(
         yield books
 
 
-def count_branch_entries(tree: Node, trials: Iterable[Trial]) -> dict[str, int]:
+def count_branch_entries(campaign: Campaign) -> dict[str, int]:
     """Return the number of trials that entered each branch after a failure or at the end.
 
     The keys are file, line and name of the branch, in the order of the tree. A branch in a subtree that is
     used twice has two paths.
     """
     paths_by_branch: dict[str, set[str]] = defaultdict(set)
-    for node in tree.walk():
+    for node in campaign.mission.loaded.tree.walk():
         if isinstance(node, InnerNode):
             for name, child in make_inspection_instance(node).list_contingencies():
                 branch = get_mission_node(child)
@@ -382,22 +354,19 @@ def count_branch_entries(tree: Node, trials: Iterable[Trial]) -> dict[str, int]:
                 while isinstance(branch, SubtreeNode) and not branch.label and branch.body is not None:
                     branch = branch.body
                 paths_by_branch[key].add(branch.path)
-    entered_paths = [trial.steps_by_path.keys() for trial in trials]
     return {
-        branch: sum(not paths.isdisjoint(entered) for entered in entered_paths)
+        branch: sum(not paths.isdisjoint(trial.steps_by_path) for trial in campaign.trials)
         for branch, paths in paths_by_branch.items()
     }
 
 
-def results_to_json(campaign: Campaign, results: CampaignResults) -> dict[str, object]:
+def results_to_json(campaign: Campaign) -> dict[str, object]:
     """Return the results of a campaign as JSON values by key; times are in s."""
     mission = campaign.mission
     return {
         "mission": mission.name, "cell": mission.cell_description, "seed": mission.seed,
-        "listed": len(campaign.faults), "complete": results.is_complete,
-        "robot_time_s": campaign.nominal_run.robot_time, "runs": len(results.trials),
-        "failed": sum(bool(trial.problems) for trial in results.trials), "branches": results.branches,
-        "trials": list(map(trial_to_json, results.trials)),
+        "robot_time_s": campaign.nominal_run.robot_time, "complete": campaign.is_complete,
+        "branches": count_branch_entries(campaign), "trials": list(map(trial_to_json, campaign.trials)),
     }  # fmt: skip
 
 
@@ -408,29 +377,29 @@ def trial_to_json(trial: Trial) -> dict[str, object]:
     return {"fault": trial.fault_option, "faults": faults, "verdict": trial.verdict, **values}
 
 
-def list_result_lines(campaign: Campaign, results: CampaignResults) -> Iterator[str]:
+def list_result_lines(campaign: Campaign) -> Iterator[str]:
     """Yield the lines of the text about a campaign: verdicts by node and fault, problems, unused branches."""
     mission = campaign.mission
     yield (
-        f"{mission.name} ({mission.cell_description}), seed {mission.seed}: {len(results.trials)} runs with "
+        f"{mission.name} ({mission.cell_description}), seed {mission.seed}: {len(campaign.trials)} runs with "
         f"faults; a run without faults takes {campaign.nominal_run.robot_time:.1f} s"
     )
-    if not results.is_complete:
+    if not campaign.is_complete:
         yield "  ended by the user before the last run"
     verdicts_by_fault: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
-    for trial in results.trials:
+    for trial in campaign.trials:
         tested_fault = list(trial.faults.values())[-1]
         verdicts_by_fault[tested_fault.name, tested_fault.kind][trial.verdict] += 1
     for (name, kind), verdicts in verdicts_by_fault.items():
         texts = [f"{verdict} ({count})" for verdict, count in verdicts.most_common()]
         yield f"  {name:40} {kind:30} {', '.join(texts)}"
-    failed_trials = [trial for trial in results.trials if trial.problems]
+    failed_trials = [trial for trial in campaign.trials if trial.problems]
     yield f"  runs with a problem: {len(failed_trials) or 'none'}"
     for trial in failed_trials:
         yield from (f"    {line}" for line in list_trial_lines(trial))
-    unentered_branches = [branch for branch, count in results.branches.items() if not count]
-    entered_count = len(results.branches) - len(unentered_branches)
-    yield f"  branches after a failure: {entered_count} of {len(results.branches)} entered"
+    branches = count_branch_entries(campaign)
+    unentered_branches = [branch for branch, count in branches.items() if not count]
+    yield f"  branches after a failure: {len(branches)}, never entered: {len(unentered_branches)}"
     yield from (f"    never entered: {branch}" for branch in unentered_branches)
 
 

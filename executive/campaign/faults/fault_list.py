@@ -116,46 +116,28 @@ class PlannedFault:
         return f"{self.location} {self.kind}, {self.occasion}: {self.injected}"
 
 
-def list_faults(
-    mission: MissionUnderTest, steps_by_path: Mapping[str, Sequence[int]], duration: float
-) -> list[PlannedFault]:
-    """Return all single faults of a mission; the number of a fault is its position in the list, from 1.
-
-    The order is: failures of all nodes in the order of the tree, bugs of all skills in the order of the tree,
-    faults of detectors, faults of objects, faults of the tool.
+class FaultLister:
+    """Lists all single faults of a mission.
 
     Args:
         mission: The mission.
         steps_by_path: Control steps of each activation in a run without faults, by path of the node.
         duration: Duration of a run without faults [s].
     """
-    lister = _FaultLister(mission, steps_by_path, duration)
-    return [
-        *(fault for node in lister.nodes for fault in lister.list_failures(node)),
-        *(fault for node in lister.nodes for fault in lister.list_bugs(node)),
-        *lister.list_detector_faults(),
-        *lister.list_object_faults(),
-        *lister.list_tool_faults(),
-    ]
-
-
-class _FaultLister:
-    """Lists the faults of one mission; the arguments are those of `list_faults`."""
 
     def __init__(
         self, mission: MissionUnderTest, steps_by_path: Mapping[str, Sequence[int]], duration: float
     ) -> None:
-        self.nodes = [node for node in mission.loaded.tree.walk() if isinstance(node, SkillNode)]
+        self._nodes = [node for node in mission.loaded.tree.walk() if isinstance(node, SkillNode)]
         self._skills = mission.loaded.skills
         self._steps_by_path = steps_by_path
         self._duration = duration
-        table = mission.loaded.cell_config.table
-        self._area = (table.x, table.y)
+        self._table = mission.loaded.cell_config.table
         # Effects on the cell that cause failures of skills, by reason.
         self._causes = {
             "missed": effects.seal_fails(),
             "dropped": effects.seal_breaks(),
-            "no_contact": effects.object_bumped(*self._area),
+            "no_contact": effects.object_bumped(self._table.x, self._table.y),
             "blocked": effects.arm_collides(),
             "unreachable": effects.no_path(),
             "stuck": effects.tool_does_not_release(),
@@ -168,7 +150,20 @@ class _FaultLister:
             "rescan": effects.operator_asks_rescan(),
         }
 
-    def list_failures(self, node: SkillNode) -> Iterator[PlannedFault]:
+    def list_faults(self) -> Iterator[PlannedFault]:
+        """Yield all faults; the number of a fault is its position, from 1.
+
+        The order is: failures of all nodes in the order of the tree, bugs of all skills in the order of the
+        tree, faults of detectors, faults of objects, faults of the tool.
+        """
+        for node in self._nodes:
+            yield from self._list_failures(node)
+        yield from map(self._make_bug, self._nodes)
+        yield from self._list_detector_faults()
+        yield from self._list_object_faults()
+        yield from self._list_tool_faults()
+
+    def _list_failures(self, node: SkillNode) -> Iterator[PlannedFault]:
         """Yield the failures of a node: each reason on each occasion, caused by the cell and by the skill."""
         activation_count = len(self._steps_by_path.get(node.path, ()))
         occasions: dict[str, tuple[int, ...]] = {"first": (1,), "lasting": ()}
@@ -180,76 +175,68 @@ class _FaultLister:
                 if cause is not None:
                     numbers = activations or (REPEATED_ACTIVATIONS if reason in ENDLESS_REASONS else ())
                     fault = during(node.path, cause, activations=numbers)
-                    yield self._plan(node, reason, occasion, fault, True)
+                    yield self._plan(node, reason, occasion, fault, is_failure_reason=True)
                 skill_fault = SkillFault(node.skill, reason, activations or REPEATED_ACTIVATIONS)
-                yield self._plan(node, reason, occasion, skill_fault, True, cause is not None)
+                flags = {"is_failure_reason": True, "replaces_previous": cause is not None}
+                yield self._plan(node, reason, occasion, skill_fault, **flags)
 
-    def list_bugs(self, node: SkillNode) -> Iterator[PlannedFault]:
-        """Yield an error that the code of a skill raises half-way in its longest activation."""
+    def _make_bug(self, node: SkillNode) -> PlannedFault:
+        """Return an error that the code of a skill raises half-way in its longest activation."""
         step_counts = self._steps_by_path.get(node.path, (0,))
         longest_activation = 1 + step_counts.index(max(step_counts))
         bug = SkillFault(node.skill, "", (longest_activation,), max(step_counts) // 2)
-        yield self._plan(node, "raises", "middle", bug)
+        return self._plan(node, "raises", "middle", bug)
 
-    def list_detector_faults(self) -> Iterator[PlannedFault]:
+    def _list_detector_faults(self) -> Iterator[PlannedFault]:
         """Yield hanging, unsure and dead detectors, from the start and from the middle of the run."""
-        kinds = {
-            "hangs": effects.detector_hangs(),
-            "unsure": effects.detector_unsure(),
-            "dead": effects.detector_dead(),
-        }
         for occasion, start in (("first", 0.0), ("middle", self._duration / 2)):
             for duration in (*FAULT_DURATIONS, self._duration):
-                for kind, effect in kinds.items():
+                for effect in (effects.detector_hangs(), effects.detector_unsure(), effects.detector_dead()):
+                    kind = f"{effect.name.removeprefix('detector_')} for {duration:.3g} s"
                     fault = between(start, start + duration, effect)
-                    yield PlannedFault(
-                        "detector", "detector", f"{kind} for {duration:.3g} s", occasion, fault
-                    )
+                    yield PlannedFault("detector", "detector", kind, occasion, fault)
 
-    def list_object_faults(self) -> Iterator[PlannedFault]:
+    def _list_object_faults(self) -> Iterator[PlannedFault]:
         """Yield removed and bumped objects: the object nearest to the tool, and the target of an approach."""
         for occasion, fraction in OCCASIONS.items():
             start = fraction * self._duration
-            for kind, effect in self._list_object_effects("nearest", None):
-                yield PlannedFault("object", "object", kind, occasion, after(start, effect))
+            for effect in self._list_object_effects("nearest", None):
+                yield PlannedFault("object", "object", effect.name, occasion, after(start, effect))
         for node in self._list_moving_nodes():
             if any(port.type is Target for port in self._skills[node.skill].ports.values()):
                 middle = 1 + len(self._steps_by_path[node.path]) // 2
                 for occasion, fraction in OCCASIONS.items():
-                    for kind, effect in self._list_object_effects("node", fraction):
+                    for effect in self._list_object_effects("node", fraction):
                         fault = during(node.path, effect, activations=middle)
-                        yield self._plan(node, f"target {kind}", occasion, fault)
+                        yield self._plan(node, f"target: {effect.name}", occasion, fault)
 
-    def list_tool_faults(self) -> Iterator[PlannedFault]:
+    def _list_tool_faults(self) -> Iterator[PlannedFault]:
         """Yield losses of the seal during a transport, and times in which the suction cup cannot seal."""
         for node in self._list_moving_nodes():
             if self._skills[node.skill].tool_state[0] is HOLDING:
                 for occasion, fraction in OCCASIONS.items():
                     fault = during(node.path, effects.seal_breaks(fraction), activations=1)
                     yield self._plan(node, "seal breaks", occasion, fault)
-                fault = during(node.path, effects.seal_breaks_over_wrong_bin())
-                yield self._plan(node, "seal breaks over a wrong bin", "lasting", fault)
         start = self._duration / 2
         for duration in FAULT_DURATIONS:
             fault = between(start, start + duration, effects.seal_fails())
             yield PlannedFault("tool", "tool", f"no seal for {duration:g} s", "middle", fault)
+        unsealable = after(0.0, effects.object_unsealable(1))
+        yield PlannedFault("tool", "tool", "no seal on an object", "lasting", unsealable)
 
-    def _list_object_effects(self, choice: ObjectChoice, fraction: float | None) -> list[tuple[str, Effect]]:
-        removed = effects.object_removed(choice, fraction)
-        bumped = effects.object_bumped(*self._area, choice, fraction)
-        return [("removed", removed), ("bumped", bumped)]
+    def _list_object_effects(self, choice: ObjectChoice, fraction: float | None) -> list[Effect]:
+        bumped = effects.object_bumped(self._table.x, self._table.y, choice, fraction)
+        return [effects.object_removed(choice, fraction), bumped]
 
     def _list_moving_nodes(self) -> list[SkillNode]:
         """Return the nodes that move the arm in a run without faults."""
-        nodes_with_run = [node for node in self.nodes if node.path in self._steps_by_path]
+        nodes_with_run = [node for node in self._nodes if node.path in self._steps_by_path]
         return [node for node in nodes_with_run if self._skills[node.skill].moves]
 
     def _plan(
-        self, node: SkillNode, kind: str, occasion: str, fault: ScheduledFault | SkillFault,
-        is_failure_reason: bool = False, replaces_previous: bool = False,
-    ) -> PlannedFault:  # fmt: skip
-        """Return a planned fault that affects a node."""
+        self, node: SkillNode, kind: str, occasion: str, fault: ScheduledFault | SkillFault, **flags: bool
+    ) -> PlannedFault:
+        """Return a planned fault that affects a node; `flags` are further attributes of the fault."""
         name = f"{node.label or node.skill} {node.span.source.path}:{node.span.line}"
-        is_conditional = node.path not in self._steps_by_path
-        reasons = (is_failure_reason, is_conditional, replaces_previous)
-        return PlannedFault(node.path, name, kind, occasion, fault, *reasons)
+        flags["is_conditional"] = node.path not in self._steps_by_path
+        return PlannedFault(node.path, name, kind, occasion, fault, **flags)

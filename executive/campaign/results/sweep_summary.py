@@ -11,7 +11,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.campaign.results.rows import ItemRow, RunRow, SkillRow, SweepSettings
+from executive.campaign.results.rows import RunRow, SkillRow, SweepSettings
 from executive.record.timeline import PlanningTotals
 
 FloatArray = NDArray[np.float64]
@@ -132,7 +132,7 @@ class SweepResults:
     Attributes:
         side: `A` or `B` in a comparison, else "".
         settings: Settings of the sweep.
-        runs, items: Rows of the runs and of the items.
+        runs: Rows of the runs.
         summaries: Summary of each variant.
         planned_run_count: Number of runs of a complete sweep.
     """
@@ -140,7 +140,6 @@ class SweepResults:
     side: str
     settings: SweepSettings
     runs: Sequence[RunRow]
-    items: Sequence[ItemRow]
     summaries: Sequence[VariantSummary]
     planned_run_count: int
 

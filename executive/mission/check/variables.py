@@ -39,7 +39,7 @@ def find_unwritten_library_inputs(context: CheckContext) -> Iterator[Finding]:
         names = " and ".join(f"${name} (for {input_name})" for name, input_name in sorted(inputs.items()))
         message = f'the subtree "{use.name}" needs variables that may be unwritten at this node: {names}'
         hints = [
-            f"${name} is written by {_suggest_writers(context, name, use.span)}." for name in sorted(inputs)
+            f"${name} is written by {_describe_writers(context, name, use.span)}." for name in sorted(inputs)
         ]
         yield make_error(use.span, "unwritten", message, " ".join(hints))
 
@@ -122,25 +122,14 @@ def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
 
 
 def _describe_writers(context: CheckContext, variable: str, span: Span) -> str:
-    """Return the skills that write a variable: `Grasp in line 3 and Grasp in line 9`."""
-    return " and ".join(_list_writers(context, variable, span)) or "a loop, for the nodes in its body only"
-
-
-def _list_writers(context: CheckContext, variable: str, span: Span) -> list[str]:
-    """Return each skill that writes a variable, for a message at `span`: `Grasp in line 3`."""
+    """Return the skills that write a variable, for a message at `span`: `Grasp in line 3`."""
     wires = [
         (node, wire) for node in context.iterate_nodes() for wire in context.find_wires(node, Direction.OUT)
     ]
     nodes = [(node.span, wire.skill) for node, wire in wires if wire.variable == variable]
     nodes.sort(key=lambda node: node[0].line)
-    return list(dict.fromkeys(f"{skill} in {place.describe_place(span.source)}" for place, skill in nodes))
-
-
-def _suggest_writers(context: CheckContext, variable: str, span: Span) -> str:
-    """Return the nodes in the file of `span` that write a variable, or else all skills with this output."""
-    all_writers = _list_writers(context, variable, span)
-    writers_in_file = [writer for writer in all_writers if " in line " in writer]
-    return " and ".join(writers_in_file) or list_skills_with_output(context, variable) or "no skill"
+    writers = dict.fromkeys(f"{skill} in {place.describe_place(span.source)}" for place, skill in nodes)
+    return " and ".join(writers) or list_skills_with_output(context, variable) or "a loop, in its body only"
 
 
 def _make_unwritten_hint(context: CheckContext, read: VariableRead) -> str:

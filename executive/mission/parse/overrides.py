@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from executive.cell.config import CellConfig
-from executive.mission.findings import Finding, make_error, suggest_choice
+from executive.mission.findings import Finding, make_error
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, parse_yaml
 
@@ -38,19 +37,9 @@ def override_cell(root: YamlNode, overrides: Mapping[str, str]) -> tuple[YamlNod
         node, override_findings = parse_override(key, value)
         findings += override_findings
         path = key.removeprefix(CELL_PREFIX).split(".")
-        if node is not None and _has_section(root, path, node, findings):
+        if node is not None:
             root = _replace_value(root, path, node, findings)
     return root, findings
-
-
-def _has_section(root: YamlNode, path: list[str], value: YamlNode, findings: list[Finding]) -> bool:
-    """Check that `path` is one key, or starts with a key of the cell; else add an error, return False."""
-    keys = root.keys if isinstance(root, YamlMapping) else ()
-    if len(path) == 1 or path[0] in (*keys, *CellConfig.model_fields):
-        return True
-    hint = suggest_choice(path[0], CellConfig.model_fields, "Keys of the cell")
-    findings.append(make_error(value.span, "unknown-key", f'the cell has no key "{path[0]}"', hint))
-    return False
 
 
 def _replace_value(root: YamlNode, path: list[str], value: YamlNode, findings: list[Finding]) -> YamlNode:

@@ -123,19 +123,9 @@ def make_name_schemas(skills: Mapping[str, type[Skill]]) -> list[Schema]:
 
 
 def _document_skill(skill: type[Skill]) -> Schema:
-    """Return the description of a skill for editors, with its docstring, ports and reasons."""
+    """Return the description of a skill for editors, with its docstring and reasons."""
     docstring = inspect.getdoc(skill) or ""
-    names_by_relation = {
-        "reads": [port.name for port in skill.ports.values() if port.direction is Direction.IN],
-        "writes": [port.name for port in skill.ports.values() if port.direction is Direction.OUT],
-        "may fail with": skill.reasons,
-    }
-    list_items = [
-        f"* {relation} " + ", ".join(f"`{name}`" for name in names)
-        for relation, names in names_by_relation.items()
-        if names
-    ]
-    markdown = "\n\n".join(part for part in (docstring, "\n".join(list_items)) if part)
+    markdown = f"{docstring}\n\nFailures: {', '.join(skill.reasons) or 'none'}"
     return {"description": docstring.partition("\n")[0], "markdownDescription": markdown}
 
 

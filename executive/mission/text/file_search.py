@@ -38,8 +38,6 @@ def find_mission(name: str | Path) -> Path:
     # Unlike the methods of Path, these functions return False for invalid file names.
     if os.path.isfile(path):
         return path
-    if os.path.isdir(path):
-        raise InputError(f'"{name}" is a folder; give the path of one of its files')
     if os.path.lexists(path):
         raise InputError(f'"{name}" is {_describe_kind(path)}, not a file')
     stem = PurePosixPath(str(name).removeprefix("missions/").removesuffix(".yaml"))

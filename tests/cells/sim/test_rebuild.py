@@ -24,7 +24,7 @@ from executive.motion.trajectory import Trajectory
 from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import make_oracle_kind
-from executive.testing.world_access import open_world
+from executive.testing.world_access import WorldAccess
 from tests.meanwhile import meanwhile
 
 SEED = 3
@@ -176,7 +176,7 @@ def test_what_happened_meanwhile_is_there_and_took_none_of_the_runs_time(
 
     meanwhile(log, mission, SEED, act, make_oracle_kind())
     cell = rebuilt(mission, log)
-    things = {thing.body: thing.position for thing in open_world(cell).objects}
+    things = {thing.body: thing.position for thing in WorldAccess(cell).objects}
     assert np.abs(things[moved[0][0]] - moved[0][1]).max() < 0.01
     assert moved[1][0] not in things
     assert (cell.steps, cell.cell.arm.at_rest) == (left[1].tick, True)

@@ -1,0 +1,36 @@
+"""No file but its own names a control node."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+
+import executive
+from executive.mission.model.grammar import SEQUENCE_KEYWORD, USE_KEYWORD
+from executive.tree.node_registry import load_control_nodes
+
+PERMITTED = {
+    ("mission/model/grammar.py", f'"{SEQUENCE_KEYWORD}"'),
+    ("mission/model/grammar.py", f'"{USE_KEYWORD}"'),
+    ("cells/sim/scene_file.py", '"any"'),  # any class of objects
+    ("skill.py", '"any"'),  # any state of the tool
+    ("record/diagnosis/diagnosis.py", '"repeat"'),  # label before the command that repeats a run
+}
+"""The words that belong to the grammar, and words that mean something else."""
+TABLE_OF_FORMER_WORDS = "mission/other_words.py"
+
+
+def test_no_other_file_names_a_control_node() -> None:
+    package = Path(inspect.getfile(executive)).parent
+    kinds = load_control_nodes().values()
+    words = {f'"{word}"' for word in (USE_KEYWORD, *(kind.keyword for kind in kinds))}
+    words |= {f"from {kind.__module__} import" for kind in kinds}
+    own = {Path(inspect.getfile(kind)) for kind in kinds}
+    found = {
+        (file.relative_to(package).as_posix(), word)
+        for file in sorted(package.rglob("*.py"))
+        if file not in own and file != package / TABLE_OF_FORMER_WORDS
+        for word in words
+        if word in file.read_text(encoding="utf-8")
+    }
+    assert found == PERMITTED
