@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from executive.cell.config import CellConfig, Section
-from executive.cells.fake.noisy_detector import NoisyOptions
+from executive.perception.detectors.noisy import NoisyOptions
 from executive.cells.sim.scene_file import SceneConfig
 from executive.cli.main import main as command_line
 from executive.cli.skills import Declaration, collect_declarations

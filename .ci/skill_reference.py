@@ -82,7 +82,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("fake = FakeCell()", "cells/fake/cell.py", "FakeCell"),
         ("fake.world", "cells/fake/world.py", "FakeWorld"),
         ("fake.arm", "cells/fake/arm.py", "FakeArm"),
-        ("fake.tool", "cells/fake/arm.py", "FakeTool"),
+        ("fake.tool", "cells/fake/world.py", "FakeTool"),
         ("fake.camera", "cells/fake/cell.py", "FakeCamera"),
         ("fake.detector", "cells/fake/cell.py", "FakeDetector"),
     ],

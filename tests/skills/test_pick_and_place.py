@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from executive.cell.objects import Target
-from executive.cells.fake.arm import FakeTool
+from executive.cells.fake.world import FakeTool
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach

@@ -1,23 +1,21 @@
-"""Arm and tool of the fake cell, with attributes by which tests provoke failures."""
+"""Arm of the fake cell, with attributes by which tests provoke failures."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell.arm import Goal, Motion, Task, reject_generator
+from executive.cell.arm import Goal, Motion, Task
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height
 from executive.cell.protocols import Clock
 from executive.cells.fake.world import FakeWorld
-from executive.errors import Blocked, Fault, Unreachable
+from executive.errors import Blocked, Unreachable
 from executive.events import Emit
-from executive.geometry import GRAVITY, Array, Pose
+from executive.geometry import Array
 from executive.motion.arms import build_planner
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
 from executive.motion.configurations import (
@@ -25,17 +23,11 @@ from executive.motion.configurations import (
     find_vertical_waypoints,
     solve_vertical_waypoints,
 )
-from executive.motion.plans import Plan, PlanFactory
+from executive.motion.plans import PlanningArm
 from executive.motion.search import EXTRA_HEIGHTS
 
 JOINT_SPEED = 1.5
 """Speed of the fastest joint of the fake arm outside of guarded motions [rad/s]."""
-
-DEFAULT_BREAKAWAY_FORCE = 7.9
-"""Breakaway force of the seals of the fake tool, unless a test changes it [N]."""
-
-LOAD_NOISE = 1e-9
-"""Amplitude of the noise of the load of the fake tool [N], so that the load cell does not seem broken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +42,7 @@ class FakeMotion:
         return len(self.qs) * STEP
 
 
-class FakeArm:
+class FakeArm(PlanningArm[FakeMotion]):
     """An arm that moves on straight joint paths, stops without braking, and never hits an obstacle by itself.
 
     A motion rises to the travel height, crosses, and descends. It is blocked if tool or load would come
@@ -63,8 +55,8 @@ class FakeArm:
         emit: Receives the events of the arm.
 
     Attributes:
-        poses: Joint positions `(n,)` [rad] of each named pose; a run begins at `home`.
         q: Joint positions `(n,)` [rad].
+        poses: Joint positions `(n,)` [rad] of each named pose; a run begins at `home`.
         tool_velocity: Velocity zero `(3,)` [m/s]: a released object falls straight down.
         collision: Description of the obstacle that stopped the last motion, or None.
         contact_point: Position of the tool `(x, y, z)` [m] at the last `next_obstacle`, or None.
@@ -72,31 +64,19 @@ class FakeArm:
         commands: Names of the executed commands, `start` or `stop`, in order, for tests.
     """
 
+    q = np.zeros(0)
+
     def __init__(self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit) -> None:
-        self.poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
+        super().__init__(config, build_planner(config), clock, emit)
         self.q = self.poses["home"]
         self.tool_velocity = np.zeros(3)
-        self.collision: str | None = None
-        self.contact_point: Sequence[float] | None = None
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
         self._world = world
         self._config = config
-        self._planner = build_planner(config)
-        self._kinematics = self._planner.kinematics
-        self._factory = PlanFactory(self._plan_motion, clock, config.motion.planning_time, emit)
+        self._kinematics = self.planner.kinematics
         self._path: list[Array] = []
         self._half_length = 0
-
-    @property
-    def tool_pose(self) -> Pose:
-        """Pose of the tool centre point."""
-        return self._kinematics.compute_tool_pose(self.q)
-
-    @property
-    def destination(self) -> Array:
-        """Position of the tool `(3,)` [m] at the end of the running motion, or now if the arm is at rest."""
-        return self._kinematics.compute_tool_pose(self._end_q).position
 
     @property
     def at_rest(self) -> bool:
@@ -107,33 +87,16 @@ class FakeArm:
     def _end_q(self) -> Array:
         return self._path[-1] if self._path else self.q
 
-    def describe_unreachable(self, goal: Goal) -> str:
-        """Return a sentence if no joint configuration within the limits reaches a goal, else ""."""
-        return self._planner.describe_unreachable(goal)
-
-    def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[FakeMotion]:
-        """Begin to plan a motion to a goal or a named pose; a plan from `plan_ahead` is complete at once."""
-        return self._factory.plan(self._end_q, goal, task)
-
-    def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
-        """Plan the next motion, from the end of the running motion, before `plan` requests it."""
-        self._factory.plan_ahead(self._end_q, goal, task)
-
     def start(self, motion: Motion) -> None:
         """Begin to follow a motion.
 
         Raises:
-            Fault: The arm is moving, or another arm planned the motion.
+            Fault: The arm is moving, or did not plan the motion.
         """
-        if not self.at_rest:
-            raise Fault("the arm was started while it moves")
-        reject_generator(motion)
-        if not isinstance(motion, FakeMotion):
-            raise Fault(f"the fake arm follows its own planned motions, not a {type(motion).__name__}")
+        self._path = list(self._require_own_motion(motion, FakeMotion).qs)
+        self._half_length = len(self._path) // 2
         self.commands.append("start")
         self._world.is_commanded = True
-        self._path = list(motion.qs)
-        self._half_length = len(self._path) // 2
         self.collision = None
         self.contact_point = None
 
@@ -169,9 +132,8 @@ class FakeArm:
             self.contact_point = self.tool_pose.position.tolist()
             self.stop()
 
-    def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> Future[FakeMotion]:
-        """Return a motion, or the error of the first attempt if every path is blocked or out of reach."""
-        future: Future[FakeMotion] = Future()
+    def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> FakeMotion:
+        """Return a motion, or raise the error of the first attempt if there is none."""
         errors: list[Exception] = []
         travel_height = compute_travel_height(self._config)
         rise = max(0.0, travel_height - float(self._kinematics.compute_tool_pose(start).position[2]))
@@ -180,13 +142,10 @@ class FakeArm:
             try:
                 qs = self._find_path(start, goal, *attempt)
                 self._require_clearance(np.vstack([start, qs]), task)
+                return FakeMotion(qs)
             except (Blocked, Unreachable) as error:
                 errors.append(error)
-            else:
-                future.set_result(FakeMotion(qs))
-                return future
-        future.set_exception(errors[0])
-        return future
+        raise errors[0]
 
     def _find_path(self, start: Array, goal: Goal | str, rise: float, height: float) -> Array:
         """Return joint positions `(N, n)` [rad] of a path up by `rise` [m], and down from `height` [m]."""
@@ -224,68 +183,3 @@ def _interpolate(corners: Array, min_last_time: float) -> Array:
     corner_times = np.cumsum([0.0, *times])
     step_times = np.append(np.arange(STEP, corner_times[-1], STEP), corner_times[-1])
     return np.column_stack([np.interp(step_times, corner_times, joint) for joint in corners.T])
-
-
-class FakeTool:
-    """A suction cup that seals on every touched object, unless `can_seal` returns False.
-
-    Args:
-        world: The world with the objects.
-        get_tip_position: Returns the position of the tool tip `(3,)` [m].
-        load_std: Declared standard deviation of a reading of `load` [N].
-
-    Attributes:
-        can_seal: Function that returns True if the cup can seal on the touched object; set by tests.
-        breakaway_force: Force that every seal withstands [N].
-        load_error: Error of `load` [N]; set by tests.
-    """
-
-    def __init__(self, world: FakeWorld, get_tip_position: Callable[[], Array], load_std: float) -> None:
-        self._world = world
-        self._get_tip_position = get_tip_position
-        self.load_std = load_std
-        self.load_error = 0.0
-        self._noise = LOAD_NOISE
-        self.can_seal: Callable[[], bool] = lambda: True
-        self.breakaway_force = DEFAULT_BREAKAWAY_FORCE
-
-    @property
-    def touching(self) -> bool:
-        """True while the cup touches an object or the table."""
-        tip_position = self._get_tip_position()
-        return self._world.find_touched_object(tip_position) is not None or float(tip_position[2]) <= 0.0
-
-    @property
-    def holding(self) -> bool:
-        """True while the tool holds an object."""
-        return self._world.held_object is not None
-
-    @property
-    def holding_force(self) -> float:
-        """Breakaway force of the seal [N]; 0 while the tool holds nothing."""
-        return self.breakaway_force if self.holding else 0.0
-
-    @property
-    def load(self) -> float:
-        """Weight of the held object by the mass of its class, plus `load_error` and alternating noise [N]."""
-        self._noise = -self._noise
-        held = self._world.held_object
-        force = self._world.classes[held.label].mass * GRAVITY if held else 0.0
-        return force + self.load_error + self._noise
-
-    def close(self) -> None:
-        """Seal the cup on the touched object."""
-        self._world.is_commanded = True
-        fake_object = self._world.find_touched_object(self._get_tip_position())
-        if fake_object is not None and self.can_seal():
-            fake_object.is_dropped = False
-            self._world.held_object = fake_object
-
-    def open(self) -> None:
-        """Release the held object; it falls straight down."""
-        self._world.is_commanded = True
-        self._world.release()
-
-    def break_seal(self) -> None:
-        """Break the seal: the held object falls straight down, and rolls off other objects and bin walls."""
-        self._world.release(is_dropped=True)

@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.detection import Detection
 from executive.cell.frame import Box, Frame
-from executive.cell.layout import TOOL_RADIUS, list_bin_boxes
 from executive.cell.protocols import Clock, Routes
-from executive.cell.visuals import Shape
 from executive.cell.workcell import CellOptions, KeyPath
-from executive.cells.fake.arm import FakeArm, FakeTool
-from executive.cells.fake.world import FakeObject, FakeWorld, list_grid_points, put_random_objects
+from executive.cells.fake.arm import FakeArm
+from executive.cells.fake.world import FakeObject, FakeTool, FakeWorld, list_grid_points, put_random_objects
 from executive.cells.ground_truth import FinalObject, count_outcomes
 from executive.cells.log_file import LogFile
 from executive.cells.table_views import find_view_errors
@@ -40,14 +38,6 @@ SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yello
 """Permitted bins of each class of the shipped cells."""
 DEFAULT_CONFIDENCE = 0.9
 """Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""
-TOOL_COLOUR = (0.25, 0.28, 0.32)
-"""Colour of the displayed tool: red, green and blue, each 0 to 1."""
-TABLE_COLOUR = (0.86, 0.78, 0.66)
-"""Colour of the displayed table: red, green and blue, each 0 to 1."""
-TABLE_THICKNESS = 0.02
-"""Thickness of the displayed table [m]."""
-TABLE_MARGIN = 0.12
-"""Distance from the workspace to the edge of the displayed table on each side [m]."""
 
 
 class SilentOperator:
@@ -189,10 +179,6 @@ class FakeCell(CellWithoutHardware):
         super().advance()
         self.log_state()
 
-    def visuals(self) -> FakeVisuals:
-        """Return the shapes in the cell for display."""
-        return FakeVisuals(self)
-
     def audit(self) -> dict[str, int]:
         """Return the number of objects by outcome, such as `right`, `wrong_bin`, `left` and `elsewhere`."""
         removed = self.world.removed_objects
@@ -209,7 +195,8 @@ class FakeCell(CellWithoutHardware):
         return count_outcomes(objects, self.ledger.records, self.cell.bins, self.routes, gate, ignored)
 
     def close(self) -> None:
-        """Close the log."""
+        """Close the arm and the log."""
+        self.arm.close()
         if self._log is not None:
             self._log.close()
 
@@ -308,40 +295,6 @@ class FakeDetector:
 
     def close(self) -> None:
         """Do nothing: the detector holds no resources."""
-
-
-class FakeVisuals:
-    """Table, bins, tool, and objects as cylinders; implements `executive.cell.visuals.Visuals`.
-
-    Attributes:
-        shapes: All shapes of the cell.
-    """
-
-    def __init__(self, fake: FakeCell) -> None:
-        self._fake = fake
-        self._names = {body: f"object {number}" for number, body in enumerate(fake.world.objects)}
-        config, (left, right), (near, far) = fake.config, fake.config.table.x, fake.config.table.y
-        size = (right - left + 2 * TABLE_MARGIN, far - near + 2 * TABLE_MARGIN, TABLE_THICKNESS)
-        centre = ((left + right) / 2, (near + far) / 2, -TABLE_THICKNESS / 2)
-        self.shapes = [Shape("", "box", size, Pose.of(centre), TABLE_COLOUR)]
-        for bin in config.bins.values():
-            for half_size, offset in list_bin_boxes(bin.size):
-                x, y, z = (2 * half for half in half_size)
-                pose = Pose.of(np.add(bin.position, offset))
-                self.shapes.append(Shape("", "box", (x, y, z), pose, bin.colour))
-        # The origin of the tool frame is the tip of the tool, and z points out of the tool.
-        tool_pose = Pose.of((0.0, 0.0, -config.tool.length / 2))
-        cylinders = [("tool", TOOL_RADIUS, config.tool.length, tool_pose, TOOL_COLOUR)]
-        for body, name in self._names.items():
-            section = config.objects[body.label]
-            cylinders.append((name, section.radius, section.height, Pose.identity(), section.colours[0]))
-        for name, radius, height, pose, colour in cylinders:
-            self.shapes.append(Shape(name, "cylinder", (2 * radius, 2 * radius, height), pose, colour))
-
-    def poses(self) -> Mapping[str, Pose]:
-        """Return the poses of the tool and of the objects, by name."""
-        poses = {self._names[body]: Pose.of(body.position) for body in self._fake.world.objects}
-        return {"tool": self._fake.arm.tool_pose, **poses}
 
 
 def _read_object(

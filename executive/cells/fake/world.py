@@ -1,9 +1,9 @@
-"""World without physics: a table with objects that the tool can pick, transport and release."""
+"""World without physics: a table with objects, and the tool that picks and releases them."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,13 +11,19 @@ import numpy as np
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass
-from executive.geometry import Array
+from executive.geometry import GRAVITY, Array
 
 MAX_SEAL_OFFSET = 0.012
 """Maximum horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
 
 TOUCH_DISTANCE = 0.002
 """Maximum vertical distance between the cup and the top of an object for contact [m]."""
+
+DEFAULT_BREAKAWAY_FORCE = 7.9
+"""Breakaway force of the seals of the fake tool, unless a test changes it [N]."""
+
+LOAD_NOISE = 1e-9
+"""Amplitude of the noise of the load of the fake tool [N], so that the load cell does not seem broken."""
 
 
 @dataclass(eq=False)
@@ -120,6 +126,71 @@ class FakeWorld:
             if is_touched and fake_object is not self.held_object:
                 return fake_object
         return None
+
+
+class FakeTool:
+    """A suction cup that seals on every touched object, unless `can_seal` returns False.
+
+    Args:
+        world: The world with the objects.
+        get_tip_position: Returns the position of the tool tip `(3,)` [m].
+        load_std: Declared standard deviation of a reading of `load` [N].
+
+    Attributes:
+        can_seal: Function that returns True if the cup can seal on the touched object; set by tests.
+        breakaway_force: Force that every seal withstands [N].
+        load_error: Error of `load` [N]; set by tests.
+    """
+
+    def __init__(self, world: FakeWorld, get_tip_position: Callable[[], Array], load_std: float) -> None:
+        self._world = world
+        self._get_tip_position = get_tip_position
+        self.load_std = load_std
+        self.load_error = 0.0
+        self._noise = LOAD_NOISE
+        self.can_seal: Callable[[], bool] = lambda: True
+        self.breakaway_force = DEFAULT_BREAKAWAY_FORCE
+
+    @property
+    def touching(self) -> bool:
+        """True while the cup touches an object or the table."""
+        tip_position = self._get_tip_position()
+        return self._world.find_touched_object(tip_position) is not None or float(tip_position[2]) <= 0.0
+
+    @property
+    def holding(self) -> bool:
+        """True while the tool holds an object."""
+        return self._world.held_object is not None
+
+    @property
+    def holding_force(self) -> float:
+        """Breakaway force of the seal [N]; 0 while the tool holds nothing."""
+        return self.breakaway_force if self.holding else 0.0
+
+    @property
+    def load(self) -> float:
+        """Weight of the held object by the mass of its class, plus `load_error` and alternating noise [N]."""
+        self._noise = -self._noise
+        held = self._world.held_object
+        force = self._world.classes[held.label].mass * GRAVITY if held else 0.0
+        return force + self.load_error + self._noise
+
+    def close(self) -> None:
+        """Seal the cup on the touched object."""
+        self._world.is_commanded = True
+        fake_object = self._world.find_touched_object(self._get_tip_position())
+        if fake_object is not None and self.can_seal():
+            fake_object.is_dropped = False
+            self._world.held_object = fake_object
+
+    def open(self) -> None:
+        """Release the held object; it falls straight down."""
+        self._world.is_commanded = True
+        self._world.release()
+
+    def break_seal(self) -> None:
+        """Break the seal: the held object falls straight down, and rolls off other objects and bin walls."""
+        self._world.release(is_dropped=True)
 
 
 def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:

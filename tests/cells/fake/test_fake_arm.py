@@ -154,7 +154,7 @@ def test_it_follows_one_motion_at_a_time_and_none_of_another_arm(fake: FakeCell)
         fake.arm.start(Hop())
     motion = plan_motion(fake, "aside")
     fake.arm.start(motion)
-    with pytest.raises(Fault, match="started while it moves"):
+    with pytest.raises(Fault, match="start a motion while moving"):
         fake.arm.start(motion)
     fake.arm.stop()
     fake.arm.stop_after_collision("not while it rests")

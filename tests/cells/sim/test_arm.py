@@ -68,7 +68,7 @@ def test_starting_or_planning_while_moving_is_a_fault(rig: Rig) -> None:
     motion = rig.planned(OVER)
     rig.arm.start(motion)
     rig.step(10)
-    with pytest.raises(Fault, match=r"start a motion while moving \(\d\.\d\d s to go\); wait for `at_rest`"):
+    with pytest.raises(Fault, match=r"start a motion while moving; wait for `at_rest`"):
         rig.arm.start(motion)
     with pytest.raises(Fault, match="plan a motion while moving"):
         rig.arm.plan(OVER)
