@@ -21,8 +21,7 @@ from executive.cells.sim.arm import SimArm
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import build_simulated_class, load_mesh
 from executive.cells.sim.spawn import spawn_objects
-from executive.cells.sim.suction import compute_breakaway_force, measure_contact
-from executive.cells.sim.tool import TOUCH_DISTANCE, SuctionTool
+from executive.cells.sim.tool import TOUCH_DISTANCE, SuctionTool, compute_breakaway_force, measure_contact
 from executive.cells.sim.world import World, name_load
 from executive.errors import Blocked, InputError, Unreachable
 from executive.geometry import Pose, make_tool_down_pose

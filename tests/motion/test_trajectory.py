@@ -14,8 +14,13 @@ from executive.cell.clock import STEP
 from executive.cells.sim.rebuild import SampledMotion
 from executive.errors import Fault, Unreachable
 from executive.motion.joints import JointState
-from executive.motion.point_to_point import Connector, JointLimitError
-from executive.motion.trajectory import Trajectory, compute_peak_fractions, downsample_path
+from executive.motion.trajectory import (
+    Connector,
+    JointLimitError,
+    Trajectory,
+    compute_peak_fractions,
+    downsample_path,
+)
 
 CONNECTOR = Connector(LIMITS)
 A, B, C = np.radians([[0, 20, 0, -90, 0, 70, 0], [40, 40, 20, -60, 10, 60, 90], [40, 45, 20, -60, 0, 60, 90]])

@@ -23,7 +23,7 @@ from executive.motion.configurations import (
     find_vertical_waypoints,
     solve_vertical_waypoints,
 )
-from executive.motion.plans import PlanningArm
+from executive.motion.planner import PlanningArm
 from executive.motion.search import EXTRA_HEIGHTS
 
 JOINT_SPEED = 1.5

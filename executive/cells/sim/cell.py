@@ -12,8 +12,7 @@ from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
 from executive.cells.ground_truth import FinalObject, count_outcomes
 from executive.cells.sim.arm import SimArm
-from executive.cells.sim.arm_occlusion import ArmOcclusion
-from executive.cells.sim.camera import SimCamera
+from executive.cells.sim.camera import ArmOcclusion, SimCamera
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.command_log import CommandLog, read_commands
 from executive.cells.sim.kind import SimCellChecks, find_missing_depth_sensors

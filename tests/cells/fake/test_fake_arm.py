@@ -14,6 +14,7 @@ from executive.cell.objects import Load, Obstacle
 from executive.cells.fake.arm import JOINT_SPEED
 from executive.cells.fake.cell import FakeCell, load_empty_cell
 from executive.errors import Blocked, Fault, Unreachable
+from executive.events import Event, MotionPlanned
 from executive.geometry import Array
 
 LATENCY = load_empty_cell().motion.planning_time
@@ -72,18 +73,28 @@ def test_the_tool_turns_as_the_goal_says(fake: FakeCell) -> None:
     assert fake.arm.tool_pose.rotation[:, 0] == pytest.approx([0, -1, 0], abs=1e-9)
 
 
-def test_a_plan_takes_its_time_unless_it_was_asked_for_before(fake: FakeCell) -> None:
-    fake.arm.start(plan_motion(fake, "aside"))
+def test_a_plan_takes_its_time_unless_it_was_asked_for_before() -> None:
+    events = list[Event]()
+    fake = FakeCell(emit=events.append)
+    motion = plan_motion(fake, "aside")
+    fake.arm.start(motion)
+    fake.arm.plan_ahead("home")  # replaced by the next plan
     fake.arm.plan_ahead(BESIDE)
     destination = fake.arm.destination
     while not fake.arm.at_rest:
         fake.advance()
     assert destination == pytest.approx(fake.arm.tool_pose.position)
-    assert fake.arm.plan(BESIDE).ready
-    planning, before = fake.arm.plan(BESIDE), fake.cell.clock.now
-    while not planning.ready:
-        fake.advance()
-    assert fake.cell.clock.now - before == pytest.approx(LATENCY, abs=STEP), "a plan is used once"
+    planning = fake.arm.plan(BESIDE)
+    assert planning.ready and planning.ready
+    duration = round(planning.result().duration, 4)
+    assert events == [
+        MotionPlanned(False, LATENCY, round(motion.duration, 4)),
+        MotionPlanned(True, 0.0, duration),
+    ]
+    planning = fake.arm.plan(BESIDE)
+    assert not planning.ready, "a plan is used once"
+    with pytest.raises(Fault, match='no arm pose "scan"; it has aside, home'):
+        fake.arm.plan("scan")
 
 
 @pytest.mark.parametrize(

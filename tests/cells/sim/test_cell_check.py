@@ -12,7 +12,7 @@ import pytest
 from executive.cell.config import ArmConfig, CellConfig
 from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.cell import SimCell
-from executive.cells.sim.poses import find_pose_errors
+from executive.cells.sim.kind import find_pose_errors
 from executive.motion.arms import build_kinematics, find_places_out_of_reach
 from tests.cells.sim.conftest import shipped_cell
 from tests.motion.joint_states import reach

@@ -21,8 +21,7 @@ from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.renderer import CELL_LIGHT
-from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, load_scene
-from executive.cells.sim.scene_world import apply_scene
+from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, apply_scene, load_scene
 from executive.cells.sim.spawn import build_initial_world
 from executive.cells.sim.world import World
 from executive.errors import InputError

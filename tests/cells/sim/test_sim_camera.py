@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig, DepthConfig, NoiseConfig
-from executive.cells.sim.arm_occlusion import ArmOcclusion
-from executive.cells.sim.camera import SimCamera, add_depth_noise, get_camera_pose
+from executive.cells.sim.camera import ArmOcclusion, SimCamera, add_depth_noise, get_camera_pose
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.renderer import CELL_LIGHT, render
 from executive.cells.sim.world import World
