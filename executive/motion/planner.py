@@ -188,6 +188,8 @@ class PlanningArm(Generic[M]):
     Args:
         config: The cell file.
         planner: Motion planner with the kinematics of the arm.
+        plan_motion: Function that plans a motion from rest at joint positions to a goal or to other joint
+            positions, `(n,)` each [rad]; called in the worker thread.
         clock: Clock of the run.
         emit: Function that receives an event for each requested plan when the plan is ready.
 
@@ -198,8 +200,16 @@ class PlanningArm(Generic[M]):
         contact_point: Point of the collision in the world `(x, y, z)` [m]; None: unknown, or no collision.
     """
 
-    def __init__(self, config: CellConfig, planner: Planner, clock: Clock, emit: Emit) -> None:
+    def __init__(
+        self,
+        config: CellConfig,
+        planner: Planner,
+        plan_motion: Callable[[Array, Goal | Array, Task], M],
+        clock: Clock,
+        emit: Emit,
+    ) -> None:
         self.planner = planner
+        self._plan_motion = plan_motion
         self.poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
         self.collision: str | None = None
         self.contact_point: Sequence[float] | None = None
@@ -223,10 +233,6 @@ class PlanningArm(Generic[M]):
     @property
     def _end_q(self) -> Array:
         """Joint positions `(n,)` [rad] at the end of the running motion, or now if the arm is at rest."""
-        raise NotImplementedError
-
-    def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> M:
-        """Return a motion from rest at `start` `(n,)` [rad]; called in the worker thread."""
         raise NotImplementedError
 
     @property
@@ -288,7 +294,8 @@ class PlanningArm(Generic[M]):
                 # A plan that the worker has already started cannot be cancelled, but nobody reads its result.
                 self._stored_plan.future.cancel()
             ready_time = self._clock.now + self._planning_time
-            future = self._worker.submit(self._plan_motion, start, goal, task)
+            end = self.poses[goal] if isinstance(goal, str) else goal
+            future = self._worker.submit(self._plan_motion, start, end, task)
             self._stored_query = query
             self._stored_plan = Plan(self._clock, ready_time, future)
         return self._stored_plan

@@ -118,7 +118,7 @@ class SimArm(PlanningArm[Trajectory]):
         emit: Emit = discard_event,
         rebuilder: WorldRebuilder | None = None,
     ) -> None:
-        super().__init__(config, planner, clock, emit)
+        super().__init__(config, planner, planner.plan, clock, emit)
         self._world = world
         self._contact_monitor = ContactMonitor(world, get_held_body)
         self._motion: Trajectory | None = None
@@ -225,10 +225,6 @@ class SimArm(PlanningArm[Trajectory]):
     def _end_q(self) -> Array:
         """Joint positions `(n,)` [rad] at the end of the running motion, or now if the arm is at rest."""
         return self._commanded_q if self._motion is None else self._motion.end
-
-    def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> Trajectory:
-        end = goal if isinstance(goal, Goal) else self.poses[goal]
-        return self.planner.plan(start, end, task)
 
     def _describe_disturbance(self, tolerance: float) -> str:
         """Return a sentence if a joint is over `tolerance` [rad] away from its command, else ""."""

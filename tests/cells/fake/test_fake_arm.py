@@ -11,11 +11,11 @@ from executive.cell.arm import Goal, Motion, Task
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.clock import STEP
 from executive.cell.objects import Load, Obstacle
-from executive.cells.fake.arm import JOINT_SPEED
 from executive.cells.fake.cell import FakeCell, load_empty_cell
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Event, MotionPlanned
 from executive.geometry import Array
+from executive.motion.straight_paths import JOINT_SPEED
 
 LATENCY = load_empty_cell().motion.planning_time
 BESIDE = Goal((0.5, 0.2, 0.03), guarded_length=0.02, guarded_speed=0.05)

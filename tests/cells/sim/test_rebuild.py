@@ -12,9 +12,9 @@ import pytest
 
 from executive.cell.clock import STEP
 from executive.cell.workcell import CellOptions, ResumePoint
-from executive.cells.fake.cell import SilentOperator
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.command_log import JOINT_TARGETS, CommandLog
+from executive.cells.without_hardware import SilentOperator
 from executive.errors import InputError
 from executive.events import discard_event
 from executive.geometry import Array

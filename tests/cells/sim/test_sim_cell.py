@@ -12,8 +12,9 @@ import pytest
 from executive.cell.arm import Goal
 from executive.cell.detection import Detections
 from executive.cell.workcell import CellOptions
-from executive.cells.fake.cell import SHIPPED_ROUTES, SilentOperator
+from executive.cells.fake.cell import SHIPPED_ROUTES
 from executive.cells.sim.cell import SimCell
+from executive.cells.without_hardware import SilentOperator
 from executive.events import discard_event
 from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell

@@ -40,7 +40,7 @@ def lose_server(run: FailedRun) -> None:
 
 
 def move_camera(run: FailedRun) -> None:
-    run.fake.camera.displacement_message = "camera overhead is not where the cell file says"
+    run.fake.camera.describe_displacement = lambda frame: "camera overhead is not where the cell file says"
 
 
 def halt_with_load(run: FailedRun) -> None:
