@@ -167,6 +167,8 @@ def test_it_follows_one_motion_at_a_time_and_none_of_another_arm(fake: FakeCell)
     fake.arm.start(motion)
     with pytest.raises(Fault, match="start a motion while moving"):
         fake.arm.start(motion)
+    with pytest.raises(Fault, match="plan a motion while moving"):
+        fake.arm.plan("home")
     fake.arm.stop()
     fake.arm.stop_after_collision("not while it rests")
     assert (fake.arm.commands, fake.arm.collision) == (["start", "stop"], None)

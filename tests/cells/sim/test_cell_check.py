@@ -37,12 +37,6 @@ def reaching(config: CellConfig, *place: float) -> Sequence[float]:
     return tuple(np.degrees(reach(kinematics, place, home)))
 
 
-def test_the_mass_of_a_class_is_declared_or_in_its_urdf(overhead: CellConfig) -> None:
-    sphere = overhead.objects["sphere"]
-    assert SimCell.compute_mass(sphere) == 0.1
-    assert SimCell.compute_mass(sphere.model_copy(update={"mass": 0.3})) == 0.3
-
-
 @pytest.mark.parametrize("name", ["overhead", "wrist", "depth"])
 def test_nothing_is_wrong_with_a_shipped_cell(missions: Path, name: str) -> None:
     assert list(SimCell.check(shipped_cell(name), missions / "cells")) == []
@@ -133,14 +127,3 @@ def test_a_bin_with_one_slot_out_of_reach_is_named_with_the_distance(
     assert keys == ("bins", "red_bin", "position")
     assert sentence.startswith('the bin "red_bin" is out of reach: the tool cannot reach (')
     assert sentence.endswith(why)
-
-
-def test_the_safe_place_and_poses_must_be_within_reach(overhead: CellConfig) -> None:
-    config = posed(overhead, turned=(0, 33, 0, -88, 0, 59, 180)).model_copy(
-        update={"safe_place": (0.9, 0.0, 0.0)}
-    )
-    pose, (keys, sentence) = find_places_out_of_reach(config)
-    text = 'joint 7 of the pose "turned" is at 180 degrees; its limit is 175'
-    assert pose == (("arm", "poses_deg", "turned"), text)
-    assert keys == ("safe_place",)
-    assert sentence.startswith("the safe place is out of reach: the tool cannot reach (0.900, 0.000, ")

@@ -14,7 +14,6 @@ from executive.cells.sim.models import find_model_errors, load_mesh
 from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Pose, rotate_about_z
-from tests.cells.sim.conftest import shipped_cell
 
 Build = Callable[[CellConfig], World]
 
@@ -36,11 +35,6 @@ f 1 5 6 4
 ADVICE = "scale or upright_deg"
 
 
-@pytest.fixture(scope="module")
-def fasteners() -> CellConfig:
-    return shipped_cell("fasteners")
-
-
 @pytest.fixture
 def wedge(tmp_path: Path) -> ObjectConfig:
     path = tmp_path / "wedge.obj"
@@ -50,30 +44,6 @@ def wedge(tmp_path: Path) -> ObjectConfig:
 
 def with_objects(config: CellConfig, **objects: ObjectConfig) -> CellConfig:
     return config.model_copy(update={"objects": objects})
-
-
-def put(world: World, label: str, x: float, y: float, yaw: float = 0.0) -> int:
-    bottom = load_mesh(world.config.objects[label]).bottom
-    body = world.add_object(label, Pose(rotate_about_z(yaw), np.array([x, y, 0.001 - bottom])), (1, 1, 1))
-    for _ in range(240):
-        world.step()
-    return body
-
-
-def hit(world: World, x: float, y: float) -> int:
-    ((body, *_),) = world.client.rayTest([x, y, 1], [x, y, -1])
-    return int(body)
-
-
-@pytest.mark.parametrize(("label", "hole", "ring"), [("washer", 0.006, 0.017), ("nut", 0.003, 0.0125)])
-def test_a_hole_is_a_hole_and_the_ring_around_it_is_not(
-    build: Build, fasteners: CellConfig, label: str, hole: float, ring: float
-) -> None:
-    world = build(fasteners)
-    body = put(world, label, 0.5, 0.1)
-    around = [(np.cos(angle), np.sin(angle)) for angle in np.linspace(0, 2 * np.pi, 24)]
-    assert {hit(world, 0.5 + hole * x, 0.1 + hole * y) for x, y in around} == {world.table}
-    assert {hit(world, 0.5 + ring * x, 0.1 + ring * y) for x, y in around} == {body}
 
 
 def test_a_mesh_stands_around_its_middle_and_weighs_about_the_middle_of_its_volume(

@@ -17,15 +17,12 @@ from executive.cells.sim.command_log import JOINT_TARGETS, CommandLog
 from executive.cells.without_hardware import SilentOperator
 from executive.errors import InputError
 from executive.events import discard_event
-from executive.geometry import Array
 from executive.mission.load import load_mission
 from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import make_oracle_kind
-from executive.testing.world_access import open_world
-from tests.meanwhile import meanwhile
 
 SEED = 3
 TICKS = (1, 400, 777)
@@ -158,26 +155,3 @@ def test_an_impossible_command_is_refused(mission, left: list[Left], tmp_path: P
     log.write_bytes(left[0].log.read_bytes() + line + b'\n["step"]\n')
     with pytest.raises(InputError, match="the log of the world is damaged"):
         rebuilt(mission, log)
-
-
-def test_what_happened_meanwhile_is_there_and_took_none_of_the_runs_time(
-    mission, left, tmp_path: Path
-) -> None:
-    log = tmp_path / "log"
-    log.write_bytes(left[1].log.read_bytes())
-    moved: list[tuple[int, Array]] = []
-
-    def act(world) -> None:
-        held = world.held_object.body if world.held_object else None
-        one, other = [thing for thing in world.objects if thing.body != held][:2]
-        world.remove(other)
-        world.move(one, (0.0, 0.3))
-        moved.extend([(one.body, one.position + np.array([0.0, 0.3, 0.0])), (other.body, np.zeros(3))])
-
-    meanwhile(log, mission, SEED, act, make_oracle_kind())
-    cell = rebuilt(mission, log)
-    things = {thing.body: thing.position for thing in open_world(cell).objects}
-    assert np.abs(things[moved[0][0]] - moved[0][1]).max() < 0.01
-    assert moved[1][0] not in things
-    assert (cell.steps, cell.cell.arm.at_rest) == (left[1].tick, True)
-    cell.close()
