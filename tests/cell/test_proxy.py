@@ -35,11 +35,6 @@ def test_every_access_goes_through_the_interceptor_and_so_do_those_to_what_a_cal
     ]
 
 
-def test_an_interceptor_may_answer_in_place_of_the_part(fake: FakeCell) -> None:
-    cell = intercept(fake.cell, lambda access: access.member, ("arm", "tool"))
-    assert (cell.tool.holding, cell.arm.plan("home").result()) == ("holding", "result")
-
-
 def test_only_the_members_of_the_protocol_are_offered(fake: FakeCell) -> None:
     cell = intercept(fake.cell, lambda access: access.proceed(), ("arm",))
     for member in ("commanded", "_plans", "__deepcopy__"):

@@ -28,23 +28,6 @@ def test_it_follows_a_motion_to_a_hundredth_of_a_degree(rig: Rig) -> None:
     assert np.allclose(rig.arm.tool_pose.position, OVER.position, atol=1e-4)
 
 
-def test_a_motion_planned_ahead_is_known_at_once_and_begins_where_the_running_one_ends(rig: Rig) -> None:
-    first = rig.planned(OVER)
-    rig.arm.start(first)
-    rig.step(30)
-    rig.arm.plan_ahead(BESIDE)
-    rig.run()
-    planning = rig.arm.plan(BESIDE)
-    assert planning.ready
-    assert rig.events[-1].planned_ahead is True
-    assert rig.events[-1].delay == 0.0
-    second = planning.result()
-    assert np.array_equal(second.start, first.end)
-    rig.arm.start(second)
-    rig.run()
-    assert np.allclose(rig.arm.tool_pose.position, BESIDE.position, atol=1e-4)
-
-
 def test_what_was_planned_ahead_is_of_no_use_once_the_arm_was_stopped_on_its_way(rig: Rig) -> None:
     rig.arm.start(rig.planned(OVER))
     rig.step(24)

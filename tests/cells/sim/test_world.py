@@ -12,15 +12,6 @@ from executive.geometry import Pose
 Build = Callable[[CellConfig], World]
 
 
-def test_the_table_top_is_at_height_zero_and_the_bin_floors_just_above(
-    build: Build, overhead: CellConfig
-) -> None:
-    world = build(overhead)
-    hits = world.client.rayTestBatch([[0.5, 0, 1], [0.2, 0.44, 1]], [[0.5, 0, -1], [0.2, 0.44, -1]])
-    assert [hit[0] for hit in hits] == [world.table, world.bin_bodies["blue_bin"]]
-    assert [hit[3][2] for hit in hits] == pytest.approx([0.0, 0.005], abs=1e-6)
-
-
 def test_a_ray_ends_at_the_first_thing_but_the_arm(build: Build, overhead: CellConfig) -> None:
     world, down = build(overhead), np.array([0.0, 0.0, -2.0])
     world.add_object("cube", Pose.of([0.5, 0.1, 0.025]), (1, 0, 0))
