@@ -78,15 +78,6 @@ class CommandLog(LogFile):
         self._length += len(data)
 
 
-def is_command_log(path: Path) -> bool:
-    """Return True if a file is the command log of a simulated world.
-
-    Raises:
-        InputError: The file cannot be read.
-    """
-    return _read_content(path).startswith(FILE_HEADER)
-
-
 def read_commands(path: Path) -> Iterator[Command]:
     """Yield the commands of a log in order, without an incomplete last command.
 
