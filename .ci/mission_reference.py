@@ -12,7 +12,6 @@ from typing import Any
 import yaml
 
 from executive.cell.config import CellConfig, Section
-from executive.cells.fake.noisy_detector import NoisyOptions
 from executive.cells.sim.scene_file import SceneConfig
 from executive.cli.main import main as command_line
 from executive.cli.skills import Declaration, collect_declarations
@@ -21,6 +20,7 @@ from executive.mission.model import grammar
 from executive.mission.schema.types import Schema, make_type_schema
 from executive.mission.text.file_search import list_shipped_missions
 from executive.perception.detectors.detector_registry import find_detector_kinds
+from executive.perception.detectors.noisy import NoisyOptions
 from executive.perception.detectors.rfdetr import RfdetrOptions
 from executive.perception.detectors.roboflow.detector import RoboflowOptions
 from executive.plugins import load_skills

@@ -80,9 +80,9 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
     ],
     "Test kit: fake cell": [
         ("fake = FakeCell()", "cells/fake/cell.py", "FakeCell"),
-        ("fake.world", "cells/fake/world.py", "FakeWorld"),
-        ("fake.arm", "cells/fake/arm.py", "FakeArm"),
-        ("fake.tool", "cells/fake/arm.py", "FakeTool"),
+        ("fake.world", "cells/fake/cell.py", "FakeWorld"),
+        ("fake.arm", "cells/fake/cell.py", "FakeArm"),
+        ("fake.tool", "cells/fake/cell.py", "FakeTool"),
         ("fake.camera", "cells/fake/cell.py", "FakeCamera"),
         ("fake.detector", "cells/fake/cell.py", "FakeDetector"),
     ],

@@ -1,22 +1,39 @@
-"""Cell without arm, tool and camera, which is the base class of the simulated and the fake cell."""
+"""Base class of the simulated and the fake cell: a cell without hardware, and an operator for tests."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from executive.cell.arm import Arm
 from executive.cell.clock import STEP, StepClock
 from executive.cell.config import CellConfig
 from executive.cell.layout import build_bins, build_object_classes
 from executive.cell.objects import Target
-from executive.cell.protocols import Cell, Routes
+from executive.cell.protocols import Cell, Detector, Localizer, Routes, Tool
 from executive.cell.visuals import Visuals
 from executive.cell.workcell import CellOptions
+from executive.cells.ground_truth import FinalObject, count_outcomes
 from executive.events import Emit, TargetSelected
 from executive.ledger.tracker import Tracker
+from executive.perception.camera_model import MountedCamera
+from executive.perception.detectors.screening import screen_detectors
+
+
+class SilentOperator:
+    """Operator without a terminal, who requests the classes of a list in order."""
+
+    def __init__(self, requests: Sequence[str] = ()) -> None:
+        self._requests = list(requests)
+
+    def ask(self, choices: Sequence[str]) -> str | None:
+        """Return the next class of the list, or None at the end of the list."""
+        del choices
+        return self._requests.pop(0) if self._requests else None
 
 
 class CellWithoutHardware:
@@ -77,6 +94,23 @@ class CellWithoutHardware:
             quotas=options.quotas,
         )
 
+    def _connect(
+        self,
+        options: CellOptions,
+        arm: Arm,
+        tool: Tool,
+        camera: MountedCamera,
+        detectors: Mapping[str, Detector],
+        localizer: Localizer,
+    ) -> None:
+        """Add the parts that skills use to `cell`; the camera of a resumed run continues to count."""
+        if options.resume is not None:
+            camera.set_counts(options.resume.frame_count, options.resume.pose_count)
+        screened = screen_detectors(detectors, self.cell.classes)
+        self.cell = replace(
+            self.cell, arm=arm, tool=tool, camera=camera, detectors=screened, localizer=localizer
+        )
+
     def log_to(self, path: Path) -> None:
         """Do nothing: without hardware or physics, there is no world to log."""
 
@@ -89,7 +123,14 @@ class CellWithoutHardware:
         return None
 
     def audit(self) -> Mapping[str, int] | None:
-        """Return None: the true counts are unknown."""
+        """Return the number of objects by `AUDIT_KEYS`; None if the true positions are unknown."""
+        if (objects := self._list_final_objects()) is None:
+            return None
+        gate, ignored = self.config.ledger.gate, self.accounts.ignored_positions
+        return count_outcomes(objects, self.accounts.records, self.cell.bins, self.routes, gate, ignored)
+
+    def _list_final_objects(self) -> Iterable[FinalObject] | None:
+        """Return all objects at the end of the run; None if their true positions are unknown."""
         return None
 
     def close(self) -> None:

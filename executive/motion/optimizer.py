@@ -19,7 +19,7 @@ from executive.motion.arm_model import Kinematics
 from executive.motion.clearance_model import ClearanceModel, NearestPairs
 from executive.motion.joints import JointLimits, JointState
 from executive.motion.payload import PayloadLimit
-from executive.motion.point_to_point import Connector, JointLimitError, PointToPoint
+from executive.motion.trajectory import Connector, JointLimitError, PointToPoint
 from executive.motion.transcription import (
     SAMPLES_PER_STEP,
     STEP_COUNT,

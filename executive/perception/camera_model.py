@@ -237,6 +237,15 @@ class MountedCamera:
             change_count=self._get_change_count(),
         )
 
+    def sees_table(self) -> bool:
+        """Return True if the whole workspace is now in the image and the arm occludes no part of it."""
+        raise NotImplementedError
+
+    def describe_displacement(self, frame: Frame) -> str:
+        """Return a message if a frame shows a displacement of the camera from the declared pose, else ""."""
+        del frame
+        return ""
+
     def _capture_images(self) -> tuple[NDArray[np.uint8], Array | None]:
         """Return the image `(H, W, 3)` and the depth `(H, W)` [m] of a new frame."""
         raise NotImplementedError

@@ -23,9 +23,8 @@ from executive.cell.protocols import Clock
 from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim.camera import SimCamera
 from executive.cells.sim.cell import SimCell
-from executive.cells.sim.models import load_mesh
+from executive.cells.sim.models import compute_bounding_box, load_mesh
 from executive.cells.sim.renderer import Image
-from executive.cells.sim.silhouette import compute_bounding_box
 from executive.cells.sim.world import World
 from executive.geometry import Array
 from executive.perception.camera_model import NEAR_PLANE, project

@@ -22,16 +22,19 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig
 from executive.cell.frame import Box
 from executive.cells.ground_truth import UNKNOWN_LABEL
-from executive.cells.sim import arrangements, variations
+from executive.cells.sim import arrangements
 from executive.cells.sim.arrangements import SceneObject
 from executive.cells.sim.camera import add_depth_noise, add_noise, get_camera_pose
-from executive.cells.sim.models import find_model_errors, load_mesh
+from executive.cells.sim.models import (
+    compute_bounding_box,
+    compute_silhouette_area,
+    find_model_errors,
+    load_mesh,
+)
 from executive.cells.sim.renderer import CELL_LIGHT, Image, RenderedImage, render
-from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
-from executive.cells.sim.scene_world import build_world
-from executive.cells.sim.silhouette import compute_bounding_box, compute_silhouette_area
+from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, build_world
 from executive.cells.sim.spawn import spawn_objects
-from executive.cells.sim.table_top import WOOD_TEXTURE
+from executive.cells.sim.world import WOOD_TEXTURE
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, intersect_plane, project
 from executive.processes import WorkerPool
@@ -236,11 +239,11 @@ class SceneRenderer:
         matrix, X_WC = self._camera_matrix, get_camera_pose(world, self._camera)
         (colour, texture), light, noise = ((1.0, 1.0, 1.0), WOOD_TEXTURE), CELL_LIGHT, self._camera.noise
         if rng.random() >= NOMINAL_SCENE_FRACTION:
-            matrix, X_WC = variations.draw_camera(self._camera, matrix, X_WC, rng)
-            (colour, texture), light = variations.draw_table_appearance(rng), variations.draw_light(rng)
-            noise = variations.draw_noise(noise, rng)
+            matrix, X_WC = arrangements.draw_camera(self._camera, matrix, X_WC, rng)
+            (colour, texture), light = arrangements.draw_table_appearance(rng), arrangements.draw_light(rng)
+            noise = arrangements.draw_noise(noise, rng)
         region = arrangements.draw_region(self._camera, rng)
-        wood_colour = tuple(np.multiply(colour, variations.WOOD_COLOUR).tolist())
+        wood_colour = tuple(np.multiply(colour, arrangements.WOOD_COLOUR).tolist())
         table_colour = wood_colour if texture == WOOD_TEXTURE else colour
         corners = [(x, y) for x in region[::2] for y in region[1::2]]
         footprint = np.array([intersect_plane(matrix, X_WC, corner, 0.0)[:2] for corner in corners])

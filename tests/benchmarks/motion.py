@@ -33,8 +33,7 @@ from executive.motion.braking import plan_braking
 from executive.motion.configurations import find_configuration_pairs, find_vertical_waypoints
 from executive.motion.joints import JointLimits, JointState, compute_min_time
 from executive.motion.planner import Planner
-from executive.motion.point_to_point import Connector
-from executive.motion.trajectory import Trajectory, compute_peak_fractions
+from executive.motion.trajectory import Connector, Trajectory, compute_peak_fractions
 from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world
 from tests.benchmarks.report import Figures, run_command, show_progress
 from tests.motion.joint_states import reach

@@ -16,7 +16,7 @@ import numpy as np
 
 from executive.cell.config import CellConfig, ToolConfig
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.suction import compute_breakaway_force, measure_contact
+from executive.cells.sim.tool import compute_breakaway_force, measure_contact
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
 from tests.benchmarks.report import Figures, run_command

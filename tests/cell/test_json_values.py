@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import Enum, IntEnum
 from functools import reduce
 from pathlib import Path
@@ -13,10 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from executive.cell.detection import Detection, ErrorRates
+from executive.cell.detection import Detection
 from executive.cell.frame import Frame
 from executive.cell.json_values import MAX_INTEGER_BITS, to_json, to_json_or_type_name
 from executive.geometry import Pose
@@ -28,18 +24,9 @@ class Corner(NamedTuple):
 
 
 Colour = Enum("Colour", {"RED": "red"})
-Shade = Enum("Shade", {"DARK": "dark"}, type=str)
 Level = IntEnum("Level", {"HIGH": 3})
-Share = Enum("Share", {"THIRD": 1 / 3}, type=float)
 
 
-@dataclass
-class Pair:
-    left: float
-    right: tuple[int, ...]
-
-
-EYE = ErrorRates(threshold=0.5, miss_rate=0.02, confusion_rate=0.0025, false_detections=0.02, jitter=0.6)
 FRAME = Frame(
     7, "overhead", np.zeros((4, 4, 3), np.uint8), None, np.eye(3), Pose.identity(), 1 / 3,
     np.ones((4, 4), bool), 0,
@@ -51,31 +38,24 @@ DUCK = {"label": "duck", "confidence": 0.6, "box": [1, 2.5, 3.0, 4], "second_con
 @pytest.mark.parametrize(
     ("value", "kept"),
     [
-        (1 / 3, 0.333333), (np.float64(2 / 3), 0.666667), (np.longdouble(1) / 3, 0.333333),
-        (-0.0, 0.0), (float("nan"), "nan"), (float("-inf"), "-inf"),
-        (np.int64(4), 4), (np.bool_(True), True), (None, None),
+        (np.float64(2 / 3), 0.666667), (np.longdouble(1) / 3, 0.333333), (-0.0, 0.0),
+        (float("nan"), "nan"), (float("-inf"), "-inf"), (np.int64(4), 4), (np.bool_(True), True),
         (np.array([[1.0, 2.00000049]]), [[1.0, 2.0]]), (np.array(["a"]), ["a"]),
         ({1: (1, 2)}, {"1": [1, 2]}), (MappingProxyType({"a": np.uint8(3)}), {"a": 3}),
         ({"b", "a"}, ["a", "b"]), (frozenset({2.5, 1.5}), [1.5, 2.5]),
-        (Colour.RED, "red"), (Shade.DARK, "dark"), (Level.HIGH, 3), (Share.THIRD, 0.333333),
-        (Corner(1 / 3, -0.0), [0.333333, 0.0]), (Pair(0.1, (1,)), {"left": 0.1, "right": [1]}),
+        (Colour.RED, "red"), (Level.HIGH, 3),
+        (Corner(1 / 3, -0.0), [0.333333, 0.0]),
         (b"bytes", "bytes"), (int, "type"), (object(), "object"), (Path("a/b"), "a/b"),
         (FRAME, {"frame": 7, "camera": "overhead", "stamp": 0.333333}),
         (Detection("duck", 0.6, (1, 2.5, np.float64(3), 4)), DUCK),
         pytest.param(2**MAX_INTEGER_BITS - 1, 2**MAX_INTEGER_BITS - 1, id="largest"),
         pytest.param(-(2**MAX_INTEGER_BITS), "-0x1" + "0" * (MAX_INTEGER_BITS // 4), id="too large"),
-        ("größe", "größe"), ("caf\udce9 ü", "caf\\udce9 ü"), ({"\ud800": 1}, {"\\ud800": 1}),
-        (Path("a\udcff"), "a\\udcff"), (np.str_("\udfff"), "\\udfff"),
+        ("caf\udce9 ü", "caf\\udce9 ü"), ({"\ud800": 1}, {"\\ud800": 1}), (Path("a\udcff"), "a\\udcff"),
     ],
 )  # fmt: skip
 def test_becomes_plain(value, kept):
     assert to_json(value) == kept
     assert repr(to_json(value)) == repr(kept)
-
-
-@given(st.recursive(st.floats() | st.integers() | st.text(), lambda inner: st.lists(inner, max_size=3)))
-def test_everything_plain_is_json(value):
-    json.dumps(to_json(value), allow_nan=False)
 
 
 class Shy(Mapping):

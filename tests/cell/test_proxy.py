@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
-
 from executive.cell.arm import Task
 from executive.cell.proxy import Access, intercept
 from executive.cells.fake.cell import FakeCell
@@ -33,15 +31,3 @@ def test_every_access_goes_through_the_interceptor_and_so_do_those_to_what_a_cal
         ("detector.request", "embedded", (frame, "full"), True),
         ("request.ready", "embedded", (), False),
     ]
-
-
-def test_an_interceptor_may_answer_in_place_of_the_part(fake: FakeCell) -> None:
-    cell = intercept(fake.cell, lambda access: access.member, ("arm", "tool"))
-    assert (cell.tool.holding, cell.arm.plan("home").result()) == ("holding", "result")
-
-
-def test_only_the_members_of_the_protocol_are_offered(fake: FakeCell) -> None:
-    cell = intercept(fake.cell, lambda access: access.proceed(), ("arm",))
-    for member in ("commanded", "_plans", "__deepcopy__"):
-        with pytest.raises(AttributeError, match=member):
-            getattr(cell.arm, member)

@@ -33,13 +33,10 @@ def changed(cell: str, **values: Any) -> CellConfig:
     [
         ("overhead", {"table_view": [250, 150, 390, 290]}, ["table_view"], "view is [231, 139, 409, 317]"),
         ("overhead", {"position": [0.5, 0, -1.2]}, ["position"], "100% of the workspace"),
-        ("overhead", {"fov_deg": 5.5}, ["position"], "86% of the workspace"),
         ("overhead", {"fov_deg": 170}, ["fov_deg"], "1.0 pixels"),
         ("depth", {"calibration": INVERSE}, ["calibration"], "exchange"),
         ("depth", {"calibration": INVERSE.replace("-2.2214, 0]", "-2, 0.3]")}, ["table_view"], "exchange"),
-        ("depth", {"calibration": INVERSE.replace("461", "46")}, ["calibration"], "2.3 pixels"),
         ("wrist", {"scan_poses": "[scan, home]"}, ["scan_poses", 1], 'from the pose "home"'),
-        ("wrist", {"table_view": [200, 120, 440, 360]}, ["table_view"], "view is [103, 27, 534, 458]"),
         ("wrist_halves", {"scan_poses": "[left_half]"}, ["scan_poses"], "y -0.22 to -0.02 m"),
         ("wrist_halves", {"partial_views": "false"}, ["scan_poses", 0], 'from the pose "left_half"'),
         ("wrist_halves", {"table_view": [0, 0, 64, 64]}, ["table_view"], "correct"),

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.cells.fake.arm import FakeTool
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake.cell import FakeCell, FakeTool
 from executive.testing.faults import during, seal_breaks
 from executive.testing.run_mission import run_mission
 

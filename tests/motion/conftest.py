@@ -14,7 +14,7 @@ from executive.motion.arm_model import Kinematics
 from executive.motion.arms import build_kinematics, build_planner
 from executive.motion.joints import JointLimits
 from executive.motion.planner import Planner
-from executive.motion.point_to_point import Connector
+from executive.motion.trajectory import Connector
 
 
 @pytest.fixture(scope="session")

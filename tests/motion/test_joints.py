@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from joint_states import LIMITS, shares
 
 from executive.motion.joints import JointLimits, JointState, compute_min_time
-from executive.motion.point_to_point import Connector
+from executive.motion.trajectory import Connector
 
 CONNECTOR = Connector(LIMITS)
 

@@ -65,17 +65,3 @@ def test_motions_of_six_joints_reach_their_goals_within_asymmetric_limits(
         assert arm.compute_tool_pose(motion.end).rotation[2, 2] == pytest.approx(-1)
         q = motion.end
     assert all(path.shape[1] == 6 for path in checked)
-
-
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"velocity_deg": LIMITS.velocity_deg[:5]}, "has 5 values in velocity_deg and 6 in position_deg"),
-        ({"jerk": ()}, "has 0 values in jerk and 6 in position_deg"),
-        ({"min_position_deg": (-150.0,)}, "has 1 values in min_position_deg and 6 in position_deg"),
-        ({"position_deg": (170, 110, 21, 170, 120, 175)}, "allows joint 3 the positions 20 to 21 degrees"),
-    ],
-)
-def test_limits_that_do_not_fit_together_are_refused(changes, text: str) -> None:
-    with pytest.raises(ValueError, match=text):
-        LimitsConfig(**{**LIMITS.model_dump(), **changes})

@@ -42,20 +42,15 @@ def question(name: str, planner: Planner, config: CellConfig, home: Array) -> Tr
     picked = planner.plan(home, pick(0.5, -0.1)).end
     motion = config.motion.model_copy(update={"straight": 0.05})
     beside, onto = planner.plan(home, Goal((0.42, 0.0, 0.01))).end, Goal((0.5, 0.0, 0.035), None, 0.02, 0.035)
-    far = planner.plan(home, pick(0.62, 0.2)).end
     straight = build_planner(config.model_copy(update={"motion": motion}))
     return {
         "pick": lambda: planner.plan(home, pick(0.5, -0.1)),
         "pick of many": lambda: planner.plan(aside, pick(0.5, -0.1), Task(obstacles=near)),
-        "turn": lambda: planner.plan(home, Goal((0.6, 0.2, 0.1), 0.5)),
         "carry": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 7.9), near)),
         "carry weakly": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 2.4))),
-        "weak far": lambda: planner.plan(far, BIN, Task(Load(CUBE, 2.4))),
         "sweep past": lambda: planner.plan(beside, onto, Task(target=Obstacle(0.5, 0.0, 0.0354, 0.05, "it"))),
         "carry hardly": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 1.0))),
         "over a wall": lambda: planner.plan(picked, beyond, Task(Load(CUBE), wall)),
-        "empty over a wall": lambda: planner.plan(picked, beyond, Task(obstacles=wall)),
-        "home": lambda: planner.plan(planner.plan(picked, BIN).end, home),
         "straight": lambda: straight.plan(picked, BIN, Task(Load(CUBE, 3.0))),
     }[name]()
 
@@ -63,15 +58,11 @@ def question(name: str, planner: Planner, config: CellConfig, home: Array) -> Tr
 ANSWERS = {
     "pick": (1.017523, 0.611915, [0.30651, 0.77648, -0.32558, -1.71549, 0.42773, 0.75296, 0.00811]),
     "pick of many": (0.880489, 0.474181, [-0.45612, 0.75291, 0.17469, -1.72332, -0.23836, 0.69373, -0.00516]),
-    "turn": (0.514799, math.inf, [0.49188, 0.75019, 0.0, -1.45755, 0.0, 0.93386, -0.08944]),
     "carry": (0.714020, math.inf, [-0.17485, 0.85074, -0.6473, -1.76272, 0.75483, 0.75121, 0.0]),
     "carry weakly": (0.881290, math.inf, [-0.13677, 0.84962, -0.61767, -1.81649, 0.72037, 0.73338, 0.00215]),
-    "weak far": (1.254183, math.inf, [-0.00803, 0.90695, -0.44667, -1.592, 0.47814, 0.85811, -8e-05]),
     "sweep past": (1.067642, 0.467143, [0.30813, 0.86882, -0.40493, -1.86897, 0.62174, 0.54181, 0.01258]),
     "carry hardly": (3.545365, math.inf, [-0.05676, 0.88929, -0.82623, -1.80773, 0.81148, 0.90025, 0.02551]),
     "over a wall": (0.720998, math.inf, [0.3358, 0.781, -0.41088, -1.67597, 0.42511, 0.52079, 4e-05]),
-    "empty over a wall": (0.608731, math.inf, [0.30546, 0.80886, -0.38222, -1.71294, 0.51594, 0.52562, 0.0]),
-    "home": (0.954888, math.inf, [0.15931, 0.83832, -0.51236, -1.67924, 0.58407, 1.00385, 0.0]),
     "straight": (1.139490, math.inf, [-0.06943, 0.87187, -0.79608, -1.81132, 0.77825, 0.84499, 0.07135]),
 }  # fmt: skip
 """Duration [s], beginning of the guarded part [s] and mean joint positions [rad] of each fixed question."""

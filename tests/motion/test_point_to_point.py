@@ -10,7 +10,7 @@ from joint_states import LIMITS, passed, peaks, states
 
 from executive.errors import Fault
 from executive.motion.joints import JointState
-from executive.motion.point_to_point import Connector, JointLimitError
+from executive.motion.trajectory import Connector, JointLimitError
 
 CONNECTOR = Connector(LIMITS)
 STILL = JointState.at_rest(np.zeros(7))

@@ -13,8 +13,13 @@ from joint_states import LIMITS, positions, states
 from executive.cell.clock import STEP
 from executive.errors import Fault, Unreachable
 from executive.motion.joints import JointState
-from executive.motion.point_to_point import Connector, JointLimitError
-from executive.motion.trajectory import Trajectory, compute_peak_fractions, downsample_path
+from executive.motion.trajectory import (
+    Connector,
+    JointLimitError,
+    Trajectory,
+    compute_peak_fractions,
+    downsample_path,
+)
 
 CONNECTOR = Connector(LIMITS)
 A, B, C = np.radians([[0, 20, 0, -90, 0, 70, 0], [40, 40, 20, -60, 10, 60, 90], [40, 45, 20, -60, 0, 60, 90]])
@@ -47,8 +52,8 @@ def test_slowed_it_takes_the_same_path_in_more_time(between: JointState, rate: f
     assert slow.duration == pytest.approx(trajectory.duration / rate)
     assert np.array_equal(slow.start, trajectory.start)
     assert np.allclose(slow.end, trajectory.end, atol=1e-9)
-    guarded = Trajectory(trajectory._pieces, 0.2)
-    assert guarded.make_slower_copy(rate).guarded_start_time == pytest.approx(0.2 / rate)
+    trajectory.guarded_start_time = 0.2
+    assert trajectory.make_slower_copy(rate).guarded_start_time == pytest.approx(0.2 / rate)
     assert slow.guarded_start_time == math.inf
     for s in np.linspace(0, trajectory.duration, 13):
         fast = trajectory.state_at(s)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -78,16 +79,16 @@ def test_an_uncertain_detection_in_a_bin_is_no_failure(
 
 def test_an_arm_in_the_way_may_be_looked_past(fake: FakeCell) -> None:
     fake.world.put("cube", 0.5, 0.0)
-    fake.camera.is_table_visible = lambda: False
+    fake.camera.sees_table = lambda: False
     result = run_skill(Detect(), fake)
     assert (result.reason, result.ticks) == ("hidden", 0)
     result = run_skill(Detect(hidden="pass"), fake)
     assert [found.label for found in result.outputs["detections"].confident] == ["cube"]
 
 
-def test_a_moved_camera_is_noticed_in_every_look(fake: FakeCell) -> None:
+def test_a_moved_camera_is_noticed_in_every_look(fake: FakeCell, monkeypatch: pytest.MonkeyPatch) -> None:
     for displacement, reason in (("", ""), ("camera overhead was moved", "camera_moved"), ("", "")):
-        fake.camera.displacement_message = displacement
+        monkeypatch.setattr(fake.camera, "describe_displacement", Mock(return_value=displacement))
         result = run_skill(Detect(), fake)
         assert (result.reason, result.message) == (reason, displacement)
 

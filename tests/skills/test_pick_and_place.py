@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from executive.cell.objects import Target
-from executive.cells.fake.arm import FakeTool
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake.cell import FakeCell, FakeTool
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 from skills.grasp import Grasp
@@ -151,7 +150,7 @@ def test_the_reason_of_an_item_that_the_tool_drops_again_and_again_is_its_weight
 def test_move_to_scan_goes_to_the_cameras_first_pose_only_if_the_table_is_out_of_view(fake: FakeCell) -> None:
     assert (run_skill(MoveToScan(), fake).ticks, fake.arm.commands) == (0, [])
     run_skill(MoveToScan(pose="aside"), fake)
-    fake.camera.is_table_visible = lambda: False
+    fake.camera.sees_table = lambda: False
     assert run_skill(MoveToScan(), fake).status == "SUCCESS"
     assert np.allclose(fake.arm.q, fake.arm.poses["home"])
 

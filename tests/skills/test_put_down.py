@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import pytest
 
-from executive.cells.fake.arm import FakeMotion
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Blocked, Unreachable
+from executive.motion.straight_paths import StraightMotion
 from executive.skill import SkillFailed
 from executive.testing.run_skill import run_skill
 from skills.put_down import PutDown
@@ -54,8 +54,8 @@ def test_what_falls_while_the_way_is_planned_is_dropped_though_there_is_none(
     assert fake.ledger.find_held_item() is None
 
 
-def make_failed(error: Exception) -> Future[FakeMotion]:
-    future = Future[FakeMotion]()
+def make_failed(error: Exception) -> Future[StraightMotion]:
+    future = Future[StraightMotion]()
     future.set_exception(error)
     return future
 

@@ -1,65 +1,427 @@
-"""Work cell without physics: a fake arm, tool, camera and detectors, with the real ledger and localizer."""
+"""Work cell without physics: world, arm, tool, camera and detectors, with the real ledger and localizer."""
 
 from __future__ import annotations
 
 import functools
+import itertools
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from executive.cell.arm import Goal, Motion
+from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.detection import Detection
 from executive.cell.frame import Box, Frame
-from executive.cell.layout import TOOL_RADIUS, list_bin_boxes
+from executive.cell.objects import ObjectClass
 from executive.cell.protocols import Clock, Routes
-from executive.cell.visuals import Shape
 from executive.cell.workcell import CellOptions, KeyPath
-from executive.cells.fake.arm import FakeArm, FakeTool
-from executive.cells.fake.world import FakeObject, FakeWorld, list_grid_points, put_random_objects
-from executive.cells.ground_truth import FinalObject, count_outcomes
+from executive.cells.ground_truth import FinalObject
 from executive.cells.log_file import LogFile
 from executive.cells.table_views import find_view_errors
-from executive.cells.without_hardware import CellWithoutHardware
+from executive.cells.without_hardware import CellWithoutHardware, SilentOperator
 from executive.errors import InputError, Unavailable
 from executive.events import Emit, discard_event
-from executive.geometry import Pose
+from executive.geometry import GRAVITY, Array, Pose
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.file_search import get_shipped_folder
-from executive.motion.arms import find_arm_errors, find_places_out_of_reach
+from executive.motion.arms import build_planner, find_arm_errors, find_places_out_of_reach
+from executive.motion.configurations import find_configuration_pairs
+from executive.motion.planner import PlanningArm
+from executive.motion.straight_paths import StraightMotion, StraightPlanner
 from executive.perception.camera_model import MountedCamera, compute_hull_mask
 from executive.perception.detectors.requests import PendingSearch
-from executive.perception.detectors.screening import screen_detectors
 from executive.perception.localization import CellLocalizer
+
+DEFAULT_CONFIDENCE = 0.9
+"""Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""
+
+MAX_SEAL_OFFSET = 0.012
+"""Maximum horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
+
+TOUCH_DISTANCE = 0.002
+"""Maximum vertical distance between the cup and the top of an object for contact [m]."""
+
+DEFAULT_BREAKAWAY_FORCE = 7.9
+"""Breakaway force of the seals of the fake tool, unless a test changes it [N]."""
+
+LOAD_NOISE = 1e-9
+"""Amplitude of the noise of the load of the fake tool [N], so that the load cell does not seem broken."""
+
+
+@dataclass(eq=False)
+class FakeObject:
+    """One object of a fake world.
+
+    Attributes:
+        label: Class of the object.
+        position: Centre of the object `(3,)` [m].
+        rest_positions: Positions `(3,)` [m] at the start, and after each fall and each placement.
+        is_dropped: True if the object fell from the tool and has not been picked up since.
+    """
+
+    label: str
+    position: Array
+    rest_positions: list[Array]
+    is_dropped: bool = False
+
+    def list_values(self) -> list[object]:
+        """Return the arguments of `restore`."""
+        return [self.label, self.is_dropped, self.position, *self.rest_positions]
+
+    @staticmethod
+    def restore(label: object, is_dropped: object, *positions: object) -> FakeObject:
+        """Return an object from a log: `positions` are the current position and the rest positions."""
+        position, *rest_positions = np.array(positions, dtype=float).reshape(-1, 3)
+        return FakeObject(str(label), position, rest_positions, bool(is_dropped))
+
+
+@dataclass(eq=False)
+class FakeWorld:
+    """Objects and bins of a fake cell.
+
+    Attributes:
+        classes: Classes of the objects, by label.
+        bins: The bins of the cell.
+        objects: The objects, in the order in which they were added.
+        removed_objects: The objects that were removed from the world.
+        held_object: The object that the tool holds, or None.
+        is_commanded: True if arm or tool has received a command since the last control step.
+    """
+
+    classes: Mapping[str, ObjectClass]
+    bins: Collection[Bin] = ()
+    objects: list[FakeObject] = field(default_factory=list)
+    removed_objects: list[FakeObject] = field(default_factory=list)
+    held_object: FakeObject | None = None
+    is_commanded: bool = False
+
+    def put(self, label: str, x: float, y: float) -> FakeObject:
+        """Put a new object on the table, and return it.
+
+        Args:
+            label: Class of the object.
+            x: Position of the centre along x [m].
+            y: Position of the centre along y [m].
+        """
+        position = np.array([x, y, self.classes[label].height / 2])
+        fake_object = FakeObject(label, position, [position.copy()])
+        self.objects.append(fake_object)
+        return fake_object
+
+    def remove(self, fake_object: FakeObject) -> None:
+        """Remove an object that is not held."""
+        self.objects.remove(fake_object)
+        self.removed_objects.append(fake_object)
+
+    def release(self, *, is_dropped: bool = False) -> None:
+        """Let the held object fall straight down; if it is dropped, it rolls to a free position."""
+        if (fake_object := self.held_object) is None:
+            return
+        self.held_object = None
+        fake_object.position[2] = self.classes[fake_object.label].height / 2
+        fake_object.is_dropped = is_dropped
+        if is_dropped:
+            self._roll_to_free_position(fake_object)
+        fake_object.rest_positions.append(fake_object.position.copy())
+
+    def _roll_to_free_position(self, fake_object: FakeObject) -> None:
+        """Move an object off each overlapping object in turn, or from the wall of a bin into the bin."""
+        radius = self.classes[fake_object.label].radius
+        for obstacle in self.objects if self.find_bin(fake_object) is None else ():
+            min_distance = radius + self.classes[obstacle.label].radius
+            direction = fake_object.position[:2] - obstacle.position[:2]
+            distance = float(np.linalg.norm(direction))
+            if obstacle is not fake_object and distance < min_distance:
+                direction = direction / distance if distance else np.array((1.0, 0.0))
+                fake_object.position[:2] = obstacle.position[:2] + min_distance * direction
+        if (bin := self.find_bin(fake_object)) is not None:
+            max_offset = np.maximum(bin.size[:2] / 2 - radius, 0.0)
+            offset = fake_object.position[:2] - bin.position[:2]
+            fake_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
+
+    def find_bin(self, fake_object: FakeObject) -> Bin | None:
+        """Return the bin that contains an object; if there is none, the bin on whose wall the object lies."""
+        wall_margin = BIN_THICKNESS + self.classes[fake_object.label].radius / 2
+        margins_and_bins = itertools.product((0.0, wall_margin), self.bins)
+        places = (bin for margin, bin in margins_and_bins if bin.contains(fake_object.position, margin))
+        return next(places, None)
+
+    def find_touched_object(self, tip_position: Array) -> FakeObject | None:
+        """Return the object that a cup at `tip_position` `(3,)` [m] touches from above, or None."""
+        for fake_object in self.objects:
+            object_class = self.classes[fake_object.label]
+            distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))
+            seal_offset = abs(distance - object_class.contact_radius)
+            gap = abs(float(fake_object.position[2]) + object_class.height / 2 - tip_position[2])
+            is_touched = seal_offset <= MAX_SEAL_OFFSET and gap <= TOUCH_DISTANCE
+            if is_touched and fake_object is not self.held_object:
+                return fake_object
+        return None
+
+
+class FakeTool:
+    """A suction cup that seals on every touched object, unless `can_seal` returns False.
+
+    Args:
+        world: The world with the objects.
+        get_tip_position: Returns the position of the tool tip `(3,)` [m].
+        load_std: Declared standard deviation of a reading of `load` [N].
+
+    Attributes:
+        can_seal: Function that returns True if the cup can seal on the touched object; set by tests.
+        breakaway_force: Force that every seal withstands [N].
+        load_error: Error of `load` [N]; set by tests.
+    """
+
+    def __init__(self, world: FakeWorld, get_tip_position: Callable[[], Array], load_std: float) -> None:
+        self._world = world
+        self._get_tip_position = get_tip_position
+        self.load_std = load_std
+        self.load_error = 0.0
+        self._noise = LOAD_NOISE
+        self.can_seal: Callable[[], bool] = lambda: True
+        self.breakaway_force = DEFAULT_BREAKAWAY_FORCE
+
+    @property
+    def touching(self) -> bool:
+        """True while the cup touches an object or the table."""
+        tip_position = self._get_tip_position()
+        return self._world.find_touched_object(tip_position) is not None or float(tip_position[2]) <= 0.0
+
+    @property
+    def holding(self) -> bool:
+        """True while the tool holds an object."""
+        return self._world.held_object is not None
+
+    @property
+    def holding_force(self) -> float:
+        """Breakaway force of the seal [N]; 0 while the tool holds nothing."""
+        return self.breakaway_force if self.holding else 0.0
+
+    @property
+    def load(self) -> float:
+        """Weight of the held object by the mass of its class, plus `load_error` and alternating noise [N]."""
+        self._noise = -self._noise
+        held = self._world.held_object
+        force = self._world.classes[held.label].mass * GRAVITY if held else 0.0
+        return force + self.load_error + self._noise
+
+    def close(self) -> None:
+        """Seal the cup on the touched object."""
+        self._world.is_commanded = True
+        touched = self._world.find_touched_object(self._get_tip_position())
+        if touched is not None and self.can_seal():
+            touched.is_dropped = False
+            self._world.held_object = touched
+
+    def open(self) -> None:
+        """Release the held object; it falls straight down."""
+        self._world.is_commanded = True
+        self._world.release()
+
+    def break_seal(self) -> None:
+        """Break the seal: the held object falls straight down, and rolls off other objects and bin walls."""
+        self._world.release(is_dropped=True)
+
+
+class FakeCamera(MountedCamera):
+    """The camera of a cell file, with blank images.
+
+    Attributes:
+        occluded_regions: Regions of the image that frames mark as occluded [pixel]; set by tests.
+    """
+
+    def __init__(
+        self, config: CellConfig, arm: FakeArm, clock: Clock, get_change_count: Callable[[], int]
+    ) -> None:
+        name, camera = next(iter(config.cameras.items()))
+        X_TF = Pose.of((0.0, 0.0, -config.tool.length))  # pose of the flange F in the frame T of the tool
+        super().__init__(name, camera, lambda: arm.tool_pose @ X_TF, clock, get_change_count)
+        self.occluded_regions: list[Box] = []
+        self._corners = np.array([(x, y, 0.0) for x in config.table.x for y in config.table.y])
+
+    def sees_table(self) -> bool:
+        """Return True if the whole workspace is in the image, without regard to occlusion."""
+        return compute_hull_mask(self._corners, self.matrix, self._compute_pose(), self._size) is not None
+
+    def _capture_images(self) -> tuple[NDArray[np.uint8], None]:
+        return np.zeros((self.config.height, self.config.width, 3), dtype=np.uint8), None
+
+    def _compute_visibility_mask(self, X_WC: Pose) -> NDArray[np.bool_]:
+        del X_WC
+        mask = np.ones((self.config.height, self.config.width), dtype=bool)
+        for left, top, right, bottom in self.occluded_regions:
+            mask[int(top) : int(bottom), int(left) : int(right)] = False
+        return mask
+
+
+@dataclass(eq=False)
+class FakeDetector:
+    """A detector that finds every object in a view, unless a test replaces `make_answer`.
+
+    Attributes:
+        name: Name of the detector in the cell file.
+        config: Section of the detector in the cell file.
+        world: The world with the true objects.
+        clock: Clock of the run.
+        get_view_region: Returns the image region [pixel] of a view, which is `table` or `full`.
+        make_answer: Returns the detections, or a message if the detector is unavailable. Its arguments are
+            the number of the request (from 1) and the true detections.
+        request_count: Number of requests so far.
+    """
+
+    name: str
+    config: DetectorConfig
+    world: FakeWorld
+    clock: Clock
+    get_view_region: Callable[[str], Box]
+    make_answer: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = field(
+        default=lambda _request_number, true_detections: true_detections
+    )
+    request_count: int = 0
+
+    def request(self, frame: Frame, view: str) -> PendingSearch:
+        """Return a request for the objects in a view of a frame, with the latency of the cell file."""
+        self.request_count += 1
+        left, top, right, bottom = self.get_view_region(view)
+        true_detections = []
+        for fake_object in self.world.objects:
+            x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
+            column, row = x / depth, y / depth
+            is_inside = depth > 0 and left <= column < right and top <= row < bottom
+            if is_inside and fake_object is not self.world.held_object:
+                half_side = frame.matrix[0, 0] / depth * self.world.classes[fake_object.label].radius
+                box = (column - half_side, row - half_side, column + half_side, row + half_side)
+                confidence = max(DEFAULT_CONFIDENCE, self.config.threshold)
+                true_detections.append(Detection(fake_object.label, confidence, box))
+        answer = self.make_answer(self.request_count, true_detections)
+        future: Future[list[Detection]] = Future()
+        if isinstance(answer, str):
+            future.set_exception(Unavailable(answer))
+        else:
+            future.set_result(list(answer))
+        due_time = self.clock.now + self.config.latency
+        return PendingSearch(future, due_time, self.clock, self.name, self.config.error_rates)
+
+    def close(self) -> None:
+        """Do nothing: the detector holds no resources."""
+
+
+def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
+    """Put objects of random classes on random grid points; the cell file limits the number of objects."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(*config.table.objects, endpoint=True))
+    points = list_grid_points(config)
+    for index in rng.permutation(len(points))[:count]:
+        world.put(str(rng.choice(list(config.objects))), *points[index])
+
+
+def list_grid_points(config: CellConfig) -> list[tuple[float, float]]:
+    """Return the points on the table at which objects can lie beside each other [m]."""
+    distance = 2 * max(object_class.radius for object_class in config.objects.values()) + config.table.gap
+    ranges = config.table.x, config.table.y
+    xs, ys = (np.linspace(low, high, 1 + int((high - low) / distance)) for low, high in ranges)
+    return [(float(x), float(y)) for x in xs for y in ys]
+
+
+class FakeArm(PlanningArm[StraightMotion]):
+    """An arm that moves on straight joint paths, stops without braking, and never hits an obstacle by itself.
+
+    `StraightPlanner` plans its motions.
+
+    Args:
+        world: The world that contains the held object.
+        config: The cell file.
+        clock: Clock of the run.
+        emit: Receives the events of the arm.
+
+    Attributes:
+        q: Joint positions `(n,)` [rad].
+        poses: Joint positions `(n,)` [rad] of each named pose; a run begins at `home`.
+        tool_velocity: Velocity zero `(3,)` [m/s]: a released object falls straight down.
+        collision: Description of the obstacle that stopped the last motion, or None.
+        contact_point: Position of the tool `(x, y, z)` [m] at the last `next_obstacle`, or None.
+        next_obstacle: Name of an obstacle in the middle of the next motion, or None; set by tests.
+        commands: Names of the executed commands, `start` or `stop`, in order, for tests.
+    """
+
+    q = np.zeros(0)
+
+    def __init__(self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit) -> None:
+        planner = build_planner(config)
+        straight_planner = StraightPlanner(config, planner.kinematics)
+        super().__init__(config, planner, straight_planner.plan, clock, emit)
+        self.q = self.poses["home"]
+        self.tool_velocity = np.zeros(3)
+        self.next_obstacle: str | None = None
+        self.commands: list[str] = []
+        self._world = world
+        self._path: list[Array] = []
+        self._half_length = 0
+
+    @property
+    def at_rest(self) -> bool:
+        """True while no motion runs."""
+        return not self._path
+
+    @property
+    def _end_q(self) -> Array:
+        return self._path[-1] if self._path else self.q
+
+    def start(self, motion: Motion) -> None:
+        """Begin to follow a motion.
+
+        Raises:
+            Fault: The arm is moving, or did not plan the motion.
+        """
+        self._path = list(self._require_own_motion(motion, StraightMotion).qs)
+        self._half_length = len(self._path) // 2
+        self.commands.append("start")
+        self._world.is_commanded = True
+        self.collision = None
+        self.contact_point = None
+
+    def set_tool_position(self, position: Array) -> None:
+        """Move the tool, which then points down, to a position `(3,)` [m] at once."""
+        x, y, z = map(float, position)
+        kinematics = self.planner.kinematics
+        self.q = find_configuration_pairs(kinematics, Goal((x, y, z)), 0.0, self.q).lower_qs[0]
+        self._path = []
+
+    def stop(self) -> None:
+        """End the running motion without braking."""
+        if self._path:
+            self.commands.append("stop")
+        self._path = []
+
+    def stop_after_collision(self, message: str) -> None:
+        """Stop the running motion and set `collision` to a message; do nothing if the arm is at rest."""
+        if self._path:
+            self.collision = message
+            self.stop()
+
+    def advance(self) -> None:
+        """Move arm and held object by one control step."""
+        if not self._path:
+            return
+        self.q = self._path.pop(0)
+        if (held := self._world.held_object) is not None:
+            height = self._world.classes[held.label].height
+            held.position = self.tool_pose.position - np.array([0.0, 0.0, height / 2])
+        if self.next_obstacle is not None and len(self._path) <= self._half_length:
+            self.contact_point = self.tool_pose.position.tolist()
+            self.stop_after_collision(self.next_obstacle)
+            self.next_obstacle = None
+
 
 SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
 """Permitted bins of each class of the shipped cells."""
-DEFAULT_CONFIDENCE = 0.9
-"""Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""
-TOOL_COLOUR = (0.25, 0.28, 0.32)
-"""Colour of the displayed tool: red, green and blue, each 0 to 1."""
-TABLE_COLOUR = (0.86, 0.78, 0.66)
-"""Colour of the displayed table: red, green and blue, each 0 to 1."""
-TABLE_THICKNESS = 0.02
-"""Thickness of the displayed table [m]."""
-TABLE_MARGIN = 0.12
-"""Distance from the workspace to the edge of the displayed table on each side [m]."""
-
-
-class SilentOperator:
-    """Operator without a terminal, who requests the classes of a list in order."""
-
-    def __init__(self, requests: Sequence[str] = ()) -> None:
-        self._requests = list(requests)
-
-    def ask(self, choices: Sequence[str]) -> str | None:
-        """Return the next class of the list, or None at the end of the list."""
-        del choices
-        return self._requests.pop(0) if self._requests else None
 
 
 class FakeCell(CellWithoutHardware):
@@ -118,16 +480,9 @@ class FakeCell(CellWithoutHardware):
         self._log_length = 0
         if options.resume is not None:
             self._restore_state(options.resume.log_path)
-            self.camera.set_counts(options.resume.frame_count, options.resume.pose_count)
             self.log_to(options.resume.log_path)
-        self.cell = replace(
-            self.cell,
-            arm=self.arm,
-            tool=self.tool,
-            camera=self.camera,
-            detectors=screen_detectors(self.detectors, classes),
-            localizer=CellLocalizer("plane", classes, bins),
-        )
+        localizer = CellLocalizer("plane", classes, bins)
+        self._connect(options, self.arm, self.tool, self.camera, self.detectors, localizer)
 
     @staticmethod
     def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
@@ -139,8 +494,7 @@ class FakeCell(CellWithoutHardware):
         yield from find_places_out_of_reach(config)
         max_count, place_count = config.table.objects[1], len(list_grid_points(config))
         if max_count > place_count:
-            message = f"{max_count} objects find no room on the workspace, which has {place_count} places; "
-            yield ("table", "objects"), message + "ask for fewer or widen table.x and table.y"
+            yield ("table", "objects"), f"the table has room for {place_count} objects, not for {max_count}"
         yield from find_view_errors(config)
 
     @staticmethod
@@ -160,7 +514,8 @@ class FakeCell(CellWithoutHardware):
             return
         held = self.world.held_object
         index = None if held is None else self.world.objects.index(held)
-        objects = [*map(vars, self.world.objects)], [*map(vars, self.world.removed_objects)]
+        groups = self.world.objects, self.world.removed_objects
+        objects = [[each.list_values() for each in group] for group in groups]
         state = [self.steps, self.last_command_step, self.arm.q, index, *objects]
         text = json.dumps(state, default=np.ndarray.tolist).encode()
         # Blanks pad the text to the length of the longest state so far, to overwrite all old text.
@@ -169,16 +524,15 @@ class FakeCell(CellWithoutHardware):
 
     def _restore_state(self, path: Path) -> None:
         try:
-            steps, last_command_step, q, held, *objects = json.loads(path.read_bytes())
+            steps, last_command_step, q, held, objects, removed_objects = json.loads(path.read_bytes())
             self.steps = int(steps)
             self.last_command_step = int(last_command_step)
             self.arm.q = np.array(q, dtype=float).reshape(self.arm.q.shape)
-            read_objects = [[_read_object(**fields) for fields in group] for group in objects]
-            self.world.objects[:], self.world.removed_objects[:] = read_objects
+            self.world.objects = [FakeObject.restore(*fields) for fields in objects]
+            self.world.removed_objects = [FakeObject.restore(*fields) for fields in removed_objects]
             self.world.held_object = None if held is None else self.world.objects[held]
         except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
-            problem = f'the world cannot be rebuilt from "{path}": {error}'
-            raise InputError(f"{problem}; run the mission again from its start") from error
+            raise InputError(f'the world in "{path}" is damaged: {error}; run the mission again') from error
 
     def advance(self) -> None:
         """Advance arm and ledger by one control step, and log the state."""
@@ -189,167 +543,19 @@ class FakeCell(CellWithoutHardware):
         super().advance()
         self.log_state()
 
-    def visuals(self) -> FakeVisuals:
-        """Return the shapes in the cell for display."""
-        return FakeVisuals(self)
-
-    def audit(self) -> dict[str, int]:
-        """Return the number of objects by outcome, such as `right`, `wrong_bin`, `left` and `elsewhere`."""
-        removed = self.world.removed_objects
-        objects = []
-        for each in (*self.world.objects, *removed):
+    def _list_final_objects(self) -> Iterator[FinalObject]:
+        for each in (*self.world.objects, *self.world.removed_objects):
             bin = self.world.find_bin(each)
-            name = bin.name if bin else ""
             is_held = each is self.world.held_object
-            final = FinalObject(
-                each.label, name, each.rest_positions, each.is_dropped, is_held, each in removed
-            )
-            objects.append(final)
-        gate, ignored = self.config.ledger.gate, self.ledger.ignored_positions
-        return count_outcomes(objects, self.ledger.records, self.cell.bins, self.routes, gate, ignored)
+            is_removed = each in self.world.removed_objects
+            name = bin.name if bin else ""
+            yield FinalObject(each.label, name, each.rest_positions, each.is_dropped, is_held, is_removed)
 
     def close(self) -> None:
-        """Close the log."""
+        """Close the arm and the log."""
+        self.arm.close()
         if self._log is not None:
             self._log.close()
-
-
-class FakeCamera(MountedCamera):
-    """The camera of a cell file, with blank images.
-
-    Attributes:
-        is_table_visible: Function that returns True if the whole workspace is in the image, by default
-            without regard to occlusion; set by tests.
-        occluded_regions: Regions of the image that frames mark as occluded [pixel]; set by tests.
-        displacement_message: Message about a displacement of the camera, "" for none; set by tests.
-    """
-
-    def __init__(
-        self, config: CellConfig, arm: FakeArm, clock: Clock, get_change_count: Callable[[], int]
-    ) -> None:
-        name, camera = next(iter(config.cameras.items()))
-        X_TF = Pose.of((0.0, 0.0, -config.tool.length))  # pose of the flange F in the frame T of the tool
-        super().__init__(name, camera, lambda: arm.tool_pose @ X_TF, clock, get_change_count)
-        self.is_table_visible: Callable[[], bool] = self._is_table_in_image
-        self.occluded_regions: list[Box] = []
-        self.displacement_message = ""
-        self._corners = np.array([(x, y, 0.0) for x in config.table.x for y in config.table.y])
-
-    def sees_table(self) -> bool:
-        """Return the result of `is_table_visible`."""
-        return self.is_table_visible()
-
-    def describe_displacement(self, frame: Frame) -> str:
-        """Return the value of `displacement_message`."""
-        del frame
-        return self.displacement_message
-
-    def _capture_images(self) -> tuple[NDArray[np.uint8], None]:
-        return np.zeros((self.config.height, self.config.width, 3), dtype=np.uint8), None
-
-    def _compute_visibility_mask(self, X_WC: Pose) -> NDArray[np.bool_]:
-        del X_WC
-        mask = np.ones((self.config.height, self.config.width), dtype=bool)
-        for left, top, right, bottom in self.occluded_regions:
-            mask[int(top) : int(bottom), int(left) : int(right)] = False
-        return mask
-
-    def _is_table_in_image(self) -> bool:
-        return compute_hull_mask(self._corners, self.matrix, self._compute_pose(), self._size) is not None
-
-
-@dataclass(eq=False)
-class FakeDetector:
-    """A detector that finds every object in a view, unless a test replaces `make_answer`.
-
-    Attributes:
-        name: Name of the detector in the cell file.
-        config: Section of the detector in the cell file.
-        world: The world with the true objects.
-        clock: Clock of the run.
-        get_view_region: Returns the image region [pixel] of a view, which is `table` or `full`.
-        make_answer: Returns the detections, or a message if the detector is unavailable. Its arguments are
-            the number of the request (from 1) and the true detections.
-        request_count: Number of requests so far.
-    """
-
-    name: str
-    config: DetectorConfig
-    world: FakeWorld
-    clock: Clock
-    get_view_region: Callable[[str], Box]
-    make_answer: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = field(
-        default=lambda _request_number, true_detections: true_detections
-    )
-    request_count: int = 0
-
-    def request(self, frame: Frame, view: str) -> PendingSearch:
-        """Return a request for the objects in a view of a frame, with the latency of the cell file."""
-        self.request_count += 1
-        left, top, right, bottom = self.get_view_region(view)
-        true_detections = []
-        for fake_object in self.world.objects:
-            x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
-            column, row = x / depth, y / depth
-            is_inside = depth > 0 and left <= column < right and top <= row < bottom
-            if is_inside and fake_object is not self.world.held_object:
-                half_side = frame.matrix[0, 0] / depth * self.world.classes[fake_object.label].radius
-                box = (column - half_side, row - half_side, column + half_side, row + half_side)
-                confidence = max(DEFAULT_CONFIDENCE, self.config.threshold)
-                true_detections.append(Detection(fake_object.label, confidence, box))
-        answer = self.make_answer(self.request_count, true_detections)
-        future: Future[list[Detection]] = Future()
-        if isinstance(answer, str):
-            future.set_exception(Unavailable(answer))
-        else:
-            future.set_result(list(answer))
-        due_time = self.clock.now + self.config.latency
-        return PendingSearch(future, due_time, self.clock, self.name, self.config.error_rates)
-
-    def close(self) -> None:
-        """Do nothing: the detector holds no resources."""
-
-
-class FakeVisuals:
-    """Table, bins, tool, and objects as cylinders; implements `executive.cell.visuals.Visuals`.
-
-    Attributes:
-        shapes: All shapes of the cell.
-    """
-
-    def __init__(self, fake: FakeCell) -> None:
-        self._fake = fake
-        self._names = {body: f"object {number}" for number, body in enumerate(fake.world.objects)}
-        config, (left, right), (near, far) = fake.config, fake.config.table.x, fake.config.table.y
-        size = (right - left + 2 * TABLE_MARGIN, far - near + 2 * TABLE_MARGIN, TABLE_THICKNESS)
-        centre = ((left + right) / 2, (near + far) / 2, -TABLE_THICKNESS / 2)
-        self.shapes = [Shape("", "box", size, Pose.of(centre), TABLE_COLOUR)]
-        for bin in config.bins.values():
-            for half_size, offset in list_bin_boxes(bin.size):
-                x, y, z = (2 * half for half in half_size)
-                pose = Pose.of(np.add(bin.position, offset))
-                self.shapes.append(Shape("", "box", (x, y, z), pose, bin.colour))
-        # The origin of the tool frame is the tip of the tool, and z points out of the tool.
-        tool_pose = Pose.of((0.0, 0.0, -config.tool.length / 2))
-        cylinders = [("tool", TOOL_RADIUS, config.tool.length, tool_pose, TOOL_COLOUR)]
-        for body, name in self._names.items():
-            section = config.objects[body.label]
-            cylinders.append((name, section.radius, section.height, Pose.identity(), section.colours[0]))
-        for name, radius, height, pose, colour in cylinders:
-            self.shapes.append(Shape(name, "cylinder", (2 * radius, 2 * radius, height), pose, colour))
-
-    def poses(self) -> Mapping[str, Pose]:
-        """Return the poses of the tool and of the objects, by name."""
-        poses = {self._names[body]: Pose.of(body.position) for body in self._fake.world.objects}
-        return {"tool": self._fake.arm.tool_pose, **poses}
-
-
-def _read_object(
-    label: str, position: object, rest_positions: Sequence[object], is_dropped: bool
-) -> FakeObject:
-    """Return an object from its attributes in the log."""
-    current, *others = np.array([position, *rest_positions], dtype=float).reshape(-1, 3)
-    return FakeObject(str(label), current, others, bool(is_dropped))
 
 
 @functools.cache

@@ -1,28 +1,86 @@
-"""Driver of the simulated arm, which follows planned trajectories and brakes along their paths."""
+"""Driver of the simulated arm: follows planned motions, detects collisions, and brakes along its path."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from executive.cell.arm import Goal, Motion, Task, reject_generator
+from executive.cell.arm import Goal, Motion, Task
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Clock
 from executive.cells.sim import command_log
-from executive.cells.sim.contacts import ContactMonitor
 from executive.cells.sim.rebuild import WorldRebuilder
-from executive.cells.sim.world import World
+from executive.cells.sim.tool import LIP_LENGTH
+from executive.cells.sim.world import BODY_B, LINK_A, NORMAL_FORCE, POSITION_A, World, name_load
 from executive.errors import Fault
 from executive.events import Emit, discard_event
-from executive.geometry import Array, Pose
+from executive.geometry import Array
 from executive.motion.braking import plan_braking, plan_retreat
-from executive.motion.planner import Planner
-from executive.motion.plans import Plan, PlanFactory
+from executive.motion.planner import Planner, PlanningArm
 from executive.motion.trajectory import Trajectory
+
+MIN_CONTACT_FORCE = 2.0
+"""Minimum force of a detected contact [N], an assumption for joint torque sensors."""
+SEPARATION_STEP_COUNT = 12
+"""Number of steps without contact after which two bodies count as separated; a lifted load may bounce."""
+
+
+class ContactMonitor:
+    """Monitor of the contacts of arm, tool and load that begin during the running motion.
+
+    Args:
+        world: The world of the arm.
+        get_held_body: Returns the body that the tool holds, or None.
+    """
+
+    def __init__(self, world: World, get_held_body: Callable[[], int | None]) -> None:
+        self._world = world
+        self._get_held_body = get_held_body
+        self._last_contact_steps: dict[tuple[str, int], int] = {}
+        """Physics step of the last contact of each ignored pair of a robot part and a body."""
+
+    def reset(self) -> None:
+        """Ignore each pair of bodies that is in contact now until the two bodies separate."""
+        step = self._world.step_count
+        self._last_contact_steps = {(part, body): step for part, body, _, _ in self._iterate_contacts()}
+
+    def find_new_contact(self, lip_may_touch: bool) -> tuple[str, Sequence[float] | None]:
+        """Return description and point [m] of a new forbidden contact; without one, "" and None.
+
+        The lip is exempt if `lip_may_touch`.
+        """
+        now, last_steps = self._world.step_count, self._last_contact_steps
+        oldest_step = now - SEPARATION_STEP_COUNT
+        self._last_contact_steps = {pair: step for pair, step in last_steps.items() if step >= oldest_step}
+        for part, body, position, force in self._iterate_contacts():
+            if (part, body) in self._last_contact_steps:
+                self._last_contact_steps[part, body] = now
+            elif force > MIN_CONTACT_FORCE and not (lip_may_touch and self._is_lip(part, position)):
+                x, y, z = self._world.get_tool_pose().position
+                name = self._world.name_body(body)
+                return f"{part} ran into {name}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m", position
+        return "", None
+
+    def _is_lip(self, part: str, position: Sequence[float]) -> bool:
+        """Return True if a point in the world [m] on a part of the robot is on the lip of the cup."""
+        X_TW = self._world.get_tool_pose().inverse()
+        is_tool = part == self._world.name_link(self._world.tool_index)
+        return is_tool and bool(X_TW.apply(position)[2] > -LIP_LENGTH)
+
+    def _iterate_contacts(self) -> Iterator[tuple[str, int, Sequence[float], float]]:
+        """Yield part of the robot, touched body, contact point [m] and normal force [N] of each contact."""
+        world, held_body = self._world, self._get_held_body()
+        robot = (world.arm,) if held_body is None else (world.arm, held_body)
+        for body in robot:
+            for point in world.client.getContactPoints(bodyA=body) or ():
+                if point[BODY_B] not in robot:
+                    is_arm = body == world.arm
+                    part = world.name_link(point[LINK_A]) if is_arm else name_load(world.labels[body])
+                    yield part, point[BODY_B], point[POSITION_A], point[NORMAL_FORCE]
+
 
 DIFFERENTIATION_STEP = 1e-4
 """Time step of the numerical derivative of the tool position [s]."""
@@ -33,7 +91,7 @@ TRACKING_TOLERANCE = math.radians(0.5)
 the sign of a collision: something holds or pushes the arm."""
 
 
-class SimArm:
+class SimArm(PlanningArm[Trajectory]):
     """The arm of a PyBullet world; implements `executive.cell.arm.Arm`.
 
     Call `advance` before each physics step; it commands the joint positions for the end of that step. After a
@@ -48,11 +106,6 @@ class SimArm:
         get_held_body: Returns the held body, or None; contacts of this body count as contacts of the arm.
         emit: Receives the events of the arm.
         rebuilder: Rebuilder of the world of an interrupted run; the arm brakes on its motion. None: new run.
-
-    Attributes:
-        planner: Motion planner of the arm.
-        collision: Description of the collision that ended the last motion; None: no collision.
-        contact_point: Point of the collision in the world `(x, y, z)` [m]; None: unknown, or no collision.
     """
 
     def __init__(
@@ -65,13 +118,8 @@ class SimArm:
         emit: Emit = discard_event,
         rebuilder: WorldRebuilder | None = None,
     ) -> None:
-        self.planner = planner
-        self.collision: str | None = None
-        self.contact_point: Sequence[float] | None = None
+        super().__init__(config, planner, planner.plan, clock, emit)
         self._world = world
-        self._poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
-        self._worker = ThreadPoolExecutor(1, "planner")
-        self._factory = PlanFactory(self._plan_motion, clock, config.motion.planning_time, emit)
         self._contact_monitor = ContactMonitor(world, get_held_body)
         self._motion: Trajectory | None = None
         self._motion_time = 0.0
@@ -91,11 +139,6 @@ class SimArm:
         return self._world.get_joint_positions()
 
     @property
-    def tool_pose(self) -> Pose:
-        """Pose of the tool centre point in the world, from the measured joint positions."""
-        return self.planner.kinematics.compute_tool_pose(self.q)
-
-    @property
     def tool_velocity(self) -> Array:
         """Velocity of the tool centre point in the world `(3,)` [m/s], from the measured joint velocities."""
         states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
@@ -104,28 +147,9 @@ class SimArm:
         return (compute_pose(q + q_change).position - compute_pose(q).position) / DIFFERENTIATION_STEP
 
     @property
-    def destination(self) -> Array:
-        """Position of the tool `(3,)` [m] at the end of the running motion, or now if the arm is at rest."""
-        return self.planner.kinematics.compute_tool_pose(self._end_q).position
-
-    @property
     def at_rest(self) -> bool:
         """True while the arm neither follows a motion nor brakes."""
         return self._motion is None
-
-    def describe_unreachable(self, goal: Goal) -> str:
-        """Return a sentence if no joint configuration within the limits reaches a goal, else ""."""
-        return self.planner.describe_unreachable(goal)
-
-    def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[Trajectory]:
-        """Begin to plan a motion from the current position to a goal, or to a named pose of the cell file.
-
-        Raises:
-            Fault: The arm is moving, or the cell file has no such pose.
-        """
-        self._require_rest("plan a motion")
-        self._require_pose(goal)
-        return self._factory.plan(self._commanded_q, goal, task)
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
         """Plan the next motion, from the end of the running motion, before `plan` requests it.
@@ -133,9 +157,8 @@ class SimArm:
         Raises:
             Fault: The cell file has no such pose.
         """
-        self._require_pose(goal)
         if self._braking_times is None:  # a braking arm does not reach the end of the motion
-            self._factory.plan_ahead(self._end_q, goal, task)
+            super().plan_ahead(goal, task)
 
     def start(self, motion: Motion) -> None:
         """Begin to follow a motion. The arm must be at rest at the start of the motion.
@@ -145,11 +168,8 @@ class SimArm:
         Raises:
             Fault: The arm is moving, was not sent to the start, or did not plan the motion.
         """
-        self._require_rest("start a motion")
-        reject_generator(motion)
-        if not isinstance(motion, Trajectory):
-            raise Fault(f"the simulated arm follows its own planned motions, not a {type(motion).__name__}")
-        if error := _describe_difference(self._commanded_q, motion.start, START_TOLERANCE):
+        trajectory = self._require_own_motion(motion, Trajectory)
+        if error := _describe_difference(self._commanded_q, trajectory.start, START_TOLERANCE):
             raise Fault(f"the start of the motion is not at the end of the last motion: {error}")
         self.collision = self._describe_disturbance(START_TOLERANCE) or None
         self.contact_point = None
@@ -157,9 +177,10 @@ class SimArm:
             self._commanded_q = self.q
             self.send_command()
             return
-        self._motion, self._motion_time = motion, 0.0
+        self._motion = trajectory
+        self._motion_time = 0.0
         self._contact_monitor.reset()
-        self._world.log.append_motion(motion)
+        self._world.log.append_motion(trajectory)
 
     def stop(self) -> None:
         """Begin to brake along the path of the running motion, if any."""
@@ -174,10 +195,6 @@ class SimArm:
             braking_times = plan_braking(self._motion, self._motion_time, self.planner.limits)
             retreat_times = plan_retreat(self._motion_time, float(braking_times[-1]))
             self._braking_times = [*braking_times.tolist(), *retreat_times.tolist()]
-
-    def close(self) -> None:
-        """Cancel the plans that have not started, wait for the running plan, and end the planning thread."""
-        self._worker.shutdown(cancel_futures=True)
 
     def send_command(self) -> None:
         """Send the current command to the motors."""
@@ -209,24 +226,10 @@ class SimArm:
         """Joint positions `(n,)` [rad] at the end of the running motion, or now if the arm is at rest."""
         return self._commanded_q if self._motion is None else self._motion.end
 
-    def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> Future[Trajectory]:
-        """Plan a motion in the worker thread, which alone uses the collision check of the planner."""
-        end = goal if isinstance(goal, Goal) else self._poses[goal]
-        return self._worker.submit(self.planner.plan, start, end, task)
-
-    def _require_pose(self, goal: Goal | str) -> None:
-        if isinstance(goal, str) and goal not in self._poses:
-            raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
-
     def _describe_disturbance(self, tolerance: float) -> str:
         """Return a sentence if a joint is over `tolerance` [rad] away from its command, else ""."""
         error = _describe_difference(self.q, self._commanded_q, tolerance)
         return f"something holds or pushes the arm off its path: {error}" if error else ""
-
-    def _require_rest(self, action: str) -> None:
-        if self._motion is not None:
-            remaining = self._motion.duration - self._motion_time
-            raise Fault(f"the arm cannot {action} while moving ({remaining:.2f} s to go); wait for `at_rest`")
 
 
 def _describe_difference(q: Array, expected_q: Array, tolerance: float) -> str:

@@ -10,10 +10,9 @@ from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
-from executive.cells.ground_truth import FinalObject, count_outcomes
+from executive.cells.ground_truth import FinalObject
 from executive.cells.sim.arm import SimArm
-from executive.cells.sim.arm_occlusion import ArmOcclusion
-from executive.cells.sim.camera import SimCamera
+from executive.cells.sim.camera import ArmOcclusion, SimCamera
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.command_log import CommandLog, read_commands
 from executive.cells.sim.kind import SimCellChecks, find_missing_depth_sensors
@@ -30,7 +29,6 @@ from executive.events import Emit
 from executive.mission.text.file_search import get_shipped_folder
 from executive.motion.arms import build_planner
 from executive.perception.detectors.requests import ClosableDetector
-from executive.perception.detectors.screening import screen_detectors
 from executive.perception.envelope import build_rated_detectors
 from executive.perception.localization import CellLocalizer
 
@@ -89,8 +87,6 @@ class SimCell(SimCellChecks, CellWithoutHardware):
             light=scene.light,
             bins=tuple(bins),
         )
-        if options.resume is not None:
-            self._camera.set_counts(options.resume.frame_count, options.resume.pose_count)
         classes = {label: build_simulated_class(label, section) for label, section in config.objects.items()}
         localizer = CellLocalizer(config.localization, classes, bins, self._world.cast_ray)
         # Detectors are built last, because their processes would outlive an exception in a later statement.
@@ -98,15 +94,8 @@ class SimCell(SimCellChecks, CellWithoutHardware):
         self._detectors = build_detectors(
             config, clock=clock, base=options.cell_folder, seed=detector_seed, folders=folders
         )
-        self.cell = replace(
-            self.cell,
-            arm=self._arm,
-            tool=self._tool,
-            camera=self._camera,
-            detectors=screen_detectors(self._detectors, classes),
-            classes=classes,
-            localizer=localizer,
-        )
+        self.cell = replace(self.cell, classes=classes)
+        self._connect(options, self._arm, self._tool, self._camera, self._detectors, localizer)
 
     def log_to(self, path: Path) -> None:
         """Record all later commands for the simulated world in a log file."""
@@ -124,12 +113,8 @@ class SimCell(SimCellChecks, CellWithoutHardware):
         """Return the shapes of the world for display."""
         return SimVisuals(self._world)
 
-    def audit(self) -> dict[str, int]:
-        """Return the number of objects by `AUDIT_KEYS`; `left` counts the objects on the table."""
-        gate = self.config.ledger.gate
-        ignored = self.accounts.ignored_positions
-        objects = list_final_objects(self._world, self._tool, self.cell.bins)
-        return count_outcomes(objects, self.accounts.records, self.cell.bins, self.routes, gate, ignored)
+    def _list_final_objects(self) -> Iterator[FinalObject]:
+        return list_final_objects(self._world, self._tool, self.cell.bins)
 
     def close(self) -> None:
         """Close the detectors, the planner and the physics servers."""

@@ -1,4 +1,4 @@
-"""Models of objects: visual mesh, PyBullet body, pose and mass, and check of the declared size."""
+"""Models of objects: mesh, silhouette, PyBullet body, pose and mass, and check of the declared size."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pybullet
 import pybullet_data
@@ -20,6 +21,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig, ObjectConfig
+from executive.cell.frame import Box
 from executive.cell.layout import build_object_class
 from executive.cell.objects import ObjectClass
 from executive.cell.workcell import KeyPath
@@ -305,6 +307,31 @@ def _place_mesh(config: ObjectConfig, X_OL: Pose, tag: str = "visual") -> Mesh:
     path = find_model(config.mesh or config.urdf)
     points, faces = model_files.read_mesh(path) if config.mesh else model_files.read_shapes(path, tag)
     return Mesh(X_OL.apply(points * config.scale), faces)
+
+
+SUBPIXEL_COUNT = 4
+"""Number of subpixels of a pixel along each axis in the rasterization of a silhouette."""
+
+
+def compute_bounding_box(pixels: Array) -> Box:
+    """Return the box around projected vertices `(N, 2)` [pixel]."""
+    (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
+    return float(left), float(top), float(right), float(bottom)
+
+
+def compute_silhouette_area(mesh: Mesh, pixels: Array) -> float:
+    """Return the area [pixel²] of the silhouette of a mesh whose projected vertices are `pixels` `(N, 2)`."""
+    if mesh.is_convex:
+        return float(cv2.contourArea(cv2.convexHull(pixels.astype(np.float32))))
+    corner = np.floor(pixels.min(axis=0))
+    size = np.ceil((pixels.max(axis=0) - corner + 1) * SUBPIXEL_COUNT).astype(int)
+    mask = np.zeros((size[1], size[0]), np.uint8)
+    triangles = ((pixels - corner) * SUBPIXEL_COUNT)[mesh.triangles]
+    (ax, ay), (bx, by) = (triangles[:, 1] - triangles[:, 0]).T, (triangles[:, 2] - triangles[:, 0]).T
+    # The triangles on the side of the camera, whose corners are clockwise, cover the whole silhouette.
+    for triangle in triangles[ax * by - ay * bx > 0].round().astype(np.int32):
+        cv2.fillConvexPoly(mask, triangle, 1)
+    return float(mask.sum()) / SUBPIXEL_COUNT**2
 
 
 if __name__ == "__main__":

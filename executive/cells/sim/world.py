@@ -7,24 +7,128 @@ equal objects in equal order are bitwise identical.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 
+import cv2
 import numpy as np
 import pybullet
+from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.clock import STEP
-from executive.cell.config import BinConfig, CellConfig, ObjectConfig
+from executive.cell.config import BinConfig, CellConfig, Colour, ObjectConfig
 from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, list_bin_boxes
 from executive.cells.sim import command_log
 from executive.cells.sim.command_log import CommandLog
 from executive.cells.sim.model_files import find_model
 from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, locate_object
-from executive.cells.sim.robot_models import ROBOT_MODELS, RobotModel
-from executive.cells.sim.table_top import TableTop
 from executive.geometry import Array, Pose
+from executive.motion.iiwa14_kinematics import FLANGE_OFFSET
+
+WOOD_TEXTURE, PLAIN_TEXTURE = "wood", "plain"
+"""Names of the texture in the URDF of the table, and of a white surface."""
+PATTERN_COUNT = 24
+"""Number of generated textures, whose names are `pattern 0` to `pattern 23`."""
+TEXTURES = (WOOD_TEXTURE, PLAIN_TEXTURE, *(f"pattern {number}" for number in range(PATTERN_COUNT)))
+"""Names of all textures."""
+TEXTURE_SIZE = 256
+"""Side of a generated texture [pixel]."""
+
+
+class TableTop:
+    """The surface of the simulated table; `paint` changes only its appearance in camera images.
+
+    Args:
+        client: The connection to the physics server.
+        table: Body of the table.
+    """
+
+    def __init__(self, client: BulletClient, table: int) -> None:
+        self._client = client
+        self._table = table
+        shapes = client.getVisualShapeData(table, pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS)
+        # A world without visual shapes needs no textures.
+        self._textures = {PLAIN_TEXTURE: -1, WOOD_TEXTURE: shapes[0][8] if shapes else -1}
+
+    def paint(self, colour: Colour, texture: str = WOOD_TEXTURE) -> None:
+        """Give the table a texture of `TEXTURES`, with RGB values multiplied by `colour`."""
+        if texture not in self._textures:
+            seed = TEXTURES.index(texture)
+            # PyBullet caches textures by path, so that each texture needs its own path.
+            with tempfile.TemporaryDirectory() as folder:
+                path = str(Path(folder) / f"{seed}.png")
+                cv2.imwrite(path, generate_pattern(seed))
+                self._textures[texture] = int(self._client.loadTexture(path))
+        texture_id = self._textures[texture]
+        self._client.changeVisualShape(self._table, -1, textureUniqueId=texture_id, rgbaColor=[*colour, 1])
+
+
+def generate_pattern(seed: int) -> NDArray[np.uint8]:
+    """Return a bright random texture of `TEXTURE_SIZE`, RGB: clouds, stripes, tiles or speckles."""
+    rng = np.random.default_rng(seed)
+    contrast = rng.uniform(15, 90)
+    count = int(rng.choice([4, 8, 16, 32]))
+    pattern_kind = seed % 4  # clouds, stripes, tiles or speckles
+    size = (TEXTURE_SIZE, TEXTURE_SIZE)
+    shape = ((count, count, 3), (1, count * 2, 3), (count, count, 1), (*size, 1))[pattern_kind]
+    interpolation = cv2.INTER_CUBIC if pattern_kind in (0, 3) else cv2.INTER_NEAREST
+    values = (255 - rng.uniform(0, contrast, shape) * np.ones(3)).astype(np.float32)
+    return np.asarray(cv2.resize(values, size, interpolation=interpolation).clip(0, 255), np.uint8)
+
+
+@dataclass(frozen=True)
+class RobotModel:
+    """PyBullet model of an arm in which each link up to the flange has its own joint.
+
+    Link indices are those of PyBullet. The tool is the link after the link of the flange.
+
+    Attributes:
+        flange_link: Name of the link with the flange.
+        flange_offset: Distance from the origin of the flange link to the flange along the link's z axis [m].
+        max_torques: Maximum torque of each joint [Nm].
+        first_collision_link: Index of the first link that can collide with other bodies.
+        wrist_link: Index of the first link of the wrist, whose links a held object is permitted to touch.
+        self_collision_pairs: Pairs of indices of links that can collide with each other.
+        link_radius: Radius of a cylinder around the housing of each link [m].
+        ik_seed_deg: Start of the numerical inverse kinematics: positions of joints 2 and higher [degree].
+    """
+
+    flange_link: str
+    flange_offset: float
+    max_torques: tuple[float, ...]
+    first_collision_link: int
+    wrist_link: int
+    self_collision_pairs: tuple[tuple[int, int], ...]
+    link_radius: float
+    ik_seed_deg: tuple[float, ...]
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints."""
+        return len(self.max_torques)
+
+
+ROBOT_MODELS: Mapping[str, RobotModel] = {
+    "kuka_iiwa/model.urdf": RobotModel(
+        flange_link="lbr_iiwa_link_7",
+        flange_offset=FLANGE_OFFSET,
+        # From the data sheet, as in iiwa_description of RobotLocomotion/models.
+        max_torques=(320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0),
+        # Link 1 (index 0) only turns about the axis of the base.
+        first_collision_link=1,
+        wrist_link=5,
+        # In 1500 random poses, 121 of 131 self-collisions were between links 5 and 7 (indices 4 and 6).
+        # A long tool (index 7) also collides with the lowest links (indices 0 to 2), mostly with the first.
+        self_collision_pairs=((4, 6), (7, 0), (7, 1), (7, 2)),
+        link_radius=0.09,
+        ik_seed_deg=(30, 0, -85, 0, 65, 0),
+    )
+}
+"""Model of each supported arm, by the value of `arm.urdf` in a cell file."""
+
 
 TABLE_HEIGHT = 0.625
 """Height of the table in pybullet_data [m]."""

@@ -11,10 +11,11 @@ from executive.cell.arm import Goal, Motion, Task
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.clock import STEP
 from executive.cell.objects import Load, Obstacle
-from executive.cells.fake.arm import JOINT_SPEED
 from executive.cells.fake.cell import FakeCell, load_empty_cell
 from executive.errors import Blocked, Fault, Unreachable
+from executive.events import Event, MotionPlanned
 from executive.geometry import Array
+from executive.motion.straight_paths import JOINT_SPEED
 
 LATENCY = load_empty_cell().motion.planning_time
 BESIDE = Goal((0.5, 0.2, 0.03), guarded_length=0.02, guarded_speed=0.05)
@@ -72,18 +73,28 @@ def test_the_tool_turns_as_the_goal_says(fake: FakeCell) -> None:
     assert fake.arm.tool_pose.rotation[:, 0] == pytest.approx([0, -1, 0], abs=1e-9)
 
 
-def test_a_plan_takes_its_time_unless_it_was_asked_for_before(fake: FakeCell) -> None:
-    fake.arm.start(plan_motion(fake, "aside"))
+def test_a_plan_takes_its_time_unless_it_was_asked_for_before() -> None:
+    events = list[Event]()
+    fake = FakeCell(emit=events.append)
+    motion = plan_motion(fake, "aside")
+    fake.arm.start(motion)
+    fake.arm.plan_ahead("home")  # replaced by the next plan
     fake.arm.plan_ahead(BESIDE)
     destination = fake.arm.destination
     while not fake.arm.at_rest:
         fake.advance()
     assert destination == pytest.approx(fake.arm.tool_pose.position)
-    assert fake.arm.plan(BESIDE).ready
-    planning, before = fake.arm.plan(BESIDE), fake.cell.clock.now
-    while not planning.ready:
-        fake.advance()
-    assert fake.cell.clock.now - before == pytest.approx(LATENCY, abs=STEP), "a plan is used once"
+    planning = fake.arm.plan(BESIDE)
+    assert planning.ready and planning.ready
+    duration = round(planning.result().duration, 4)
+    assert events == [
+        MotionPlanned(False, LATENCY, round(motion.duration, 4)),
+        MotionPlanned(True, 0.0, duration),
+    ]
+    planning = fake.arm.plan(BESIDE)
+    assert not planning.ready, "a plan is used once"
+    with pytest.raises(Fault, match='no arm pose "scan"; it has aside, home'):
+        fake.arm.plan("scan")
 
 
 @pytest.mark.parametrize(
@@ -154,8 +165,10 @@ def test_it_follows_one_motion_at_a_time_and_none_of_another_arm(fake: FakeCell)
         fake.arm.start(Hop())
     motion = plan_motion(fake, "aside")
     fake.arm.start(motion)
-    with pytest.raises(Fault, match="started while it moves"):
+    with pytest.raises(Fault, match="start a motion while moving"):
         fake.arm.start(motion)
+    with pytest.raises(Fault, match="plan a motion while moving"):
+        fake.arm.plan("home")
     fake.arm.stop()
     fake.arm.stop_after_collision("not while it rests")
     assert (fake.arm.commands, fake.arm.collision) == (["start", "stop"], None)

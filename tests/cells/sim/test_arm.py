@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rig import Rig
 
-from executive.cell.arm import Goal, Motion
+from executive.cell.arm import Goal
 from executive.errors import Fault
 from executive.motion.braking import RETREAT_TIME
 
@@ -28,23 +28,6 @@ def test_it_follows_a_motion_to_a_hundredth_of_a_degree(rig: Rig) -> None:
     assert np.allclose(rig.arm.tool_pose.position, OVER.position, atol=1e-4)
 
 
-def test_a_motion_planned_ahead_is_known_at_once_and_begins_where_the_running_one_ends(rig: Rig) -> None:
-    first = rig.planned(OVER)
-    rig.arm.start(first)
-    rig.step(30)
-    rig.arm.plan_ahead(BESIDE)
-    rig.run()
-    planning = rig.arm.plan(BESIDE)
-    assert planning.ready
-    assert rig.events[-1].planned_ahead is True
-    assert rig.events[-1].delay == 0.0
-    second = planning.result()
-    assert np.array_equal(second.start, first.end)
-    rig.arm.start(second)
-    rig.run()
-    assert np.allclose(rig.arm.tool_pose.position, BESIDE.position, atol=1e-4)
-
-
 def test_what_was_planned_ahead_is_of_no_use_once_the_arm_was_stopped_on_its_way(rig: Rig) -> None:
     rig.arm.start(rig.planned(OVER))
     rig.step(24)
@@ -58,36 +41,11 @@ def test_what_was_planned_ahead_is_of_no_use_once_the_arm_was_stopped_on_its_way
     assert np.allclose(planning.result().start, rig.arm.q, atol=1e-4)
 
 
-def test_an_unknown_pose_is_a_fault_that_lists_the_known_ones(rig: Rig) -> None:
-    for ask in (rig.arm.plan, rig.arm.plan_ahead):
-        with pytest.raises(Fault, match='the cell file has no arm pose "hime"; it has aside, home'):
-            ask("hime")
-
-
-def test_starting_or_planning_while_moving_is_a_fault(rig: Rig) -> None:
-    motion = rig.planned(OVER)
-    rig.arm.start(motion)
-    rig.step(10)
-    with pytest.raises(Fault, match=r"start a motion while moving \(\d\.\d\d s to go\); wait for `at_rest`"):
-        rig.arm.start(motion)
-    with pytest.raises(Fault, match="plan a motion while moving"):
-        rig.arm.plan(OVER)
-
-
 def test_a_motion_that_starts_elsewhere_is_a_fault_with_numbers(rig: Rig) -> None:
     motion = rig.go(OVER)
     with pytest.raises(Fault, match=r"the start of the motion .* joint \d is .*° away; 0\.2°"):
         rig.arm.start(motion)
     rig.go("home")
-
-
-def test_a_motion_of_another_arm_is_a_fault(rig: Rig) -> None:
-    class Hop:
-        duration = 1.0
-
-    hop: Motion = Hop()
-    with pytest.raises(Fault, match="follows its own planned motions, not a Hop"):
-        rig.arm.start(hop)
 
 
 def test_an_arm_pushed_off_its_path_reports_a_collision_and_moves_back(rig: Rig) -> None:

@@ -10,7 +10,7 @@ import pytest
 from rig import Rig
 
 from executive.cell.arm import Goal, Task
-from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, build_object_class
+from executive.cell.layout import build_object_class
 from executive.cell.objects import Load, Obstacle
 from executive.geometry import Array
 from executive.motion.braking import RETREAT_TIME
@@ -18,7 +18,6 @@ from executive.motion.trajectory import Trajectory
 from tests.benchmarks.halts import measure_distance
 
 LEFT, RIGHT = Goal((0.5, 0.25, 0.15)), Goal((0.5, -0.2, 0.15))
-LONG_DESCENT = Goal(RIGHT.position, guarded_length=0.1, guarded_speed=0.05)
 
 
 def float_at(rig: Rig, label: str, place: Array, mass: float = 0.1) -> int:
@@ -32,11 +31,6 @@ def float_at(rig: Rig, label: str, place: Array, mass: float = 0.1) -> int:
 def tool_at(rig: Rig, motion: Trajectory, share: float) -> Array:
     """Return where the tool is after a share of the time of a motion `(3,)` [m]."""
     return rig.planner.kinematics.compute_tool_pose(motion.state_at(share * motion.duration).q).position
-
-
-def on_the_way_down(rig: Rig, motion: Trajectory) -> Array:
-    """Return where the tool is in the middle of the guarded part of a motion `(3,)` [m]."""
-    return tool_at(rig, motion, (motion.guarded_start_time / motion.duration + 1) / 2)
 
 
 def bump(rig: Rig, motion: Trajectory, earliest: float = 0.0) -> str:
@@ -87,17 +81,6 @@ def test_what_the_held_object_runs_into_counts_but_neither_the_tool_nor_the_tabl
     float_at(rig, "sphere", tool_at(rig, motion, 0.5) - (0, 0, 0.06), mass=0.02)
     assert bump(rig, motion).startswith("the held cube ran into a sphere, with the tool at")
     assert rig.tool.holding
-
-
-def test_the_shaft_of_the_tool_feels_a_bump_on_a_guarded_motion_too(rig: Rig) -> None:
-    """Only the lip is meant to touch something."""
-    rig.go(LEFT)
-    motion = rig.planned(LONG_DESCENT)
-    # Its edge lies beside the thin end of the tool, under the wider shaft.
-    beside = 0.025 + (rig.config.tool.cup_radius + TOOL_RADIUS) / 2
-    float_at(rig, "cube", np.add(on_the_way_down(rig, motion), (0, -beside, NECK_LENGTH - 0.025)), mass=1.0)
-    said = bump(rig, motion, earliest=motion.guarded_start_time)
-    assert said.startswith("the tool ran into a cube, with the tool at")
 
 
 @pytest.mark.parametrize("mass", [0.0, 1000.0], ids=["fixed", "heavy"])

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from executive.cell.config import ArmConfig, CellConfig
+from executive.cell.config import CellConfig
 from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.cell import SimCell
-from executive.cells.sim.poses import find_pose_errors
-from executive.motion.arms import build_kinematics, find_places_out_of_reach
-from tests.cells.sim.conftest import shipped_cell
+from executive.cells.sim.kind import find_pose_errors
+from executive.motion.arms import build_kinematics
 from tests.motion.joint_states import reach
 
 
@@ -37,17 +36,6 @@ def reaching(config: CellConfig, *place: float) -> Sequence[float]:
     return tuple(np.degrees(reach(kinematics, place, home)))
 
 
-def test_the_mass_of_a_class_is_declared_or_in_its_urdf(overhead: CellConfig) -> None:
-    sphere = overhead.objects["sphere"]
-    assert SimCell.compute_mass(sphere) == 0.1
-    assert SimCell.compute_mass(sphere.model_copy(update={"mass": 0.3})) == 0.3
-
-
-@pytest.mark.parametrize("name", ["overhead", "wrist", "depth"])
-def test_nothing_is_wrong_with_a_shipped_cell(missions: Path, name: str) -> None:
-    assert list(SimCell.check(shipped_cell(name), missions / "cells")) == []
-
-
 def test_all_that_is_wrong_is_said_at_once(overhead: CellConfig, tmp_path: Path) -> None:
     yolo = overhead.detectors["embedded"].model_copy(update={"kind": "yolo"})
     config = posed(overhead, down=(0, 118, 0, 0, 0, 0, 0), turned=(0, 0, 0, 0, 0, 0, 180))
@@ -63,19 +51,6 @@ def test_all_that_is_wrong_is_said_at_once(overhead: CellConfig, tmp_path: Path)
     ]
     said = found["localization",]
     assert said.startswith('localization "depth" needs a camera with depth, and overhead has none; give')
-
-
-def test_the_labels_are_those_of_its_detectors(overhead: CellConfig, tmp_path: Path) -> None:
-    own = {"model_path": "own.onnx", "labels": ["red", "blue"], "class_map": {"red": "cube"}}
-    detectors = {
-        **overhead.detectors,
-        "own": overhead.detectors["embedded"].model_validate({"kind": "rfdetr", **own}),
-        "yolo": overhead.detectors["embedded"].model_copy(update={"kind": "yolo"}),
-    }
-    labels = SimCell.labels(overhead.model_copy(update={"detectors": detectors}), tmp_path)
-    assert set(labels["embedded"] or ()) == {"cube", "sphere", "duck"}
-    assert labels["own"] == ("cube", "blue")
-    assert labels["yolo"] is None
 
 
 def test_a_pose_too_near_to_something_is_named_with_the_distance(overhead: CellConfig) -> None:
@@ -109,38 +84,3 @@ def test_an_arm_without_kinematics_is_a_finding_with_the_supported_arms(overhead
     ((keys, message),) = kind.check(config, Path())
     assert keys == ("arm", "urdf")
     assert message.endswith("supported: kuka_iiwa/model.urdf")
-
-
-def test_limits_of_another_number_of_joints_are_a_finding(overhead: CellConfig) -> None:
-    limits = {name: value[:6] if isinstance(value, tuple) else value for name, value in overhead.arm.limits}
-    arm = ArmConfig(limits=limits, poses_deg={"home": overhead.arm.poses_deg["home"][:6]})
-    ((keys, message),) = SimCell.check(overhead.model_copy(update={"arm": arm}), Path())
-    assert keys == ("arm", "limits")
-    assert "has 7 joints, but the limits of 6 joints" in message
-
-
-@pytest.mark.parametrize(
-    ("position", "why"),
-    [
-        ((0.6, -0.6, 0.0), "beyond the reach of the arm (0.82 m)"),
-        ((0.24, -0.25, 0.0), "nearer than joint 4 permits (0.41 m)"),
-    ],
-)
-def test_a_bin_with_one_slot_out_of_reach_is_named_with_the_distance(
-    overhead: CellConfig, position: tuple[float, float, float], why: str
-) -> None:
-    ((keys, sentence),) = find_places_out_of_reach(moved(overhead, "red_bin", *position))
-    assert keys == ("bins", "red_bin", "position")
-    assert sentence.startswith('the bin "red_bin" is out of reach: the tool cannot reach (')
-    assert sentence.endswith(why)
-
-
-def test_the_safe_place_and_poses_must_be_within_reach(overhead: CellConfig) -> None:
-    config = posed(overhead, turned=(0, 33, 0, -88, 0, 59, 180)).model_copy(
-        update={"safe_place": (0.9, 0.0, 0.0)}
-    )
-    pose, (keys, sentence) = find_places_out_of_reach(config)
-    text = 'joint 7 of the pose "turned" is at 180 degrees; its limit is 175'
-    assert pose == (("arm", "poses_deg", "turned"), text)
-    assert keys == ("safe_place",)
-    assert sentence.startswith("the safe place is out of reach: the tool cannot reach (0.900, 0.000, ")

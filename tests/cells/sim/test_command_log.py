@@ -67,7 +67,7 @@ def test_a_damaged_log_says_so(path: Path) -> None:
 
 
 def test_a_file_that_is_no_log_says_so(path: Path) -> None:
-    with pytest.raises(InputError, match=r"cannot read the log of the world .*without it a simulated run"):
+    with pytest.raises(InputError, match="cannot read the log of the world"):
         list(read_commands(path))
     path.write_bytes(b"executive world 2 joints 7\nS")
     with pytest.raises(InputError, match="is no log of a world"):

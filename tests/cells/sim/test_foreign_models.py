@@ -24,22 +24,8 @@ BINARY_STL = bytes(80) + struct.pack("<I", 12) + b"".join(
 )  # fmt: skip
 VERTICES = "\n".join(f"vertex {x} {y} {z}" for x, y, z in TRIANGLES.reshape(-1, 3))
 TEXT_STL = f"solid s\n{VERTICES}\nendsolid s"
-COLLADA = f"""<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-<asset><unit meter="0.001"/></asset><library_geometries><geometry id="g"><mesh>
-<source id="p"><float_array id="a">{" ".join(map(str, 1000 * CORNERS.ravel()))}</float_array>
-<technique_common><accessor source="#a" count="8" stride="3">
-<param name="X"/><param name="Y"/><param name="Z"/></accessor>
-</technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<polylist><input semantic="VERTEX" source="#v" offset="0"/>
-<vcount>{"3 " * 12}</vcount><p>{" ".join(map(str, np.ravel(FACES)))}</p></polylist>
-</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id="s"><node>
-<translate>0 0 9</translate><rotate>0 0 1 90</rotate><scale>1 1 2</scale>
-<matrix>1 0 0 0 0 1 0 0 0 0 .5 0 0 0 0 1</matrix>
-<instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
-<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
 BOX, AWAY = '<box size="0.05 0.05 0.05"/>', '<origin xyz="0.5 0 0"/>'
-STL, DAE = '<mesh filename="package://parts/p.stl"/>', '<mesh filename="p.dae"/>'
+STL = '<mesh filename="package://parts/p.stl"/>'
 INERTIAL = '<mass value="0.1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
 
 
@@ -49,7 +35,6 @@ def write(
     """Write a URDF with its meshes, and return its class, which is 5 cm wide and high."""
     (folder / "p.stl").write_bytes(BINARY_STL)
     (folder / "text.stl").write_text(TEXT_STL)
-    (folder / "p.dae").write_text(COLLADA)
     shapes = f"<visual>{origin}<geometry>{visual}</geometry></visual>"
     shapes += f"<collision>{origin}<geometry>{collision or visual}</geometry></collision>"
     (folder / "m.urdf").write_text(
@@ -61,7 +46,7 @@ def write(
 LOCAL = '<mesh filename="file://{}/p.stl"/>'
 
 
-@pytest.mark.parametrize("visual", [BOX, STL, DAE, '<mesh filename="text.stl"/>', LOCAL])
+@pytest.mark.parametrize("visual", [BOX, STL, '<mesh filename="text.stl"/>', LOCAL])
 def test_a_box_in_each_format_lies_on_the_table_as_declared(visual: str, tmp_path: Path) -> None:
     config = write(tmp_path, visual.format(tmp_path))
     assert np.ptp(load_mesh(config).vertices, axis=0) == pytest.approx([0.05, 0.05, 0.05])
@@ -74,10 +59,7 @@ def test_a_box_in_each_format_lies_on_the_table_as_declared(visual: str, tmp_pat
     ("name", "content", "reason"),
     [
         ("p.stl", BINARY_STL[:400], "it has no faces"),
-        ("p.stl", TEXT_STL.replace("0.025", "0,025").encode(), "string or file could not be read"),
-        ("p.dae", COLLADA.replace("25.0", "nan", 1).encode(), "NaN"),
-        ("p.dae", COLLADA.partition("<scene>")[0].encode() + b"</COLLADA>", "it has no scene"),
-        ("p.dae", COLLADA[:-3].encode(), "unclosed token"),
+        ("p.dae", b"<COLLADA>nan</COLLADA>", "NaN"),
     ],
 )
 def test_a_broken_mesh_is_refused(name: str, content: bytes, reason: str, tmp_path: Path) -> None:
@@ -107,11 +89,10 @@ def test_geometry_far_from_the_origin_is_moved_to_the_object_frame(tmp_path: Pat
     try_model(config)
 
 
-@pytest.mark.parametrize("shape", [BOX, STL])
-def test_links_joined_by_fixed_joints_are_one_object(shape: str, tmp_path: Path) -> None:
+def test_links_joined_by_fixed_joints_are_one_object(tmp_path: Path) -> None:
     turn = '<origin xyz="0.3 0 0" rpy="0 1.5707963 0.2"/>'
     back = '<origin xyz="0 0 -0.3" rpy="0.2 0 0"/>'  # the sum of both is a turn about the y axis
-    config = write(tmp_path, shape, origin=back, inertial=back + INERTIAL)
+    config = write(tmp_path, STL, origin=back, inertial=back + INERTIAL)
     joint = f"<joint name='j' type='fixed'>{turn}<parent link='k'/><child link='l'/></joint><link name='k'/>"
     text = Path(config.urdf).read_text().replace("</robot>", f"{joint}</robot>")
     Path(config.urdf).write_text(text)
@@ -119,30 +100,22 @@ def test_links_joined_by_fixed_joints_are_one_object(shape: str, tmp_path: Path)
     try_model(config)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("parts", "key", "reason"),
+    ("parts", "reason"),
     [
-        ({"inertial": ""}, "urdf", "a mass of 0 kg"),
-        ({"inertial": AWAY + INERTIAL}, "urdf", "centre of mass at .* outside of its visual"),
-        ({"collision": '<box size="0.05 0.05 0.1"/>'}, "urdf", r"from 0\.025 to 0\.075 m, not 0 to 0\.05"),
-        ({"visual": '<box size="0.05 0.05 0"/>'}, "urdf", r'size="0\.05 0\.05 0" in a <box>'),
-        ({"visual": '<mesh filename="p.stl" scale="1000 1000 1000"/>'}, "height", "height of 50"),
-        (
-            {"inertial": f"{INERTIAL}</inertial></link><link name='k'><inertial>{INERTIAL}"},
-            "urdf",
-            "has 2 link",
-        ),
+        ({"inertial": ""}, "a mass of 0 kg"),
+        ({"inertial": AWAY + INERTIAL}, "centre of mass at .* outside of its visual"),
+        ({"collision": '<box size="0.05 0.05 0.1"/>'}, r"from 0\.025 to 0\.075 m, not 0 to 0\.05"),
+        ({"collision": '<box size="0.07 0.05 0.05"/>'}, "collision shape that differs by 0.010 m"),
+        ({"visual": '<box size="0.05 0.05 0"/>'}, r'size="0\.05 0\.05 0" in a <box>'),
+        ({"inertial": f"{INERTIAL}</inertial></link><link name='k'><inertial>{INERTIAL}"}, "has 2 link"),
     ],
 )
 def test_a_model_that_no_tool_could_sort_is_refused(
-    overhead: CellConfig, parts: dict[str, str], key: str, reason: str, tmp_path: Path
+    parts: dict[str, str], reason: str, tmp_path: Path
 ) -> None:
-    objects = {"part": write(tmp_path, **{"visual": BOX, **parts})}
-    (keys, message), *_ = find_model_errors(overhead.model_copy(update={"objects": objects}))
-    assert keys == ("objects", "part", key)
     with pytest.raises(InputError, match=reason):
-        raise InputError(message)
+        try_model(write(tmp_path, **{"visual": BOX, **parts}))
 
 
 @pytest.mark.parametrize(

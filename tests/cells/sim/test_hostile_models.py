@@ -22,11 +22,12 @@ BOMB = f"<!DOCTYPE r [<!ENTITY a0 'ha'>{LEVELS}]><robot name='&a9;'/>"
     [
         ("garbage", "is no URDF: syntax error"),
         (BOMB, "is no URDF: "),
+        ("<robot><mesh xmlns='q' filename='../m.obj'/></robot>", "has an XML namespace"),
         ("<svg/>", "its root is <svg>, not <robot>"),
         ("<robot><inertial><mass value='nan'/></inertial></robot>", 'has value="nan" in a <mass>'),
         ("<robot><inertial><mass value='1 2'/></inertial></robot>", 'has value="1 2" in a <mass>'),
     ],
-    ids=["garbage", "XML bomb", "other XML", "not finite", "two numbers"],
+    ids=["garbage", "XML bomb", "namespace", "other XML", "not finite", "two numbers"],
 )
 def test_a_file_that_is_no_urdf_is_an_error(content: str, error: str, tmp_path: Path) -> None:
     (tmp_path / "m.urdf").write_text(content)
@@ -53,38 +54,14 @@ def test_a_mesh_that_is_no_file_is_not_opened(part: str, tmp_path: Path) -> None
         compute_mass(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
 
 
-@pytest.mark.parametrize(
-    ("part", "error"),
-    [
-        ("<mesh xmlns='q' filename='../m.obj'/>", "has an XML namespace"),
-        ("<texture filename='../m.png'/>", 'names the file "../m.png", which is outside'),
-    ],
-)
-def test_no_element_of_a_urdf_names_a_file_outside_of_its_folder(
-    part: str, error: str, tmp_path: Path
-) -> None:
-    (tmp_path / "m.urdf").write_text(f"<robot><visual><geometry>{part}</geometry></visual></robot>")
-    with pytest.raises(InputError, match=re.escape(error)):
-        compute_mass(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
-
-
-@pytest.mark.parametrize("model", ["m.urdf", "m.obj"])
-def test_a_mesh_of_more_than_20000_triangles_is_refused(model: str, tmp_path: Path) -> None:
+def test_a_mesh_of_more_than_20000_triangles_is_refused(tmp_path: Path) -> None:
     (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 20_001)
     shape = "<collision><geometry><mesh filename='m.obj'/></geometry></collision>"
     (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
-    key = {"mesh" if model.endswith("obj") else "urdf": str(tmp_path / model)}
     with pytest.raises(
         InputError, match=r"^the model m\.obj has more than 20000 triangles; simplify the mesh$"
     ):
-        load_mesh(ObjectConfig(**key, height=0.05, radius=0.03))
-
-
-@pytest.mark.parametrize("faces", ["f 1 2 3\n" * 20_001 + "f\n" * 9, "\u2028".join(["f 1 2 3"] * 20_001)])
-def test_empty_faces_and_other_line_breaks_hide_no_triangle(faces: str, tmp_path: Path) -> None:
-    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + faces, encoding="utf-8")
-    with pytest.raises(InputError, match=r"^the model m\.obj has more than 20000 triangles"):
-        load_mesh(ObjectConfig(mesh=str(tmp_path / "m.obj"), height=0.05, radius=0.03))
+        load_mesh(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
 
 
 def test_a_model_of_more_than_20_megabytes_is_not_read(tmp_path: Path) -> None:

@@ -12,12 +12,11 @@ import pytest
 
 from executive.cell.clock import STEP
 from executive.cell.workcell import CellOptions, ResumePoint
-from executive.cells.fake.cell import SilentOperator
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.command_log import JOINT_TARGETS, CommandLog
+from executive.cells.without_hardware import SilentOperator
 from executive.errors import InputError
 from executive.events import discard_event
-from executive.geometry import Array
 from executive.mission.load import load_mission
 from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
@@ -165,7 +164,7 @@ def test_what_happened_meanwhile_is_there_and_took_none_of_the_runs_time(
 ) -> None:
     log = tmp_path / "log"
     log.write_bytes(left[1].log.read_bytes())
-    moved: list[tuple[int, Array]] = []
+    moved: list[tuple[int, np.ndarray]] = []
 
     def act(world) -> None:
         held = world.held_object.body if world.held_object else None

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from executive.cell.arm import Goal
-from executive.cell.detection import Detections
 from executive.cell.workcell import CellOptions
-from executive.cells.fake.cell import SHIPPED_ROUTES, SilentOperator
+from executive.cells.fake.cell import SHIPPED_ROUTES
 from executive.cells.sim.cell import SimCell
+from executive.cells.without_hardware import SilentOperator
 from executive.events import discard_event
 from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
@@ -39,40 +39,6 @@ def build_cell(missions: Path, request: pytest.FixtureRequest) -> Build:
     return build_cell
 
 
-def look(made: SimCell) -> None:
-    """Let the ledger see everything the camera sees."""
-    cell = made.cell
-    frame = cell.camera.capture()
-    request = cell.detectors["embedded"].request(frame, "full")
-    while not request.ready:
-        made.advance()
-    detections = Detections(
-        **vars(request.result()), frame=frame, view="full", area=cell.camera.get_view_box("full")
-    )
-    cell.ledger.observe(detections, cell.localizer.localize(detections))
-
-
-def put(made: SimCell, body: int, place: tuple[float, float, float]) -> None:
-    made._world.place_object(body, Pose.of(place))
-
-
-def test_the_audit_counts_every_body_once_by_where_it_really_is(build_cell: Build) -> None:
-    made = build_cell(seed=0)
-    look(made)
-    one, two, three, _ = made._world.labels
-    bins, permitted = made.cell.bins, [SHIPPED_ROUTES[made._world.labels[body]][0] for body in (one, two)]
-    home = bins[permitted[0]].position
-    strange = next(bin for name, bin in bins.items() if name != permitted[1]).position
-    for body, place, counts in (
-        (one, (home[0] + 0.05, home[1] - 0.05, 0.04), {"right": 1, "left": 3}),
-        (two, (strange[0], strange[1] + 0.03, 0.04), {"right": 1, "wrong_bin": 1, "left": 2}),
-        (three, (1.4, 0.0, -0.6), {"right": 1, "wrong_bin": 1, "left": 1, "elsewhere": 1}),
-        (one, (home[0], home[1], -0.6), {"wrong_bin": 1, "left": 1, "elsewhere": 2}),  # under a bin
-    ):
-        put(made, body, place)
-        assert {key: count for key, count in made.audit().items() if count} == counts
-
-
 def test_the_table_is_hidden_while_the_arm_is_over_it(build_cell: Build) -> None:
     made = build_cell()
     cell = made.cell
@@ -92,21 +58,13 @@ def test_the_table_is_hidden_while_the_arm_is_over_it(build_cell: Build) -> None
     assert not frame.visible[int(y / z), int(x / z)]
 
 
-@pytest.mark.parametrize("name", ["overhead", "fasteners"])
-def test_a_class_weighs_what_its_objects_do(build_cell: Build, name: str) -> None:
-    made = build_cell(name)
-    for body, label in made._world.labels.items():
-        mass = made._world.client.getDynamicsInfo(body, -1)[0]
-        assert made.cell.classes[label].mass == pytest.approx(mass), label
-
-
 @pytest.mark.parametrize(("way", "raised"), [("depth", 0.05), ("ray", 0.05), ("plane", 0.0)])
 def test_only_depth_and_ray_find_what_does_not_stand_on_the_table(
     build_cell: Build, way: str, raised: float
 ) -> None:
     made = build_cell("depth", localization=way)
     body = next(body for body, label in made._world.labels.items() if label == "cube")
-    put(made, body, (0.6, 0.15, 0.075))
+    made._world.place_object(body, Pose.of((0.6, 0.15, 0.075)))
     frame = made.cell.camera.capture()
     assert isinstance(frame, TrueFrame)
     found = [

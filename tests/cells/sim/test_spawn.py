@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import combinations
 
-import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.sim.models import load_mesh
 from executive.cells.sim.spawn import derive_seeds, spawn_objects
 from executive.cells.sim.world import World
 from executive.errors import InputError
@@ -17,26 +14,10 @@ from executive.errors import InputError
 Build = Callable[[CellConfig], World]
 
 
-def with_stacks(config: CellConfig, share: float, count: int | None = None) -> CellConfig:
-    """Return the cell with a share of stacked objects and, if a count is given, this number of objects."""
-    changes = {"stacked": share} if count is None else {"stacked": share, "objects": (count, count)}
+def with_stacks(config: CellConfig, share: float, count: int) -> CellConfig:
+    """Return the cell with a share of stacked objects, and this number of objects."""
+    changes = {"stacked": share, "objects": (count, count)}
     return config.model_copy(update={"table": config.table.model_copy(update=changes)})
-
-
-def lowest(world: World, body: int) -> float:
-    """Return the height of an object's underside [m]."""
-    vertices = load_mesh(world.config.objects[world.labels[body]]).vertices
-    return float(world.get_object_pose(body).apply(vertices)[:, 2].min())
-
-
-def carried(world: World) -> dict[int, int]:
-    """Return what each object that lies on another one lies on."""
-    places = {body: world.get_object_pose(body).position[:2] for body in world.labels}
-    return {
-        upper: min(places.keys() - {upper}, key=lambda b: float(np.linalg.norm(places[b] - places[upper])))
-        for upper in world.labels
-        if lowest(world, upper) > 0.02
-    }
 
 
 def placed(world: World) -> list[tuple[str, float, float, float]]:
@@ -62,31 +43,6 @@ def test_a_seed_decides_everything(build: Build, overhead: CellConfig) -> None:
         ("duck", 0.4613, -0.1923, 0.0477), ("cube", 0.4529, -0.028, 0.075), ("cube", 0.4613, -0.1957, 0.025),
         ("cube", 0.453, -0.0296, 0.025),
     ]  # fmt: skip
-
-
-@pytest.mark.parametrize("share", [0.0, 1.0])
-def test_objects_stand_still_apart_and_inside_the_workspace(
-    build: Build, overhead: CellConfig, share: float
-) -> None:
-    world, table = build(with_stacks(overhead, share, 6 if share else None)), overhead.table
-    bodies = spawn_objects(world, 0)
-    assert table.objects[0] <= len(bodies) <= table.objects[1]
-    poses, pairs = {body: world.get_object_pose(body) for body in bodies}, carried(world)
-    assert bool(pairs) is bool(share)
-    assert len({*pairs, *pairs.values()}) == 2 * len(pairs), "each carries one object and lies on the table"
-    for pose in poses.values():
-        assert table.x[0] - 0.005 <= pose.position[0] <= table.x[1] + 0.005
-        assert table.y[0] - 0.005 <= pose.position[1] <= table.y[1] + 0.005
-    for (a, X_WA), (b, X_WB) in combinations(poses.items(), 2):
-        radii = sum(overhead.objects[world.labels[body]].radius for body in (a, b))
-        distance = float(np.linalg.norm(X_WA.position[:2] - X_WB.position[:2]))
-        assert {a, b} & pairs.keys() or distance >= radii + table.gap - 0.005
-    for _ in range(240):
-        world.step()
-    assert carried(world) == pairs
-    for body, before in poses.items():
-        assert world.get_object_pose(body).position == pytest.approx(before.position, abs=1e-3)
-        assert lowest(world, body) == pytest.approx(0.05 if body in pairs else 0.0, abs=2e-3)
 
 
 def test_too_many_objects_are_refused_with_what_to_change(build: Build, overhead: CellConfig) -> None:

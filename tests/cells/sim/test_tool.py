@@ -81,12 +81,6 @@ def bench() -> Iterator[Bench]:
     bench.world.close()
 
 
-@pytest.mark.parametrize(("height", "touching"), [(0.05, False), (0.0014, False), (0.0006, True)])
-def test_the_lip_feels_a_surface_within_a_millimetre(bench: Bench, height: float, touching: bool) -> None:
-    bench.put(height)
-    assert bench.tool.touching is touching
-
-
 def test_a_vacuum_already_on_seals_on_what_comes_within_reach(bench: Bench) -> None:
     bench.put(0.01)
     bench.tool.close()
@@ -154,7 +148,9 @@ def test_opening_drops_the_object_and_lets_it_collide_with_the_tool_again(bench:
 
 def test_the_load_of_a_hanging_object_is_its_weight_and_noise_of_the_declared_size() -> None:
     bench = Bench("cube")
-    assert bench.tool.load == pytest.approx(0.0, abs=5 * bench.tool.load_std)
+    first = bench.tool.load
+    assert first == pytest.approx(0.0, abs=5 * bench.tool.load_std)
+    assert bench.tool.load == first != SuctionTool(bench.world, bench.config, noise_seed=1).load
     bench.hang()
     loads = []
     for _ in range(300):
@@ -164,14 +160,3 @@ def test_the_load_of_a_hanging_object_is_its_weight_and_noise_of_the_declared_si
     assert np.mean(loads) == pytest.approx(mass * GRAVITY, abs=4 * bench.tool.load_std / 300**0.5)
     assert np.std(loads) == pytest.approx(bench.tool.load_std, rel=0.15)
     bench.world.close()
-
-
-def test_the_noise_of_the_load_depends_on_the_seed_and_the_step_and_not_on_the_number_of_readings(
-    bench: Bench,
-) -> None:
-    other = SuctionTool(bench.world, bench.config, noise_seed=1)
-    first = bench.tool.load
-    assert bench.tool.load == first
-    assert other.load != first
-    bench.steps(1)
-    assert bench.tool.load != first

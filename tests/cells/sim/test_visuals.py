@@ -33,17 +33,10 @@ def test_the_arm_is_where_its_joints_put_it(world: World) -> None:
     after = visuals.poses()
     assert np.allclose(after["link 8"].position, world.get_flange_pose().position, atol=1e-6)
     assert not np.allclose(before["link 4"].position, after["link 4"].position, atol=0.01)
-
-
-def test_shapes_have_the_sizes_of_the_cell(world: World, overhead: CellConfig) -> None:
-    shapes = SimVisuals(world).shapes
-    walls = [shape for shape in shapes if shape.kind == "box"]
-    assert len(walls) == 5 * len(overhead.bins)
-    red = next(shape for shape in walls if np.allclose(shape.colour, overhead.bins["red_bin"].colour))
-    length, width, _ = overhead.bins["red_bin"].size
-    assert red.size == pytest.approx((length + 0.01, width + 0.01, 0.005))
-    assert red.X_BS.position == pytest.approx((0.24, -0.48, 0.0025))
-    body, neck = [shape for shape in shapes if shape.kind == "cylinder"]
-    assert neck.size[0] == pytest.approx(2 * overhead.tool.cup_radius)
-    assert body.size[2] + neck.size[2] == pytest.approx(overhead.tool.length)
-    assert all(Path(shape.file).is_file() for shape in shapes if shape.kind == "mesh")
+    walls = [shape for shape in visuals.shapes if shape.kind == "box"]
+    assert len(walls) == 5 * len(world.config.bins)
+    assert walls[0].X_BS.position == pytest.approx((0.24, -0.48, 0.0025))
+    body, neck = [shape for shape in visuals.shapes if shape.kind == "cylinder"]
+    assert neck.size[0] == pytest.approx(2 * world.config.tool.cup_radius)
+    assert body.size[2] + neck.size[2] == pytest.approx(world.config.tool.length)
+    assert all(Path(shape.file).is_file() for shape in visuals.shapes if shape.kind == "mesh")

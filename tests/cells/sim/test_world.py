@@ -6,19 +6,10 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.sim.world import World, name_load
+from executive.cells.sim.world import World
 from executive.geometry import Pose
 
 Build = Callable[[CellConfig], World]
-
-
-def test_the_table_top_is_at_height_zero_and_the_bin_floors_just_above(
-    build: Build, overhead: CellConfig
-) -> None:
-    world = build(overhead)
-    hits = world.client.rayTestBatch([[0.5, 0, 1], [0.2, 0.44, 1]], [[0.5, 0, -1], [0.2, 0.44, -1]])
-    assert [hit[0] for hit in hits] == [world.table, world.bin_bodies["blue_bin"]]
-    assert [hit[3][2] for hit in hits] == pytest.approx([0.0, 0.005], abs=1e-6)
 
 
 def test_a_ray_ends_at_the_first_thing_but_the_arm(build: Build, overhead: CellConfig) -> None:
@@ -30,14 +21,3 @@ def test_a_ray_ends_at_the_first_thing_but_the_arm(build: Build, overhead: CellC
         assert world.cast_ray(np.array([x, y, 1.5]), down) == pytest.approx([x, y, height], abs=1e-3)
     assert world.cast_ray(np.array([0.5, 0.1, 1.2]), -down) is None
     assert world.cast_ray(np.array([0.5, 0.1, 5.1]), down) is None, "5 m is as far as it goes"
-
-
-def test_every_body_and_part_has_a_name_for_the_text_of_an_error(build: Build, overhead: CellConfig) -> None:
-    world = build(overhead)
-    duck = world.add_object("duck", Pose.of([0.5, 0.1, 0.2]), (1, 1, 1))
-    bodies = world.floor, world.table, world.bin_bodies["blue_bin"], duck, world.arm
-    names = ["the floor", "the table", "blue_bin", "a duck", "the arm"]
-    assert [world.name_body(body) for body in bodies] == names
-    parts = [world.name_link(link) for link in (-1, 0, world.flange_index, world.tool_index)]
-    assert parts == ["link 0", "link 1", "link 7", "the tool"]
-    assert name_load("duck") == "the held duck"

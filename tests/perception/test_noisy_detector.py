@@ -10,7 +10,7 @@ import pytest
 
 from executive.cell.config import DetectorConfig
 from executive.cell.detection import Answer, Detection
-from executive.cells.fake.noisy_detector import NoisyDetector
+from executive.perception.detectors.noisy import NoisyDetector
 from executive.perception.detectors.requests import DetectorContext
 
 CLASSES = ("cube", "sphere", "duck")
