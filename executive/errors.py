@@ -1,12 +1,11 @@
-"""Error classes, and functions for the texts of error messages."""
+"""Error classes, exit codes, and functions for the texts of error messages."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-
-from executive.exit_codes import ExitCode
+from enum import IntEnum
 
 MAX_QUOTATION_LENGTH = 200
 """Maximum length of a quotation or word in a message [characters]."""
@@ -122,3 +121,14 @@ def shorten_quotations(text: str) -> str:
         return match[0][: MAX_QUOTATION_LENGTH - len(ellipsis)] + ellipsis
 
     return _QUOTATION_OR_WORD.sub(shorten, text)
+
+
+class ExitCode(IntEnum):
+    """Exit code of a command; a command that executes a run returns the code of the status of the run."""
+
+    SUCCESS = 0
+    FAILURE = 1  # also if the ledger differs from the true state of the simulator
+    INVALID_INPUT = 2
+    FAULT = 3
+    INCOMPLETE = 4
+    HALTED = 130

@@ -1,4 +1,4 @@
-"""Child processes: worker pools that end with their parent process, and commands that run a module."""
+"""Child processes: worker pools that end with their parent process, commands that run a module, and waits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, wait
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -94,3 +94,16 @@ def build_command(module: str, *arguments: str) -> list[str]:
         "module = sys.argv.pop(1); import runpy; runpy.run_module(module, None, '__main__')"
     )
     return [sys.executable, "-c", script, module, *arguments]
+
+
+T = TypeVar("T")
+
+MAX_BLOCKING_TIME = 0.05
+"""Maximum uninterrupted wait for another thread [s]; within this time, Python handles a signal, for example
+a second Ctrl-C, which ends the process at once."""
+
+
+def wait_until_done(future: Future[T]) -> None:
+    """Wait until another thread has computed a result or raised an exception."""
+    while not future.done():
+        wait([future], MAX_BLOCKING_TIME)

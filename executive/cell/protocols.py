@@ -11,12 +11,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 from executive.cell.arm import Arm
-from executive.cell.bins import Bin
+from executive.cell.bins import Bin, Quotas
 from executive.cell.detection import Answer, Detection, Detections, Observation
 from executive.cell.frame import Box, Frame
 from executive.cell.ledger import Ledger
 from executive.cell.objects import ObjectClass, Target
-from executive.cell.quotas import Quotas
 from executive.geometry import Array
 
 Steps = Iterator[None]

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from executive.cell.bins import Quotas
 from executive.cell.protocols import Cell, Operator, Routes
-from executive.cell.quotas import Quotas
 from executive.cell.visuals import Visuals
 from executive.events import Emit, ItemChanged
 

@@ -12,7 +12,7 @@ import click
 
 from executive.cli.options import json_option, overrides_option
 from executive.cli.streams import keep_stdout_clean, print_json
-from executive.exit_codes import ExitCode
+from executive.errors import ExitCode
 
 if TYPE_CHECKING:
     from executive.mission.findings import Finding

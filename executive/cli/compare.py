@@ -10,7 +10,7 @@ import click
 from executive.cli import options
 from executive.cli.streams import keep_stdout_clean, print_json
 from executive.cli.sweep import execute_missing_runs
-from executive.exit_codes import ExitCode
+from executive.errors import ExitCode
 
 
 @click.command(name="compare")

@@ -14,8 +14,7 @@ import click
 
 from executive.cli.options import json_option
 from executive.cli.streams import keep_stdout_clean, print_json
-from executive.errors import InputError
-from executive.exit_codes import ExitCode
+from executive.errors import ExitCode, InputError
 
 
 class CheckResult(NamedTuple):

@@ -10,7 +10,7 @@ import click
 
 from executive.cli import options
 from executive.cli.streams import keep_stdout_clean, print_json
-from executive.exit_codes import ExitCode
+from executive.errors import ExitCode
 
 
 def parse_fault_numbers(text: str) -> tuple[int, ...]:

@@ -16,8 +16,7 @@ from typing import Any
 import click
 
 from executive.cli.streams import use_tolerant_streams
-from executive.errors import ExecutiveError, shorten_quotations
-from executive.exit_codes import ExitCode
+from executive.errors import ExecutiveError, ExitCode, shorten_quotations
 from executive.run.garbage_collection import START_THRESHOLD
 from executive.run.signals import TERMINATION_SIGNALS, handle_signals
 

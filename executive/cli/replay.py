@@ -8,7 +8,7 @@ import click
 
 from executive.cli import options
 from executive.cli.streams import keep_stdout_clean, print_json
-from executive.exit_codes import ExitCode
+from executive.errors import ExitCode
 
 
 @click.command(name="replay")

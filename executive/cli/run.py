@@ -14,8 +14,8 @@ from executive.cli import options
 from executive.cli.streams import keep_stdout_clean, open_unescaped_stderr, print_json
 
 if TYPE_CHECKING:
+    from executive.errors import ExitCode
     from executive.events import RunStarted
-    from executive.exit_codes import ExitCode
     from executive.mission.load import LoadedMission
     from executive.record.recorded_run import RecordOptions
     from executive.record.result import Result

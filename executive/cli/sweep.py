@@ -11,7 +11,7 @@ import click
 
 from executive.cli import options
 from executive.cli.streams import keep_stdout_clean, print_json
-from executive.exit_codes import ExitCode
+from executive.errors import ExitCode
 
 if TYPE_CHECKING:
     from executive.campaign.results.database import ResultsDatabase

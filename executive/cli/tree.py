@@ -53,7 +53,7 @@ def command(
         from executive.mission.outline import make_outline
         from executive.plugins import load_skills
         from executive.record.recorded_mission import format_tree
-        from executive.tree.blackboard import Blackboard
+        from executive.tree.tree_node import Blackboard
         from executive.view.tree import btcpp, svg, tree_text
 
         loaded = load_mission(mission, load_skills(), overrides)

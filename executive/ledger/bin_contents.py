@@ -9,12 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell.bins import BIN_THICKNESS, Bin
+from executive.cell.bins import BIN_THICKNESS, Bin, Quotas, is_quota_reached
 from executive.cell.config import LedgerConfig
 from executive.cell.detection import Detections, ErrorRates, Observation
 from executive.cell.ledger import Presence
 from executive.cell.protocols import Routes
-from executive.cell.quotas import Quotas, is_quota_reached
 from executive.geometry import Array
 from executive.ledger.association import MAX_STANDARD_DEVIATIONS
 from executive.ledger.item import ItemRecord, ItemRecords, State

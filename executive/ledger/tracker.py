@@ -9,14 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell.bins import Bin
+from executive.cell.bins import Bin, Quotas
 from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.detection import Detections, Observation
 from executive.cell.frame import Frame, FrameCaptured
 from executive.cell.ledger import Presence
 from executive.cell.objects import Item, KnownItem, ObjectClass, Target
 from executive.cell.protocols import Routes
-from executive.cell.quotas import Quotas
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array

@@ -10,12 +10,11 @@ from itertools import product
 import numpy as np
 
 from executive.cell.arm import Goal, Task
-from executive.cell.bins import BIN_THICKNESS, Bin
+from executive.cell.bins import BIN_THICKNESS, Bin, is_quota_reached
 from executive.cell.detection import Detection
 from executive.cell.frame import Frame
 from executive.cell.objects import Item, ObjectClass, Obstacle, Target
 from executive.cell.protocols import Cell
-from executive.cell.quotas import is_quota_reached
 from executive.errors import NoDepth
 from executive.geometry import Array
 

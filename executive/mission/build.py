@@ -16,10 +16,9 @@ from executive.mission.model.instance import make_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.wiring import find_literals, find_wires
 from executive.skill import Direction, Param, Port, Skill
-from executive.tree.blackboard import Blackboard
 from executive.tree.node_registry import ControlNodes, load_control_nodes
 from executive.tree.skill_leaf import SkillLeaf, Wiring
-from executive.tree.tree_node import NodeContext, TreeNode
+from executive.tree.tree_node import Blackboard, NodeContext, TreeNode
 
 
 def build_tree(

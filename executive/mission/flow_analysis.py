@@ -9,13 +9,10 @@ from executive.mission.model.instance import get_mission_node, make_inspection_i
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.wiring import find_wires
 from executive.plugins import Skills
-from executive.skill import HOLDING, Direction, Skill
+from executive.skill import HALT, HOLDING, Direction, Skill
 from executive.tree.flow import INITIAL_STATE, UNKNOWN_STATE, Flow, FlowState, PossibleFailure, join_states
 from executive.tree.keys import Child
 from executive.tree.node import ControlNode
-
-HALT_KEY = "halt"
-"""Key of `Skill.tool_state_after_failure` for the state of the tool after a halt."""
 
 
 class FlowAnalysis:
@@ -94,13 +91,13 @@ class FlowAnalysis:
         )
         end_states = {
             key: state.apply_failure(tool_states_after_failure.get(key), node.path)
-            for key in (*skill.reasons, HALT_KEY)
+            for key in (*skill.reasons, HALT)
         }
         failures = {PossibleFailure(node.skill, key, node.path): end_states[key] for key in skill.reasons}
         success = apply_success(postcondition, node.path)
         if skill.is_instantaneous():
             return Flow(success, failures, None)
-        halted = end_states[HALT_KEY]
+        halted = end_states[HALT]
         return Flow(None, {}, halted) if self._is_first_tick else Flow(success, failures, halted)
 
     def _compute_subtree_flow(self, node: SubtreeNode, body: Node, state: FlowState) -> Flow:

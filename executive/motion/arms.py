@@ -9,10 +9,9 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import find_unreachable_places
 from executive.cell.workcell import KeyPath
 from executive.geometry import Array
-from executive.motion.arm_model import Kinematics
 from executive.motion.clearance_model import SAMPLING_MARGIN
 from executive.motion.iiwa14_kinematics import IIWA14_JOINT_COUNT, Iiwa14
-from executive.motion.joints import JointLimits, JointRange
+from executive.motion.joints import JointLimits, JointRange, Kinematics
 from executive.motion.planner import CollisionCheck, Planner
 
 KinematicsFactory = Callable[[float, JointRange, float | None], Kinematics]

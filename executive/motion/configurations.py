@@ -11,9 +11,17 @@ import numpy as np
 from executive.cell.arm import Goal
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose, make_tool_down_pose
-from executive.motion.arm_model import BranchKey, Kinematics, Solutions, wrap_angles
 from executive.motion.cartesian_line import CartesianLine
-from executive.motion.joints import JointLimits, JointRange, JointState, compute_min_time
+from executive.motion.joints import (
+    BranchKey,
+    JointLimits,
+    JointRange,
+    JointState,
+    Kinematics,
+    Solutions,
+    compute_min_time,
+    wrap_angles,
+)
 
 PREFERRED_LIMIT_DISTANCE = math.radians(1.0)
 """Preferred minimum distance of joint positions from their limits [rad]."""

@@ -22,8 +22,7 @@ from numpy.typing import ArrayLike
 
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose
-from executive.motion.arm_model import BranchKey, Solutions, wrap_angles
-from executive.motion.joints import JointRange
+from executive.motion.joints import BranchKey, JointRange, Solutions, wrap_angles
 
 IIWA14_JOINT_COUNT = 7
 """Number of joints of the arm."""
@@ -61,7 +60,7 @@ def interpolate_max_joint_6_angle(min_link_distance: float) -> float:
 
 
 class Iiwa14:
-    """Kinematics of an iiwa 14; implements `executive.motion.arm_model.Kinematics`.
+    """Kinematics of an iiwa 14; implements `executive.motion.joints.Kinematics`.
 
     Args:
         tool_length: Distance from the flange to the tool centre point [m].

@@ -15,9 +15,8 @@ from itertools import pairwise
 import numpy as np
 
 from executive.geometry import Array
-from executive.motion.arm_model import Kinematics
 from executive.motion.clearance_model import ClearanceModel, NearestPairs
-from executive.motion.joints import JointLimits, JointState
+from executive.motion.joints import JointLimits, JointState, Kinematics
 from executive.motion.payload import PayloadLimit
 from executive.motion.trajectory import Connector, JointLimitError, PointToPoint
 from executive.motion.transcription import (

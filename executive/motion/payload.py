@@ -9,7 +9,7 @@ import numpy as np
 from executive.cell.clock import STEP
 from executive.cell.objects import Load
 from executive.geometry import GRAVITY, Array
-from executive.motion.arm_model import Kinematics
+from executive.motion.joints import Kinematics
 from executive.motion.trajectory import Trajectory
 from executive.motion.transcription import SAMPLES_PER_STEP, LinearizedConstraints
 

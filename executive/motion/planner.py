@@ -20,18 +20,17 @@ from numpy.typing import ArrayLike
 from executive.cell.arm import Goal, Motion, Task, reject_generator
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
-from executive.cell.futures import wait_until_done
 from executive.cell.layout import compute_travel_height
 from executive.cell.protocols import Clock
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit, MotionPlanned
 from executive.geometry import Array, Pose
-from executive.motion.arm_model import Kinematics
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.joints import JointLimits
+from executive.motion.joints import JointLimits, Kinematics
 from executive.motion.payload import PayloadLimit
 from executive.motion.search import MotionSearch
 from executive.motion.trajectory import JointLimitError, Trajectory, downsample_path
+from executive.processes import wait_until_done
 
 CollisionCheck = Callable[[Array, Task], None]
 """Function that raises Blocked if the path `(N, n)` [rad] of a task collides."""

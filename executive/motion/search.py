@@ -17,7 +17,6 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height
 from executive.errors import Unreachable
 from executive.geometry import Array, make_tool_down_pose
-from executive.motion.arm_model import BranchKey, Kinematics
 from executive.motion.cartesian_line import CartesianLine
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
 from executive.motion.configurations import (
@@ -26,7 +25,7 @@ from executive.motion.configurations import (
     find_vertical_waypoints,
     solve_vertical_waypoints,
 )
-from executive.motion.joints import JointLimits, JointState
+from executive.motion.joints import BranchKey, JointLimits, JointState, Kinematics
 from executive.motion.optimizer import OptimizationProblem, Optimizer
 from executive.motion.payload import PayloadLimit
 from executive.motion.trajectory import Connector, JointLimitError, MotionPiece, Trajectory, sample_pieces

@@ -13,13 +13,13 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
-from executive.motion.arm_model import Kinematics
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
 from executive.motion.configurations import (
     find_configuration_pairs,
     find_vertical_waypoints,
     solve_vertical_waypoints,
 )
+from executive.motion.joints import Kinematics
 from executive.motion.search import EXTRA_HEIGHTS
 
 JOINT_SPEED = 1.5

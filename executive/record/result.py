@@ -11,9 +11,8 @@ from pydantic import TypeAdapter
 
 from executive.cell.json_values import to_json
 from executive.cell.workcell import AUDIT_KEYS
-from executive.errors import ExecutiveError, explain_os_errors
+from executive.errors import ExecutiveError, ExitCode, explain_os_errors
 from executive.events import RunResumed, RunStatus, TimedEvent
-from executive.exit_codes import ExitCode
 from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis.diagnosis import Diagnosis
 from executive.record.journal import find_run_end

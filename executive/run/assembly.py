@@ -24,8 +24,7 @@ from executive.run.run_context import RunContext
 from executive.run.run_control import RunControl
 from executive.run.versions import list_versions
 from executive.skill import Skill
-from executive.tree.blackboard import Blackboard
-from executive.tree.tree_node import TreeNode
+from executive.tree.tree_node import Blackboard, TreeNode
 
 
 @dataclass(frozen=True)

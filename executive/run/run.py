@@ -18,8 +18,7 @@ from executive.run.garbage_collection import shorten_collections
 from executive.run.run_context import RunContext, brake_arm
 from executive.run.run_control import RunControl
 from executive.run.signals import halt_on_signals
-from executive.tree.halting import halt
-from executive.tree.tree_node import TreeNode
+from executive.tree.tree_node import TreeNode, halt
 
 
 @dataclass(frozen=True)

@@ -60,18 +60,6 @@ def make_raising(
     return make_substitute(skill, "Raising", run, _list_first_starts(start_count))
 
 
-def make_raising_when_halted(skill: type[Skill], error: Exception) -> type[Skill]:
-    """Return a skill that raises `error` when it is halted, like a skill with a bug in a `finally` block."""
-
-    def run(self: Skill, cell: Cell) -> Steps:
-        try:
-            yield from _run_original(skill, self, cell)
-        except GeneratorExit:
-            raise error from None
-
-    return make_substitute(skill, "RaisingWhenHalted", run)
-
-
 def make_substitute(
     skill: type[Skill], prefix: str, run: RunMethod, start_numbers: Container[int] | None = None
 ) -> type[Skill]:

@@ -17,10 +17,9 @@ from executive.errors import Fault
 from executive.events import BranchChosen, NodeEnded, NodeStarted
 from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState
-from executive.tree.halting import halt
 from executive.tree.inspection import Advice, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeyKind, KeyOwner, KeySection
-from executive.tree.tree_node import NodeContext, TreeNode
+from executive.tree.tree_node import NodeContext, TreeNode, halt
 
 
 class ControlNode(KeyOwner, TreeNode):

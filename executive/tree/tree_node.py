@@ -1,7 +1,8 @@
-"""Base class of all nodes of a tree, and the context with which a node is built."""
+"""Base class of all nodes of a tree, the context with which a node is built, the blackboard, and halting."""
 
 from __future__ import annotations
 
+from collections import UserDict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import cast
@@ -11,8 +12,8 @@ from py_trees.common import Status
 
 from executive.cell.ledger import Ledger
 from executive.cell.protocols import Clock
+from executive.errors import Fault
 from executive.events import Emit, Event, discard_event
-from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Failure
 
 
@@ -84,3 +85,30 @@ class TreeNode(Behaviour):
         """Continue by one tick, then yield this node for visitors of py_trees."""
         self.tick_once()
         yield self
+
+
+def halt(root: Behaviour) -> list[str]:
+    """Stop every running node of the tree `root`, children first; return the messages of failed clean-ups."""
+    problems = []
+    for node in root.iterate():
+        if node.status is Status.RUNNING:
+            try:
+                node.stop(Status.INVALID)
+            except Exception as error:
+                node_name = (error.node if isinstance(error, Fault) else "") or node.name
+                problems.append(f"{node_name}: {error}")
+                # A node whose clean-up failed counts as ended: no node is halted twice.
+                node.status = Status.INVALID
+    return problems
+
+
+class Blackboard(UserDict[str, object]):
+    """The variables of one run by name; a skill reads inputs at its start and writes outputs on success.
+
+    Every run has its own blackboard, so that one process can execute several missions. All subtrees share
+    the blackboard. Arguments of subtrees are no variables: values replace them before the tree is built.
+    """
+
+    def describe_missing(self, variable: str) -> str:
+        """Return a text about a variable that a node reads too early, for the end of a sentence."""
+        return f"${variable}, which no node has written yet; written so far: {', '.join(self) or 'nothing'}"

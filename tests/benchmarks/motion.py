@@ -28,10 +28,9 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
-from executive.motion.arm_model import Kinematics
 from executive.motion.braking import plan_braking
 from executive.motion.configurations import find_configuration_pairs, find_vertical_waypoints
-from executive.motion.joints import JointLimits, JointState, compute_min_time
+from executive.motion.joints import JointLimits, JointState, Kinematics, compute_min_time
 from executive.motion.planner import Planner
 from executive.motion.trajectory import Connector, Trajectory, compute_peak_fractions
 from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world

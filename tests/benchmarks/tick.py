@@ -28,12 +28,11 @@ from executive.events import Event, Observer, TimedEvent
 from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory
 from executive.skill import Skill
-from executive.tree.blackboard import Blackboard
 from executive.tree.decorators import Timeout
 from executive.tree.retry import Retry
 from executive.tree.sequences import Sequence as SequenceNode
 from executive.tree.skill_leaf import SkillLeaf, Wiring
-from executive.tree.tree_node import NodeContext
+from executive.tree.tree_node import Blackboard, NodeContext
 from tests.benchmarks.report import Figures, run_command
 
 SIZES = (10, 100, 1000)

@@ -24,9 +24,8 @@ from executive.mission.parse.node_parser import NodeParser
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import parse_yaml
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Skill, port
-from executive.tree.blackboard import Blackboard
-from executive.tree.halting import halt
 from executive.tree.node_registry import load_control_nodes
+from executive.tree.tree_node import Blackboard, halt
 
 MOST_TICKS = 400
 

@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from executive.mission.source import Source
-from executive.mission.text.scalars import convert_scalar
-from executive.mission.text.yaml_text import parse_yaml
+from executive.mission.text.yaml_text import convert_scalar, parse_yaml
 
 
 def read(text: str) -> tuple[Any, list[str]]:

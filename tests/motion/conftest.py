@@ -10,9 +10,8 @@ import yaml
 
 from executive.cell.config import CellConfig
 from executive.geometry import Array
-from executive.motion.arm_model import Kinematics
 from executive.motion.arms import build_kinematics, build_planner
-from executive.motion.joints import JointLimits
+from executive.motion.joints import JointLimits, Kinematics
 from executive.motion.planner import Planner
 from executive.motion.trajectory import Connector
 

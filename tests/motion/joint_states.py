@@ -8,9 +8,8 @@ from numpy.typing import ArrayLike
 
 from executive.cell.arm import Goal
 from executive.geometry import Array
-from executive.motion.arm_model import Kinematics
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.joints import JointLimits, JointRange, JointState
+from executive.motion.joints import JointLimits, JointRange, JointState, Kinematics
 from executive.motion.trajectory import MotionPiece
 
 POSITION_LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose
-from executive.motion.arm_model import BranchKey, Solutions, wrap_angles
-from executive.motion.joints import JointRange
+from executive.motion.joints import BranchKey, JointRange, Solutions, wrap_angles
 
 HEIGHT, UPPER_ARM, FOREARM, WRIST_TO_FLANGE = 0.30, 0.45, 0.42, 0.10  # [m]
 AXES = "zyyzyz"
@@ -24,7 +23,7 @@ FLIPS = tuple(product((1, -1), repeat=3))
 
 
 class SixJointArm:
-    """Implements `executive.motion.arm_model.Kinematics`."""
+    """Implements `executive.motion.joints.Kinematics`."""
 
     def __init__(self, tool_length: float, joint_range: JointRange) -> None:
         self.joint_range = joint_range

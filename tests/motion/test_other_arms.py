@@ -10,8 +10,7 @@ from six_joint_arm import SixJointArm
 from executive.cell.arm import Goal, Task
 from executive.cell.config import ArmConfig, CellConfig, LimitsConfig
 from executive.cell.objects import Load, ObjectClass, Obstacle
-from executive.motion.arm_model import Kinematics
-from executive.motion.joints import JointLimits
+from executive.motion.joints import JointLimits, Kinematics
 from executive.motion.planner import Planner
 
 LIMITS = LimitsConfig(

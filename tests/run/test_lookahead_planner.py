@@ -15,8 +15,8 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import Unreachable
 from executive.events import FrameSearched, MotionPlanned, TargetSelected, TimedEvent
 from executive.manipulation.tool_goals import sort_pickable_targets
-from executive.motion.arm_model import Kinematics
 from executive.motion.configurations import ConfigurationPairs, find_configuration_pairs
+from executive.motion.joints import Kinematics
 from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.run_context import RunContext
 from executive.skill import Skill, SkillFailed

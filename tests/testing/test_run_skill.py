@@ -9,11 +9,12 @@ import pytest
 
 from executive.cell.arm import Goal
 from executive.cell.objects import Target
+from executive.cell.protocols import Cell, Steps
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
 from executive.skill import In, Out, Skill, param, port
 from executive.testing.run_skill import run_skill
-from executive.testing.substitutes import make_failing, make_raising, make_raising_when_halted
+from executive.testing.substitutes import make_failing, make_raising
 from skills.approach import Approach
 from skills.await_request import AwaitRequest
 from skills.detect import Detect
@@ -139,8 +140,16 @@ def test_a_bug_comes_up_in_mid_work_and_the_skill_cleans_up(fake: FakeCell, targ
 
 
 def test_a_bug_in_finally_comes_up_in_a_halt_and_not_without_one(fake: FakeCell, target: Target) -> None:
-    broken = make_raising_when_halted(Approach, ValueError("in finally"))
+    class Broken(Approach):
+        """Approach the target."""
+
+        def run(self, cell: Cell) -> Steps:
+            try:
+                yield from super().run(cell)
+            except GeneratorExit:
+                raise ValueError("in finally") from None
+
     with pytest.raises(Fault, match="ValueError while it was halted: in finally"):
-        run_skill(broken, fake, inputs={"target": target}, halt_at=40)
+        run_skill(Broken, fake, inputs={"target": target}, halt_at=40)
     assert fake.arm.commands == ["start", "stop"], "the skill's own finally ran before"
-    assert run_skill(broken, fake, inputs={"target": target}).status == "SUCCESS"
+    assert run_skill(Broken, fake, inputs={"target": target}).status == "SUCCESS"

@@ -11,7 +11,6 @@ from hand_set_clock import Clock
 from py_trees.behaviour import Behaviour
 
 from executive.events import Emit, discard_event
-from executive.tree.blackboard import Blackboard
 from executive.tree.decorators import Invert, Succeed, Timeout
 from executive.tree.failure import Reason
 from executive.tree.keys import VariableName
@@ -20,7 +19,7 @@ from executive.tree.parallel import Parallel
 from executive.tree.retry import Backoff, Retry
 from executive.tree.sequences import Fallback
 from executive.tree.sequences import Sequence as SequenceNode
-from executive.tree.tree_node import NodeContext
+from executive.tree.tree_node import Blackboard, NodeContext
 from executive.tree.try_catch import Catch, TryCatch
 
 Names = Iterable[tuple[str, str]]

@@ -12,8 +12,7 @@ from py_trees.common import Status
 from scripted_leaf import Leaf
 
 from executive.events import Event
-from executive.tree.blackboard import Blackboard
-from executive.tree.tree_node import NodeContext
+from executive.tree.tree_node import Blackboard, NodeContext
 
 LEDGER: Any = None
 """The nodes of these tests read no items."""

@@ -10,7 +10,7 @@ from build_nodes import names_of, sequence, timeout, try_catch
 from py_trees.common import Status
 
 from executive.events import NodeEnded, NodeStarted
-from executive.tree.halting import halt
+from executive.tree.tree_node import halt
 
 
 def test_finally_runs_neither_after_a_halt_nor_after_a_fault(leaf: Any, site: Any, log: Any) -> None:

@@ -13,10 +13,9 @@ from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.events import BranchChosen
 from executive.skill import In, Skill, port
-from executive.tree.blackboard import Blackboard
-from executive.tree.halting import halt
 from executive.tree.loops import ForEach
 from executive.tree.skill_leaf import SkillLeaf, Wiring
+from executive.tree.tree_node import Blackboard, halt
 
 
 class Use(Skill):

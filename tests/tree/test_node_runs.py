@@ -25,9 +25,8 @@ from py_trees.common import Status
 from scripted_leaf import Leaf
 
 from executive.events import BranchChosen, Event
-from executive.tree.blackboard import Blackboard
-from executive.tree.halting import halt
 from executive.tree.loops import ForEach
+from executive.tree.tree_node import Blackboard, halt
 from executive.tree.try_catch import TryCatch
 
 LOST, EMPTY = [("A", "lost")], [("A", "empty")]

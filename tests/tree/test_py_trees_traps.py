@@ -11,9 +11,9 @@ from py_trees.common import Status
 from scripted_leaf import Leaf
 
 from executive.errors import Fault
-from executive.tree.halting import halt
 from executive.tree.parallel import Parallel
 from executive.tree.sequences import Fallback, Sequence
+from executive.tree.tree_node import halt
 
 
 class Terminated(Leaf):

@@ -13,9 +13,8 @@ from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.skill import In, Out, Skill, param, port
-from executive.tree.blackboard import Blackboard
-from executive.tree.halting import halt
 from executive.tree.skill_leaf import SkillLeaf, Wiring
+from executive.tree.tree_node import Blackboard, halt
 
 
 class Worker(Skill):

@@ -18,7 +18,7 @@ from executive.cell.protocols import Clock
 from executive.cells.sim.renderer import CELL_LIGHT, FixedViewRenderer, Image, Light, RenderedImage, render
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
-from executive.motion.arm_model import Kinematics
+from executive.motion.joints import Kinematics
 from executive.perception.camera_check import describe_displacement
 from executive.perception.camera_model import FAR_PLANE, MountedCamera, compute_calibration, compute_hull_mask
 

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from executive.cell.config import CameraConfig, DetectorConfig
 from executive.cell.detection import Answer, Detection, ErrorRates
 from executive.cell.frame import Frame
-from executive.cell.futures import wait_until_done
 from executive.cell.protocols import Clock, Detector, Request
 from executive.errors import DeadlinePassed, Unavailable
 from executive.perception.detectors.views import Region, list_regions
+from executive.processes import wait_until_done
 
 CLOCK_ROUNDING_ERROR = 1e-9
 """Maximum rounding error of a time on the clock [s]."""
