@@ -18,6 +18,17 @@ _QUOTATION_OR_WORD = re.compile(r'"[^"\n]*"|\S+')
 """A quotation in double quotes within one line, or a word; `shorten_quotations` shortens the matches."""
 
 
+class ExitCode(IntEnum):
+    """Exit code of a command; a command that executes a run returns the code of the status of the run."""
+
+    SUCCESS = 0
+    FAILURE = 1  # also if the ledger differs from the true state of the simulator
+    INVALID_INPUT = 2
+    FAULT = 3
+    INCOMPLETE = 4
+    HALTED = 130
+
+
 class ExecutiveError(Exception):
     """Base class of the errors of this project.
 
@@ -121,14 +132,3 @@ def shorten_quotations(text: str) -> str:
         return match[0][: MAX_QUOTATION_LENGTH - len(ellipsis)] + ellipsis
 
     return _QUOTATION_OR_WORD.sub(shorten, text)
-
-
-class ExitCode(IntEnum):
-    """Exit code of a command; a command that executes a run returns the code of the status of the run."""
-
-    SUCCESS = 0
-    FAILURE = 1  # also if the ledger differs from the true state of the simulator
-    INVALID_INPUT = 2
-    FAULT = 3
-    INCOMPLETE = 4
-    HALTED = 130
