@@ -22,7 +22,7 @@ class Special(Target):
         (int, int), (int, float), (Special, Target), (str, str | None), (list[int], list), (Any, Target),
         (None | str, Optional[str]),  # noqa: UP045 - both ways of writing it
         (list[int], list[float]), (list[Special], Sequence[Target]), (tuple[int, ...], Sequence[float]),
-        (Target, Any),
+        (Target, Any), (int, float | str),
     ],
 )  # fmt: skip
 def test_these_fit(given: Any, wanted: Any) -> None:
@@ -33,7 +33,7 @@ def test_these_fit(given: Any, wanted: Any) -> None:
     ("given", "wanted"),
     [
         (float, int), (Target, Special), (str | None, str), (list[Target], Target), (Target, list[Target]),
-        (list[Target], list[Detection]), (str, list[str]), (Target, str),
+        (list[Target], list[Detection]), (str, list[str]), (Target, str), (float, int | str),
     ],
 )  # fmt: skip
 def test_these_do_not_fit(given: Any, wanted: Any) -> None:
