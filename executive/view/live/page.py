@@ -158,11 +158,11 @@ class LivePage:
             if self._run.control.is_paused != self._was_paused:
                 self._was_paused = not self._was_paused
                 self._enqueue(page_state.PageChange(is_paused=self._was_paused))
-            if self._can_send_images and self._visuals is not None:
+            if self._can_send_images:
                 self._enqueue(page_state.PageChange(clock=self._run.now))
-                self._enqueue(
-                    page_state.SceneChange(body_poses=page_state.encode_poses(self._visuals.poses()))
-                )
+                if self._visuals is not None:
+                    body_poses = page_state.encode_poses(self._visuals.poses())
+                    self._enqueue(page_state.SceneChange(body_poses=body_poses))
 
     @property
     def _can_send_images(self) -> bool:
