@@ -257,6 +257,8 @@ def measure(texts: int = 5000, data_sets: int = 300, models: int = 300, seed: in
 def run_in_child(command: Callable[[], object], folder: Path, logs: Path) -> CommandResult:
     """Run a command, which ends with SystemExit, in a forked child whose working directory is `folder`."""
     outputs = [logs / "output.txt", logs / "errors.txt"]
+    # A child begins with the memory of this process, which is not counted.
+    inherited_pages = int(Path("/proc/self/statm").read_text().split()[1])
     child = os.fork()
     if child == 0:
         try:
@@ -275,7 +277,8 @@ def run_in_child(command: Callable[[], object], folder: Path, logs: Path) -> Com
     status, usage = _wait(child)
     output, errors = (file.read_bytes().decode(errors="backslashreplace") for file in outputs)
     cpu_time = usage.ru_utime + usage.ru_stime
-    return CommandResult(os.waitstatus_to_exitcode(status), output, errors, cpu_time, usage.ru_maxrss / 1e3)
+    memory = usage.ru_maxrss / 1e3 - inherited_pages * resource.getpagesize() / 1e6
+    return CommandResult(os.waitstatus_to_exitcode(status), output, errors, cpu_time, memory)
 
 
 def _wait(child: int) -> tuple[int, resource.struct_rusage]:
