@@ -303,7 +303,8 @@ def _check_entry(skill: type[Skill], entry: Param | Port) -> None:
 
 def _describe_default_problem(param: Param) -> str:
     """Return what the default of a param must be, and what it is; "" if the default is allowed."""
-    default, unit = param.default, f" {param.unit}" if param.unit else ""
+    default = param.default
+    unit = f" {param.unit}" if param.unit else ""
     if param.is_required:
         return ""
     allowed_types = {bool: (bool,), int: (int,), float: (float, int), str: (str,)}.get(param.type)
@@ -322,7 +323,8 @@ def _describe_default_problem(param: Param) -> str:
 
 def _check_attributes(skill: type[Skill]) -> None:
     """Raise TypeError if the docstring or a class attribute of a skill violates a rule for all skills."""
-    name, summary = skill.__qualname__, inspect.cleandoc(skill.__doc__ or "").partition("\n")[0]
+    name = skill.__qualname__
+    summary = inspect.cleandoc(skill.__doc__ or "").partition("\n")[0]
     # Python removes docstrings with the option -OO. A class without `run` is a base class, or varies a skill.
     if "run" in vars(skill) and sys.flags.optimize < 2 and not summary.endswith("."):
         raise TypeError(

@@ -126,7 +126,8 @@ class CellWithoutHardware:
         """Return the number of objects by `AUDIT_KEYS`; None if the true positions are unknown."""
         if (objects := self._list_final_objects()) is None:
             return None
-        gate, ignored = self.config.ledger.gate, self.accounts.ignored_positions
+        gate = self.config.ledger.gate
+        ignored = self.accounts.ignored_positions
         return count_outcomes(objects, self.accounts.records, self.cell.bins, self.routes, gate, ignored)
 
     def _list_final_objects(self) -> Iterable[FinalObject] | None:

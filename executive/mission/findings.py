@@ -10,7 +10,6 @@ from functools import lru_cache
 from pathlib import Path
 
 from executive.errors import InputError, shorten_quotations
-from executive.mission.other_words import WORD_BY_OTHER_WORD
 from executive.mission.source import Span
 
 _MAX_EXCERPT_LENGTH = 140
@@ -35,6 +34,25 @@ _VALUE_CODES = frozenset({
     "unknown-bin", "unknown-class", "unknown-detector", "unknown-pose", "unseen-class",
 })  # fmt: skip
 """Codes of findings about a value; `sort_findings` keeps one finding per position and code."""
+WORD_BY_OTHER_WORD = {
+    "aim": "max_position_std",
+    "and": "all",
+    "confused": "confusion_rate",
+    "else": "try",
+    "for": "for_each",
+    "if": "try",
+    "invented": "false_detections",
+    "least_force": "min_force",
+    "loop": "repeat",
+    "misjudged": "max_class_error",
+    "misses": "miss_rate",
+    "most": "max",
+    "or": "any",
+    "overlooked": "max_miss_probability",
+    "planning": "planning_time",
+    "selector": "fallback",
+}
+"""Word of the current language by a word that was renamed, or that other languages use."""
 
 
 @dataclass(frozen=True)

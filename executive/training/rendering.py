@@ -240,7 +240,8 @@ class SceneRenderer:
         (colour, texture), light, noise = ((1.0, 1.0, 1.0), WOOD_TEXTURE), CELL_LIGHT, self._camera.noise
         if rng.random() >= NOMINAL_SCENE_FRACTION:
             matrix, X_WC = arrangements.draw_camera(self._camera, matrix, X_WC, rng)
-            (colour, texture), light = arrangements.draw_table_appearance(rng), arrangements.draw_light(rng)
+            (colour, texture) = arrangements.draw_table_appearance(rng)
+            light = arrangements.draw_light(rng)
             noise = arrangements.draw_noise(noise, rng)
         region = arrangements.draw_region(self._camera, rng)
         wood_colour = tuple(np.multiply(colour, arrangements.WOOD_COLOUR).tolist())

@@ -171,8 +171,9 @@ def sweep(folder: Path, cluster: str | None = None, **options: Any) -> list[RunR
     with closing(create_sweep(make_settings("sort_fruit", SEEDS, FAKE, {}, None, False), folder)) as database:
         jobs = list_jobs(database.settings, database.path.parent)
         run_sweep(jobs, database, JobOptions(**options), cluster)
-        assert [row.run_index for row in database.read_items() if row.state != "placed"] == []
-        return database.read_runs()
+        rows = database.read_runs()
+        assert [row.run_index for row in rows if row.items.placed != row.items.seen] == []
+        return rows
 
 
 @pytest.mark.slow

@@ -108,12 +108,13 @@ def test_all_rows_are_read_as_they_were_stored(tmp_path: Path) -> None:
         with closing(ResultsDatabase(get_database_path(tmp_path))) as reader:
             assert reader.settings == SETTINGS
             assert reader.read_runs() == [plain, RUN]
-            assert (reader.read_items(), reader.read_skills()) == ([ITEM], [SKILL])
+            assert reader.read_skills() == [SKILL]
     assert [path.name for path in tmp_path.iterdir()] == ["results.sqlite"], "one file contains everything"
     with closing(sqlite3.connect(tmp_path / "results.sqlite")) as connection:
         (schema,) = connection.execute("SELECT sql FROM sqlite_master WHERE name = 'runs'").fetchone()
         query = "SELECT items_placed, audit_right, planning_waited_s FROM runs WHERE audit_agrees = 0"
         assert connection.execute(query).fetchall() == [(1, 1, 0.1)]
+        assert connection.execute("SELECT * FROM items").fetchall() == [tuple(vars(ITEM).values())]
     assert "robot_time_s REAL, -- Duration on the run clock" in schema
 
 
@@ -121,7 +122,7 @@ def test_a_run_is_stored_completely_or_not_at_all(tmp_path: Path) -> None:
     with closing(ResultsDatabase(tmp_path / "a", SETTINGS)) as database:
         with pytest.raises(InputError, match=r"UNIQUE.* skills\.run_index, skills\.skill"):
             database.append(replace(RECORD, skills=(SKILL, SKILL)))
-        assert (database.read_runs(), database.read_items()) == ([], [])
+        assert (database.read_runs(), database.read_skills()) == ([], [])
         database.append(RECORD)
         with pytest.raises(InputError, match=r"UNIQUE constraint failed: runs\.run_index"):
             database.append(RECORD)

@@ -41,7 +41,8 @@ def invoke(*words: str) -> Result:
 def test_a_mistake_is_printed_by_check_and_run_and_nothing_is_run() -> None:
     assert invoke("check", "m.yaml").stdout.startswith("m.yaml: ok\n")
     Path("m.yaml").write_text(MISSION.replace("Localize", "Localise"))
-    checked, ran = invoke("check", "m.yaml"), invoke("run", "m.yaml", "--runs", "runs")
+    checked = invoke("check", "m.yaml")
+    ran = invoke("run", "m.yaml", "--runs", "runs")
     assert (checked.exit_code, checked.stdout, checked.stderr) == (2, FINDING, "")
     assert (ran.exit_code, ran.stdout, ran.stderr) == (2, "", FINDING)
     assert not Path("runs").exists()

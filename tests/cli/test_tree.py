@@ -32,7 +32,8 @@ def test_every_shipped_mission_is_shown_in_every_form(mission):
 
 
 def test_ports_and_reasons_are_printed_on_demand():
-    plain, full = shown("sort_overhead").stdout, shown("sort_overhead", "--ports", "--reasons").stdout
+    plain = shown("sort_overhead").stdout
+    full = shown("sort_overhead", "--ports", "--reasons").stdout
     assert "reads" not in plain and "may fail" not in plain
     assert "may fail: no_candidate, unseen" in full and "; writes $target" in full
     assert max(map(len, full.splitlines())) <= 100

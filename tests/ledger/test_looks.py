@@ -157,7 +157,9 @@ def test_an_item_that_was_moved_is_looked_at_as_if_for_the_first_time(bench):
 
 
 def test_a_place_searched_again_from_the_same_pose_is_hardly_emptier():
-    once, twice, apart = Bench(), Bench(), Bench()
+    once = Bench()
+    twice = Bench()
+    apart = Bench()
     for bench, views in ((once, ["eye"]), (twice, ["eye", "eye"]), (apart, ["eye", "other"])):
         for detector in views:
             bench.look(by=replace(EYE, miss_rate=0.2, repeated=0.8), view="full", detector=detector)

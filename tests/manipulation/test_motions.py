@@ -57,7 +57,9 @@ def test_a_look_during_planning_changes_the_plan(fake: FakeCell) -> None:
 
 @pytest.mark.parametrize("up", [-0.5, 0.0, 0.5])
 def test_its_flight_begins_with_the_velocity_of_the_tool(up: float) -> None:
-    place, velocity, height = np.array((0.0, 0.0, 0.4)), np.array((0.3, -0.2, up)), 0.06
+    place = np.array((0.0, 0.0, 0.4))
+    velocity = np.array((0.3, -0.2, up))
+    height = 0.06
     x, y, z = predict_landing(place, velocity, height)
     time = x / 0.3
     assert y == pytest.approx(-0.2 * time)

@@ -92,7 +92,8 @@ def mutate_text(dice: random.Random, text: str) -> str:
 def test_mutants_are_refused_or_run_without_a_fault(tmp_path: Path) -> None:
     texts = [file.read_text() for file in [*sorted(MISSIONS.glob("*.yaml")), *BASES]]
     pool = [container[key] for text in texts for container, key in list_places(yaml.safe_load(text))]
-    skills, run_count = load_skills(), 0
+    skills = load_skills()
+    run_count = 0
     for seed in range(150):
         dice = random.Random(seed)
         text = dice.choice(texts)

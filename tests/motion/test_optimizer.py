@@ -13,7 +13,8 @@ from executive.motion.joints import JointState
 from executive.motion.optimizer import OptimizationProblem
 
 POST = Obstacle(0.5, 0.0, 0.04, 0.22, "the post")
-LEFT, RIGHT = (0.5, -0.2, 0.12), (0.5, 0.2, 0.12)
+LEFT = (0.5, -0.2, 0.12)
+RIGHT = (0.5, 0.2, 0.12)
 
 
 @pytest.fixture(scope="module")

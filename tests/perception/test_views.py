@@ -38,7 +38,8 @@ def test_a_detection_keeps_the_confidence_of_its_second_class_and_gets_the_name_
 
 @given(st.integers(64, 300), st.integers(0, 600), st.floats(0, 1))
 def test_every_small_object_is_whole_in_some_tile_of_the_full_view(side, further, fraction):
-    width, extent = side + further, side // 5
+    width = side + further
+    extent = side // 5
     left = round(fraction * (width - extent))
     parts = list_regions("full", (0, 0, side, side), (width, side))
     assert all(part[2] - part[0] == part[3] - part[1] == side for part in parts)

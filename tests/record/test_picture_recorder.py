@@ -129,7 +129,8 @@ def test_a_picture_shows_the_selection_and_then_its_failure(draw):
         look(1, DUCK, CUBE), change("cube-1", "seen", position=(0.5, 0.1, 0.02)), select(), look(2),
         fail("Grasp", "missed", "cube-1"),
     )  # fmt: skip
-    first, second = pictures["000012_cube-1.jpg"], pictures["000090_cube-1_missed.jpg"]
+    first = pictures["000012_cube-1.jpg"]
+    second = pictures["000090_cube-1_missed.jpg"]
     assert first.caption == "0.75 s   overhead, 0.25 s old   cube-1 to red_bin"
     assert second.caption == "2.00 s   overhead, 1.50 s old   Grasp.missed: it was missed"
     for picture in (first, second):

@@ -273,7 +273,8 @@ def test_the_first_other_decision_of_an_edited_mission_is_reported(missions: Pat
 
 
 def test_a_decision_too_many_is_a_difference_in_a_run_that_was_cut_off_too(missions: Path) -> None:
-    file, skills = missions / "sort_overhead.yaml", load_skills()
+    file = missions / "sort_overhead.yaml"
+    skills = load_skills()
     cut = [timed for timed in run_mission(file, seed=3).events if timed.tick <= 600]
     missing = next(n for n, timed in enumerate(cut) if isinstance(timed.event, ToolCommanded))
     without = [one for n, one in enumerate(cut) if n < missing or isinstance(one.event, InputRead)]

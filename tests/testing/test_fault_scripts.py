@@ -25,7 +25,8 @@ from skills.move_to_scan import MoveToScan
 
 LATENCY = 0.05
 PLACES = {"cube": (0.6, -0.15), "sphere": (0.65, 0.1), "duck": (0.45, 0.2)}
-X, Y = (0.4, 0.7), (-0.3, 0.3)
+X = (0.4, 0.7)
+Y = (-0.3, 0.3)
 
 
 class Case:

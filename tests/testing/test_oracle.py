@@ -63,7 +63,8 @@ def test_without_noise_every_object_is_located_where_it_lies_as_late_as_by_a_det
 def test_noise_differs_from_look_to_look_and_repeats_with_the_seed(build):
     cell, _ = build()
     other, _ = build(renders_images=True)
-    first, second = look(cell)[1], look(cell)[1]
+    first = look(cell)[1]
+    second = look(cell)[1]
     frame, again = look(other)
     assert again == first != second
     shifts = np.array([a.box for a in first]) - np.array([b.box for b in second])

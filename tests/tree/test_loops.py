@@ -82,7 +82,8 @@ def runs(node: Retry, clock: Any, times: list[float]) -> str:
 def test_a_retry_waits_on_the_clock_then_recovers_then_tries_again(
     leaf: Any, site: Any, clock: Any, log: Any
 ) -> None:
-    body, fix = leaf("A", "R lost", "S"), leaf("fix", "R S")
+    body = leaf("A", "R lost", "S")
+    fix = leaf("fix", "R S")
     node = retry(site(), body, 3, [], fix, make_backoff(0.5), clock)
     assert (runs(node, clock, [0.0, 0.125, 0.25, 0.5]), log) == ("RRRR", ["A starts"])
     assert (body.status, fix.status) == (Status.FAILURE, Status.INVALID)

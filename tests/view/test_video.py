@@ -58,7 +58,9 @@ def test_a_gif_shows_world_camera_picture_and_text(run: Path) -> None:
     # Two seconds of the run take one second; equal frames are one frame in the file.
     duration = read_journal(run / "journal.jsonl")[-1].clock
     assert len(frames) == math.ceil(5 * duration) + 1
-    world, camera, text = np.s_[:252, :320], np.s_[:252, 320:], np.s_[252:]
+    world = np.s_[:252, :320]
+    camera = np.s_[:252, 320:]
+    text = np.s_[252:]
     assert (frames[0][camera] == 0).mean() > 0.99
     for part in (world, camera, text):
         assert (np.abs(frames[0][part].astype(int) - frames[-1][part]).max(axis=2) > 60).sum() > 100

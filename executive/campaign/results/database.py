@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from executive.campaign.results.rows import ItemRow, RunRecord, RunRow, SkillRow, SweepSettings
+from executive.campaign.results.rows import RunRecord, RunRow, SkillRow, SweepSettings
 from executive.errors import InputError
 from executive.record.result import Audit, ItemCounts
 from executive.record.timeline import PlanningTotals
@@ -96,10 +96,6 @@ class ResultsDatabase:
     def read_runs(self) -> list[RunRow]:
         """Return the rows of all runs, in the order of the jobs."""
         return list(map(_decode_run, self._select("runs ORDER BY run_index")))
-
-    def read_items(self) -> list[ItemRow]:
-        """Return the rows of all items, sorted by run."""
-        return [ItemRow(**row) for row in self._select("items ORDER BY run_index, rowid")]
 
     def read_skills(self) -> list[SkillRow]:
         """Return the rows of all skills, sorted by run."""

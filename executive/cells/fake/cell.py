@@ -492,9 +492,12 @@ class FakeCell(CellWithoutHardware):
             yield from arm_errors
             return
         yield from find_places_out_of_reach(config)
-        max_count, place_count = config.table.objects[1], len(list_grid_points(config))
-        if max_count > place_count:
-            yield ("table", "objects"), f"the table has room for {place_count} objects, not for {max_count}"
+        place_count = len(list_grid_points(config))
+        if config.table.objects[1] > place_count:
+            yield (
+                ("table", "objects"),
+                f"the table has room for {place_count} objects, not for {config.table.objects[1]}",
+            )
         yield from find_view_errors(config)
 
     @staticmethod

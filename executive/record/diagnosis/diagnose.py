@@ -138,7 +138,8 @@ class _FailedRun:
 
     def describe_cause(self) -> str:
         """Return a sentence with the cause of the end: lost items, or skill, attempt and message."""
-        end, skills = self.end, " and ".join(map(self.format_skill_name, self.halted_skills))
+        end = self.end
+        skills = " and ".join(map(self.format_skill_name, self.halted_skills))
         skills_text = f" during {skills}" if skills else ""
         if end.status == "HALTED":
             return end.message + (" while the operator was asked" if self.timeline.question else skills_text)
@@ -224,7 +225,8 @@ def _format_source_location(node: Node) -> str:
 
 
 def _make_lost_item(name: str, item: ItemHistory) -> LostItem:
-    failed, failure = item.failure, ""
+    failed = item.failure
+    failure = ""
     if failed is not None:
         failure = f"{get_skill_name(failed.node)}.{failed.reason} at {failed.end:.2f} s: {failed.message}"
     return LostItem(name, item.sighting, item.unseen_look_count, item.pick_time, item.drop_time, failure)

@@ -149,7 +149,8 @@ def _compute_size(drawing: _NodeDrawing) -> NodeSize:
     widths = [estimate_text_width(line, LINE_SIZE) for _, line in drawing.lines]
     widths.append(estimate_text_width(drawing.title, TITLE_SIZE, bold=True))
     height = _TITLE_HEIGHT + _LINE_HEIGHT * len(drawing.lines)
-    label, name = drawing.node.parent_key, drawing.node.joined_subtrees
+    label = drawing.node.parent_key
+    name = drawing.node.joined_subtrees
     label_width = estimate_text_width(label, EDGE_LABEL_SIZE) + _EDGE_LABEL_GAP if label else 0.0
     name_width = estimate_text_width(name, SUBTREE_NAME_SIZE, bold=True) + FRAME_PADDING if name else 0.0
     return NodeSize(drawing.indent + max(widths) + _BOX_PADDING, height, label_width, name_width)

@@ -41,7 +41,9 @@ def counted(bins_of_cube: tuple[str, ...], world: OneBody | None = None, **more:
     return count_outcomes(objects, records, bins, {"cube": bins_of_cube}, max_distance=0.025)
 
 
-RED, BLUE, DROPPED = ("red_bin",), ("blue_bin",), {"dropped_bodies": {7}}
+RED = ("red_bin",)
+BLUE = ("blue_bin",)
+DROPPED = {"dropped_bodies": {7}}
 
 
 @pytest.mark.parametrize(

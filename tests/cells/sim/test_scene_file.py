@@ -109,7 +109,8 @@ def test_appearance_changes_no_position_and_the_ledger_does_not_know_the_true_si
 ) -> None:
     looks = {"objects": {"any": {"colours": [BLACK]}, "duck": {}}, "light": {"brightness": 0.3}}
     table = {"colour": [0.2, 0.2, 0.4], "texture": "pattern 1"}
-    usual, black = world(), world(**looks, table=table)
+    usual = world()
+    black = world(**looks, table=table)
     assert placed(usual) == placed(black)
     for body, label in black.labels.items():
         colour = black.client.getVisualShapeData(body)[0][7][:3]

@@ -50,7 +50,8 @@ def build(monkeypatch):
         eye = Delayed(answer)
 
         def build_detectors(configs, *, camera, clock, base, seed):
-            eye.camera, eye.clock = camera, clock
+            eye.camera = camera
+            eye.clock = clock
             return {"eye": eye}
 
         monkeypatch.setattr(evaluate, "build_detectors", build_detectors)
