@@ -11,7 +11,8 @@ from typing import Any
 
 import yaml
 
-from executive.cell.config import CellConfig, Section
+from executive.cell.config import CellConfig
+from executive.cell.device_config import Section
 from executive.cells.sim.scene_file import SceneConfig
 from executive.cli.main import main as command_line
 from executive.cli.skills import Declaration, collect_declarations

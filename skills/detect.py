@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.cell.detection import Detections
+from executive.cell.frame import Detections
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.looks import LookingSkill
 from executive.manipulation.tool_goals import is_detection_in_bin

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.cell.detection import Detections
+from executive.cell.frame import Detections
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
 from executive.errors import NoDepth

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Generator
 from contextlib import suppress
 
-from executive.cell.ledger import Presence
 from executive.cell.objects import Item
-from executive.cell.protocols import Cell, Steps
+from executive.cell.protocols import Cell, Presence, Steps
 from executive.errors import NoDepth
 from executive.manipulation.looks import LookingSkill
 from executive.skill import In, param, port

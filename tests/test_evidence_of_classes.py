@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.cell.detection import Detection, Detections, ErrorRates
-from executive.cell.frame import Box, Frame
+from executive.cell.frame import Box, Detection, Detections, ErrorRates, Frame
 from executive.cell.objects import ObjectClass
 from executive.perception.evidence import (
     describe_size_contradiction,

@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import BinConfig, CellConfig, ObjectConfig
-from executive.cell.objects import ObjectClass
+from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
 from executive.cell.workcell import KeyPath
 from executive.errors import Unreachable
 from executive.geometry import Array

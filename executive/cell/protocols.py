@@ -1,22 +1,233 @@
-"""Protocols of the parts of a work cell that skills use.
-
-Through these protocols, a skill runs unchanged in simulation, on the fake cell of the test kit, and on
-hardware. No call blocks: a skill sends a request, yields, and reads the result in a later control step.
-"""
+"""Protocols of the parts of a work cell that skills use: clock, tool, camera, detector, ledger, operator."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import NamedTuple, Protocol
 
 from executive.cell.arm import Arm
-from executive.cell.bins import Bin, Quotas
-from executive.cell.detection import Answer, Detection, Detections, Observation
-from executive.cell.frame import Box, Frame
-from executive.cell.ledger import Ledger
-from executive.cell.objects import ObjectClass, Target
+from executive.cell.frame import Answer, Box, Detection, Detections, Frame, Observation
+from executive.cell.objects import Bin, Item, KnownItem, ObjectClass, Quotas, Target
 from executive.geometry import Array
+
+STEP = 1 / 240
+"""Duration of one control step, and of one physics step of the simulation [s]."""
+
+
+class StepClock:
+    """Clock that reads its time from a function; implements `executive.cell.protocols.Clock`.
+
+    Args:
+        get_time: Function that returns the time since the start of the run [s].
+        step: Duration of one control step [s].
+    """
+
+    def __init__(self, get_time: Callable[[], float], step: float = STEP) -> None:
+        self._get_time = get_time
+        self.step = step
+
+    @property
+    def now(self) -> float:
+        """Time since the start of the run [s]."""
+        return self._get_time()
+
+    def sleep(self, duration: float) -> Iterator[None]:
+        """Yield until the time of the clock has advanced by `duration` [s]."""
+        end = self.now + duration
+        while self.now < end - self.step / 2:
+            yield
+
+
+class Presence(Enum):
+    """Answer to the question whether an item is at the place where the ledger believes it to be."""
+
+    PRESENT = "present"
+    """A frame shows the item at its place."""
+    GONE = "gone"
+    """Enough frames show the place of the item without the item."""
+    HIDDEN = "hidden"
+    """The frame does not show the place of the item, or the tool holds the item."""
+    UNSURE = "unsure"
+    """A detection at the place is doubtful, or too few frames show the place without the item."""
+
+
+class Ledger(Protocol):
+    """Tracker of the items of a run, which decides on the identity, state and position of each object."""
+
+    @property
+    def change_count(self) -> int:
+        """Number of actions of the robot so far that may have moved objects on the table."""
+
+    @property
+    def empty_load(self) -> float:
+        """Load of the empty tool before the last approach [N], the zero of a weighing; 0 if it is unknown."""
+
+    @property
+    def unknown_labels(self) -> Mapping[str, int]:
+        """Labels that are not in the cell file, each with its maximum number of boxes per frame."""
+
+    def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
+        """Update all items with the detections in a frame, and return the targets (`find_targets`).
+
+        The ledger ignores all detections in a frame of an earlier call, and detections at positions where the
+        robot may have moved objects since the capture of the frame.
+
+        Args:
+            detections: Detections with their frame, its searched region, and the detector's error rates.
+            observations: The same detections, localized in the world.
+        """
+
+    def find_targets(self) -> Sequence[Target]:
+        """Return a target for each item that still has to be sorted and has a known position."""
+
+    def find_objects_on_table(self) -> Sequence[Target]:
+        """Return all items that lie on the table with a probability of at least 0.5, and objects of no item.
+
+        Objects of no item have the label "": objects whose label the cell file ignores, and what the arm ran
+        into, unless it is an item or a bin. They are forgotten after some frames without them.
+        """
+
+    def find_uncertain_items(self) -> Sequence[Item]:
+        """Return the unsorted items in the workspace that are uncertain, or that may have been moved."""
+
+    def find_held_item(self) -> Item | None:
+        """Return the item in the tool, or None."""
+
+    def is_current(self, frame: Frame) -> bool:
+        """Return False if an action since the capture of a frame may have moved any object on the table."""
+
+    def is_fresh(self, target: Target) -> bool:
+        """Return False if the robot may have moved a target since its last detection."""
+
+    def is_certain(self, item: Item) -> bool:
+        """Return True if the existence, class and position of an item are certain enough to pick it."""
+
+    def is_height_confirmed(self, label: str) -> bool:
+        """Return True if the tool has touched an object of a class at the height of the class."""
+
+    def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
+        """Return True if almost certainly no object that the mission still sorts is visible on the table.
+
+        An object is sorted if its class has a route to a bin below its quota. `label` restricts the check to
+        objects of one class; None: all classes with a route. The objects in `ignored_items` may be on the
+        table.
+        """
+
+    def get_label(self, item: Item) -> str:
+        """Return the most probable class of an item."""
+
+    def list_possible_labels(self, item: Item) -> Sequence[str]:
+        """Return the classes of an item that a weighing may find, the most probable class first.
+
+        Before a weighing, these are all classes that look alike; after a weighing that determined the class,
+        only this class.
+        """
+
+    def describe(self, item: Item) -> KnownItem:
+        """Return the present knowledge about an item."""
+
+    def list_known_items(self) -> Sequence[KnownItem]:
+        """Return all items that exist with a probability of at least 0.5, in the order of detection."""
+
+    def count_objects_in(self, bin: str, label: str | None = None) -> int:
+        """Return the number of objects in a bin; `label` restricts the count to one class."""
+
+    def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
+        """Return the number of items in `state`, which is `placed` or `rejected` (`KnownItem.state`).
+
+        `label` restricts the count to one class, `bin` to one bin.
+        """
+
+    def explain_skipped_class(self, label: str) -> str:
+        """Return the reason why the mission does not sort further objects of a class, or "".
+
+        There are two reasons: the class has no route, or the quotas of all its bins are reached.
+        """
+
+    def find_next_slot_index(self, bin: str) -> int:
+        """Return the index of the next free slot of a bin, behind the slots of all objects in the bin.
+
+        Slots are filled in order: a slot whose object was taken out is not filled again while a later slot
+        contains an object.
+        """
+
+    def update_presence(
+        self, item: Item, detections: Detections, observations: Sequence[Observation]
+    ) -> Presence:
+        """Record whether a frame shows an item at its place, and return its presence.
+
+        The item is gone if the probability that all frames so far missed the item by chance is small enough,
+        given the miss rates of the detectors. Its position is then unknown: the item counts as dropped until
+        a frame shows an object of its class at a new place.
+
+        Args:
+            item: The item.
+            detections: Detections in a frame, for which `observe` was called before. The searched region is
+                the full image, or contains the place of the item.
+            observations: The same detections, localized in the world.
+        """
+
+    def record_empty_load(self, load: float) -> None:
+        """Record the load of the empty tool at rest [N]."""
+
+    def record_touch(self, item: Item, contradiction: str = "", *, may_have_missed_top: bool = False) -> bool:
+        """Record a touch of an item, and return False if the touch contradicts the class of the item.
+
+        Args:
+            item: The item.
+            contradiction: Sentence that states how the height of the touch contradicts the class, or "".
+            may_have_missed_top: True if the cup may have touched the item below its top.
+        """
+
+    def record_weight(self, item: Item, weight: float, std: float) -> str:
+        """Record the weight of an item, which determines its class among the classes that look alike.
+
+        Return "" if the class is then certain, otherwise a sentence that states the contradiction.
+
+        Args:
+            item: The item.
+            weight: Measured weight [N].
+            std: Standard deviation of the error of the measurement [N].
+        """
+
+    def record_failed_pick(self, item: Item, *, found_table: bool = False) -> None:
+        """Record a failed attempt to pick an item, which may have moved any object on the table.
+
+        `found_table` is True if the descent to the item touched nothing above the table.
+        """
+
+    def record_grasp(self, item: Item) -> None:
+        """Record that the tool holds an item; the grasp may have moved neighbouring objects."""
+
+    def record_drop(self, item: Item, landing: Array | None = None) -> None:
+        """Record that the tool lost an item, which may have moved any object on the table.
+
+        `landing` is the predicted landing position `(3,)` [m]; None if it is unknown.
+        """
+
+    def record_placement(self, item: Item, bin: str) -> None:
+        """Record that an item was released in a bin."""
+
+    def record_put_down(self, item: Item, position: Array) -> None:
+        """Record that an item was put back on the table, with its centre at `position` `(3,)` [m]."""
+
+    def reject(self, item: Item, reason: str) -> None:
+        """Reject an item: skills no longer select the item, and the result of the run lists the item."""
+
+    def defer(self, item: Item) -> None:
+        """Defer an item: the item stays open, and skills select it only after every other candidate."""
+
+    def invalidate_positions(self) -> None:
+        """Record that the robot may have moved any object on the table."""
+
+    def record_collision(self, point: Sequence[float] | None) -> None:
+        """Record a collision of the arm, which may have moved any object on the table.
+
+        `point` is the contact point `(x, y, z)` [m]; None if it is unknown.
+        """
+
 
 Steps = Iterator[None]
 """Iterator of an operation, which yields None once per control step until the operation ends."""

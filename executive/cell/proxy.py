@@ -11,8 +11,17 @@ from functools import cached_property, partial
 from typing import Any
 
 from executive.cell.arm import Arm, Planning
-from executive.cell.ledger import Ledger
-from executive.cell.protocols import Behaviours, Camera, Cell, Detector, Localizer, Operator, Request, Tool
+from executive.cell.protocols import (
+    Behaviours,
+    Camera,
+    Cell,
+    Detector,
+    Ledger,
+    Localizer,
+    Operator,
+    Request,
+    Tool,
+)
 
 _PROTOCOLS: Mapping[str, type] = {
     "arm": Arm,

@@ -1,4 +1,4 @@
-"""Protocols that a run requires of a work cell, its ledger and its factory; wrapper of a work cell."""
+"""Protocols that a run requires of a work cell, its shapes, its ledger and its factory; wrapper of a cell."""
 
 from __future__ import annotations
 
@@ -7,10 +7,46 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from executive.cell.bins import Quotas
+from executive.cell.objects import Quotas
 from executive.cell.protocols import Cell, Operator, Routes
-from executive.cell.visuals import Visuals
 from executive.events import Emit, ItemChanged
+from executive.geometry import Pose
+
+Colour = tuple[float, float, float]
+"""Red, green and blue, 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A solid shape that is rigidly attached to a body.
+
+    Attributes:
+        body: Name of the body; "" for a shape that never moves.
+        kind: Kind of shape: `box`, `cylinder`, `sphere` or `mesh`.
+        size: Size along x, y and z [m]; for a mesh, scale factors along x, y and z.
+        X_BS: Pose of the shape in the frame of the body.
+        colour: Colour of the surface.
+        file: Path of the file of a mesh, with the suffix of its format; "" for other kinds.
+    """
+
+    body: str
+    kind: str
+    size: tuple[float, float, float]
+    X_BS: Pose
+    colour: Colour
+    file: str = ""
+
+
+class Visuals(Protocol):
+    """Shapes of a cell and their poses, for displays."""
+
+    @property
+    def shapes(self) -> Sequence[Shape]:
+        """All shapes of the cell."""
+
+    def poses(self) -> Mapping[str, Pose]:
+        """Return the current pose `X_WB` of each body by name, without removed bodies."""
+
 
 AUDIT_KEYS = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
 """Keys of the object counts of an audit: objects in permitted bins (`right`), in other bins, on the table

@@ -1,27 +1,169 @@
-"""Base class of the simulated and the fake cell: a cell without hardware, and an operator for tests."""
+"""What simulated and fake cell share: base class, log of the world, and true positions of objects."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+import math
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from executive.cell.arm import Arm
-from executive.cell.clock import STEP, StepClock
 from executive.cell.config import CellConfig
 from executive.cell.layout import build_bins, build_object_classes
-from executive.cell.objects import Target
-from executive.cell.protocols import Cell, Detector, Localizer, Routes, Tool
-from executive.cell.visuals import Visuals
-from executive.cell.workcell import CellOptions
-from executive.cells.ground_truth import FinalObject, count_outcomes
+from executive.cell.objects import Bin, Target
+from executive.cell.protocols import STEP, Cell, Detector, Localizer, Routes, StepClock, Tool
+from executive.cell.workcell import AUDIT_KEYS, CellOptions, Visuals
+from executive.errors import Fault, InputError, describe_os_error, explain_os_errors
 from executive.events import Emit, TargetSelected
+from executive.geometry import Array
+from executive.ledger.item import ItemRecord, State
 from executive.ledger.tracker import Tracker
 from executive.perception.camera_model import MountedCamera
 from executive.perception.detectors.screening import screen_detectors
+
+UNKNOWN_LABEL = "unknown"
+"""Label of an object without a class."""
+
+
+@dataclass(frozen=True, eq=False)
+class FinalObject:
+    """An object at the end of a run.
+
+    Attributes:
+        label: Class of the object, or `UNKNOWN_LABEL`.
+        bin: Name of the bin that contains the object; "" outside of all bins, None below the table.
+        rest_positions: Positions of the object `(3,)` [m] at the start, and after each move and each fall.
+        is_dropped: True if the object fell from the tool and has not been picked up since.
+        is_held: True if the tool holds the object.
+        is_removed: True if the object was removed from the world; `bin` is then the bin before the removal.
+    """
+
+    label: str
+    bin: str | None
+    rest_positions: Sequence[Array]
+    is_dropped: bool
+    is_held: bool = False
+    is_removed: bool = False
+
+
+def count_outcomes(
+    objects: Iterable[FinalObject],
+    records: Sequence[ItemRecord],
+    bins: Mapping[str, Bin],
+    routes: Routes,
+    max_distance: float,
+    ignored_positions: Sequence[Array] = (),
+) -> dict[str, int]:
+    """Return the number of objects by outcome.
+
+    * `right`: objects in a permitted bin
+    * `wrong_bin`: objects in another bin, except objects that fell into it
+    * `left`: objects on the table, and the held object
+    * `elsewhere`: objects below the table, and objects that fell into a wrong bin
+    * `fell_in_wrong_bin`: only the objects that fell into a wrong bin
+    * `unseen`: objects that were never seen: the ledger contains no item, except phantoms, whose first
+      position has a horizontal distance of at most `max_distance` [m] from a rest position of the object
+      or from the centre of its bin
+
+    A removed object counts only if it was seen: by its bin if the tool placed it there, else as `elsewhere`.
+    An object with `UNKNOWN_LABEL` that was never seen counts only if it is in a wrong bin, not as `unseen`;
+    so does any other unseen object that was detected with an ignored label, at one of `ignored_positions`.
+    """
+    counts = dict.fromkeys(AUDIT_KEYS, 0)
+    first_positions = [record.first_position for record in records if record.state is not State.PHANTOM]
+    for final_object in objects:
+        # For an item in a bin, a resumed run records the centre of the bin as first position.
+        bin_centre = [bins[final_object.bin].position] if final_object.bin else []
+        positions = (*final_object.rest_positions, *bin_centre)
+        is_seen = _is_any_near(first_positions, positions, max_distance)
+        if not is_seen and _is_any_near(ignored_positions, positions, max_distance):
+            final_object = replace(final_object, label=UNKNOWN_LABEL)
+        for key in _find_outcomes(final_object, _find_place(final_object, routes), is_seen):
+            counts[key] += 1
+    return counts
+
+
+def _is_any_near(points: Sequence[Array], positions: Sequence[Array], max_distance: float) -> bool:
+    """Return True if a point `(3,)` [m] is at most `max_distance` [m] from a position, seen from above."""
+    return any(math.dist(point[:2], place[:2]) <= max_distance for point in points for place in positions)
+
+
+def _find_outcomes(final_object: FinalObject, place: str, is_seen: bool) -> Iterator[str]:
+    """Yield the keys of the counts that include an object with a final `place`."""
+    if final_object.is_removed:
+        if is_seen:
+            was_placed = place in ("right", "wrong_bin") and not final_object.is_dropped
+            yield place if was_placed else "elsewhere"
+    elif place == "wrong_bin" and final_object.is_dropped:
+        yield from ("elsewhere", "fell_in_wrong_bin")
+    elif place == "wrong_bin" or is_seen or final_object.label != UNKNOWN_LABEL:
+        yield place
+    if not (is_seen or final_object.is_removed or final_object.label == UNKNOWN_LABEL):
+        yield "unseen"
+
+
+def _find_place(final_object: FinalObject, routes: Routes) -> str:
+    """Return `right`, `wrong_bin`, `left` or `elsewhere` for the final position, without regard to drops."""
+    if final_object.is_held:
+        return "left"
+    if not final_object.bin:
+        return "elsewhere" if final_object.bin is None else "left"
+    return "right" if final_object.bin in routes.get(final_object.label, ()) else "wrong_bin"
+
+
+class LogFile:
+    """A file without a write buffer, so that a killed process loses no written data.
+
+    Args:
+        path: Path of the file; None: all data are discarded.
+        content_name: Name of the content, for the message of a fault.
+        length: Length to which an existing file is truncated [byte], or None to keep its content.
+
+    Raises:
+        InputError: The file cannot be opened.
+    """
+
+    def __init__(self, path: Path | None, content_name: str, length: int | None = None) -> None:
+        self._path, self._content_name = path, content_name
+        self._has_content = bool(length)
+        self._file: int | None = None
+        if path is None:
+            return
+        with explain_os_errors(InputError, f'cannot write "{path}"'):
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+            if length is not None:
+                os.ftruncate(self._file, length)
+
+    def write(self, data: bytes, offset: int) -> None:
+        """Write all data at an offset in the file [byte]; do nothing if the file is closed.
+
+        Raises:
+            InputError: The disk does not accept the first data.
+            Fault: The disk does not accept later data. Later calls do nothing, so that the run can still
+                bring the arm to rest.
+        """
+        try:
+            while data and self._file is not None:
+                byte_count = os.pwrite(self._file, data, offset)
+                data, offset = data[byte_count:], offset + byte_count
+        except OSError as error:
+            self.close()
+            error_class = Fault if self._has_content else InputError
+            raise error_class(
+                f'{self._content_name} "{self._path}" cannot be written: {describe_os_error(error)}; '
+                "the run stops, because without this file it could not be resumed after an interruption"
+            ) from error
+        self._has_content = True
+
+    def close(self) -> None:
+        """Close the file; do nothing if it is closed."""
+        if self._file is not None:
+            file, self._file = self._file, None
+            os.close(file)
 
 
 class SilentOperator:

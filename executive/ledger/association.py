@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from executive.cell.detection import Observation
+from executive.cell.frame import Observation
 from executive.ledger.certainty import MIN_EXISTENCE_PROBABILITY, Certainty
 from executive.ledger.coverage import Staleness
 from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, ItemRecord, State

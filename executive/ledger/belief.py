@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from executive.cell.detection import Detections, ErrorRates
+from executive.cell.frame import Detections, ErrorRates
 
 VIEWPOINT_GRID_SPACING = 0.02
 """Spacing of the grid to which camera positions are rounded [m]; equal grid points are one viewpoint."""

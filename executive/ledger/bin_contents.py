@@ -9,11 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell.bins import BIN_THICKNESS, Bin, Quotas, is_quota_reached
 from executive.cell.config import LedgerConfig
-from executive.cell.detection import Detections, ErrorRates, Observation
-from executive.cell.ledger import Presence
-from executive.cell.protocols import Routes
+from executive.cell.frame import Detections, ErrorRates, Observation
+from executive.cell.objects import BIN_THICKNESS, Bin, Quotas, is_quota_reached
+from executive.cell.protocols import Presence, Routes
 from executive.geometry import Array
 from executive.ledger.association import MAX_STANDARD_DEVIATIONS
 from executive.ledger.item import ItemRecord, ItemRecords, State

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import TableConfig
-from executive.cell.detection import Detections
+from executive.cell.frame import Detections
 from executive.geometry import Array
 from executive.ledger.belief import compute_repeat_probability, make_viewpoint_key
 from executive.ledger.item import ItemRecord

@@ -10,8 +10,7 @@ from enum import Enum
 
 import numpy as np
 
-from executive.cell.detection import Observation
-from executive.cell.frame import Frame
+from executive.cell.frame import Frame, Observation
 from executive.cell.json_values import round_values
 from executive.cell.objects import Item, KnownItem, Target
 from executive.errors import Fault

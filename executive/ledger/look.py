@@ -10,7 +10,7 @@ from itertools import compress
 import numpy as np
 
 from executive.cell.config import LedgerConfig
-from executive.cell.detection import Detections, Observation
+from executive.cell.frame import Detections, Observation
 from executive.cell.json_values import round_values
 from executive.events import DetectedObject, FrameSearched
 from executive.geometry import Array

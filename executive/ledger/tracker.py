@@ -9,13 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell.bins import Bin, Quotas
 from executive.cell.config import LedgerConfig, TableConfig
-from executive.cell.detection import Detections, Observation
-from executive.cell.frame import Frame, FrameCaptured
-from executive.cell.ledger import Presence
-from executive.cell.objects import Item, KnownItem, ObjectClass, Target
-from executive.cell.protocols import Routes
+from executive.cell.frame import Detections, Frame, FrameCaptured, Observation
+from executive.cell.objects import Bin, Item, KnownItem, ObjectClass, Quotas, Target
+from executive.cell.protocols import Presence, Routes
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
@@ -51,7 +48,7 @@ MIN_LOOKS_WITHOUT_CLASS = 3
 
 @dataclass(eq=False)
 class Tracker:
-    """Tracks each object from its first look to its final state; implements `executive.cell.ledger.Ledger`.
+    """Tracks each object from its first look to its final state; implements `Ledger` of the cell.
 
     A look is an image with its detections. The tracker owns the records of the items and emits each change of
     an item as an event. `Ledger` documents the methods in detail.

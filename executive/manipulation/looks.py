@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from typing import ClassVar
 
-from executive.cell.detection import Detections
+from executive.cell.frame import Detections
 from executive.cell.protocols import Cell
 from executive.errors import Crowded, Unavailable
 from executive.skill import Skill, param

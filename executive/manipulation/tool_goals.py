@@ -10,10 +10,8 @@ from itertools import product
 import numpy as np
 
 from executive.cell.arm import Goal, Task
-from executive.cell.bins import BIN_THICKNESS, Bin, is_quota_reached
-from executive.cell.detection import Detection
-from executive.cell.frame import Frame
-from executive.cell.objects import Item, ObjectClass, Obstacle, Target
+from executive.cell.frame import Detection, Frame
+from executive.cell.objects import BIN_THICKNESS, Bin, Item, ObjectClass, Obstacle, Target, is_quota_reached
 from executive.cell.protocols import Cell
 from executive.errors import NoDepth
 from executive.geometry import Array

@@ -9,8 +9,8 @@ from typing import cast
 
 from pydantic import JsonValue
 
-from executive.cell.bins import Quotas
 from executive.cell.config import CellConfig
+from executive.cell.objects import Quotas
 from executive.cell.workcell import CellKind
 from executive.errors import InputError
 from executive.mission.check.checks import run_checks

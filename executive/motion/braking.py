@@ -15,7 +15,7 @@ import numpy as np
 from ruckig import ControlInterface, InputParameter, Ruckig
 from ruckig import Trajectory as Profile
 
-from executive.cell.clock import STEP
+from executive.cell.protocols import STEP
 from executive.geometry import Array
 from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory

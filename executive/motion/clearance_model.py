@@ -16,10 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
 from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, compute_max_pile_height
-from executive.cell.objects import Load, Obstacle
+from executive.cell.objects import BIN_THICKNESS, Load, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
 

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from executive.cell.config import LimitsConfig
+from executive.cell.device_config import LimitsConfig
 from executive.geometry import Array, Pose
 
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from executive.cell.clock import STEP
 from executive.cell.objects import Load
+from executive.cell.protocols import STEP
 from executive.geometry import GRAVITY, Array
 from executive.motion.joints import Kinematics
 from executive.motion.trajectory import Trajectory

@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from executive.cell.arm import Goal, Motion, Task, reject_generator
-from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height
-from executive.cell.protocols import Clock
+from executive.cell.protocols import STEP, Clock
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit, MotionPlanned
 from executive.geometry import Array, Pose

@@ -12,9 +12,9 @@ from operator import itemgetter
 import numpy as np
 
 from executive.cell.arm import Goal, Task
-from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height
+from executive.cell.protocols import STEP
 from executive.errors import Unreachable
 from executive.geometry import Array, make_tool_down_pose
 from executive.motion.cartesian_line import CartesianLine

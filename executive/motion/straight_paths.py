@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from executive.cell.arm import Goal, Task
-from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height
+from executive.cell.protocols import STEP
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs

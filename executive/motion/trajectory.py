@@ -19,7 +19,7 @@ import numpy as np
 from ruckig import InputParameter, Result, Ruckig, RuckigError
 from ruckig import Trajectory as Profile
 
-from executive.cell.clock import STEP
+from executive.cell.protocols import STEP
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array
 from executive.motion.joints import JointLimits, JointState

@@ -18,8 +18,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.frame import Frame
+from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import NEAR_PLANE, project
 

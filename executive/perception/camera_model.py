@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from executive.cell.config import CameraConfig
+from executive.cell.device_config import CameraConfig
 from executive.cell.frame import Box, Frame
 from executive.cell.protocols import Clock
 from executive.geometry import Array, Pose

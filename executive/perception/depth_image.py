@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.detection import Detection
-from executive.cell.frame import Frame
+from executive.cell.frame import Detection, Frame
 from executive.errors import NoDepth
 from executive.geometry import Array
 

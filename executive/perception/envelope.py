@@ -17,9 +17,9 @@ import cv2
 import numpy as np
 from pydantic import Field, ValidationError
 
-from executive.cell.config import CameraConfig, CellConfig, DetectorConfig, Section
-from executive.cell.detection import ErrorRates, assume_rates
-from executive.cell.frame import Frame
+from executive.cell.config import CellConfig, DetectorConfig
+from executive.cell.device_config import CameraConfig, Section
+from executive.cell.frame import ErrorRates, Frame, assume_rates
 from executive.cell.protocols import Clock
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, compute_hull_mask
@@ -112,7 +112,7 @@ def _compute_tolerance(range_limit: float) -> float:
 
 
 class StoredErrorRates(Section):
-    """Error rates of a detector in a measurement file; `executive.cell.detection` describes the fields."""
+    """Error rates of a detector in a measurement file; `executive.cell.frame` describes the fields."""
 
     miss_rate: float = Field(gt=0, lt=1)
     confusion_rate: float = Field(gt=0, lt=1)

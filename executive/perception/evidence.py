@@ -11,8 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from executive.cell.detection import Detection
-from executive.cell.frame import Box, Frame
+from executive.cell.frame import Box, Detection, Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import GRAVITY, Array

@@ -8,10 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from executive.cell.bins import BIN_THICKNESS, Bin
-from executive.cell.detection import Detection, Detections, Observation
-from executive.cell.frame import Frame
-from executive.cell.objects import ObjectClass
+from executive.cell.frame import Detection, Detections, Frame, Observation
+from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception import evidence

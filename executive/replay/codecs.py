@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import from_json, to_json
 
-from executive.cell.detection import Answer, Detection, ErrorRates, Observation
-from executive.cell.frame import Frame
+from executive.cell.frame import Answer, Detection, ErrorRates, Frame, Observation
 from executive.cell.protocols import BehaviourStep
 from executive.geometry import Array, Pose
 

@@ -11,8 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from pydantic import JsonValue
 
-from executive.cell.clock import StepClock
-from executive.cell.protocols import Cell
+from executive.cell.protocols import Cell, StepClock
 from executive.cell.proxy import Access, intercept
 from executive.errors import Stopped
 from executive.events import Emit, InputRead, ToolCommanded

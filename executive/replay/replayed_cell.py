@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from executive import errors
-from executive.cell.clock import StepClock
+from executive.cell.protocols import StepClock
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import CellWrapper, Workcell
 from executive.events import InputRead

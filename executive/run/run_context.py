@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from executive.cell.clock import StepClock
-from executive.cell.protocols import Cell
+from executive.cell.protocols import Cell, StepClock
 from executive.cell.workcell import Workcell
 from executive.errors import Fault
 from executive.events import Event, Observer, TimedEvent

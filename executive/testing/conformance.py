@@ -17,9 +17,9 @@ from typing import Any, get_args
 
 import numpy as np
 
-from executive.cell.clock import STEP
-from executive.cell.detection import Detections
+from executive.cell.frame import Detections
 from executive.cell.objects import Item, Target
+from executive.cell.protocols import STEP
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import SHIPPED_ROUTES, FakeCell

@@ -23,7 +23,7 @@ from typing import Any, Literal
 import numpy as np
 
 from executive.cell.arm import Motion, Planning
-from executive.cell.detection import Answer
+from executive.cell.frame import Answer
 from executive.cell.json_values import round_values
 from executive.cell.protocols import Request
 from executive.cell.proxy import Access, intercept

@@ -16,16 +16,16 @@ from typing import Any
 import cv2
 import numpy as np
 
-from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
-from executive.cell.detection import Detection
-from executive.cell.frame import Frame
+from executive.cell.config import CellConfig, DetectorConfig
+from executive.cell.device_config import CameraConfig
+from executive.cell.frame import Detection, Frame
 from executive.cell.protocols import Clock
-from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim.camera import SimCamera
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import compute_bounding_box, load_mesh
 from executive.cells.sim.renderer import Image
 from executive.cells.sim.world import World
+from executive.cells.without_hardware import UNKNOWN_LABEL
 from executive.geometry import Array
 from executive.perception.camera_model import NEAR_PLANE, project
 from executive.perception.detectors.requests import PendingSearch

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from executive.cell.arm import Goal
-from executive.cell.detection import Detections
-from executive.cell.frame import Frame
+from executive.cell.frame import Detections, Frame
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept

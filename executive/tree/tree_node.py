@@ -10,8 +10,7 @@ from typing import cast
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.cell.ledger import Ledger
-from executive.cell.protocols import Clock
+from executive.cell.protocols import Clock, Ledger
 from executive.errors import Fault
 from executive.events import Emit, Event, discard_event
 from executive.tree.failure import Failure

@@ -20,7 +20,7 @@ import numpy as np
 from py_trees.common import Status
 
 from executive.campaign.mission_under_test import MissionUnderTest
-from executive.cell.clock import STEP
+from executive.cell.protocols import STEP
 from executive.cell.workcell import CellWrapper, Workcell
 from executive.cells.sim.arm import SimArm
 from executive.errors import ExecutiveError

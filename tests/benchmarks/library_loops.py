@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell.detection import Answer
+from executive.cell.frame import Answer
 from executive.errors import Fault
 from executive.plugins import load_cell_kind
 from executive.testing.faults import (

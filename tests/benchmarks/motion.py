@@ -23,9 +23,9 @@ from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
 from executive.cell.arm import Goal
-from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height
+from executive.cell.protocols import STEP
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.braking import plan_braking

@@ -17,8 +17,7 @@ from typing import Any
 import yaml
 
 from executive.cell.config import CellConfig
-from executive.cell.detection import Answer
-from executive.cell.frame import Frame
+from executive.cell.frame import Answer, Frame
 from executive.cells.sim.scene_file import load_scene
 from executive.mission.load import load_mission
 from executive.perception.detectors.requests import ChangedRequest, ClosableDetector

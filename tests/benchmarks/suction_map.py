@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.cell.config import CellConfig, ToolConfig
+from executive.cell.config import CellConfig
+from executive.cell.device_config import ToolConfig
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.tool import compute_breakaway_force, measure_contact
 from executive.cells.sim.world import World

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from executive.cell.detection import Detection
-from executive.cell.frame import Frame
+from executive.cell.frame import Detection, Frame
 from executive.cell.json_values import MAX_INTEGER_BITS, to_json, to_json_or_type_name
 from executive.geometry import Pose
 

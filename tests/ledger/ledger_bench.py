@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
-from executive.cell.detection import Detection, Detections, ErrorRates, Observation
-from executive.cell.frame import Frame
-from executive.cell.objects import ObjectClass, Target
+from executive.cell.frame import Detection, Detections, ErrorRates, Frame, Observation
+from executive.cell.objects import Bin, ObjectClass, Target
 from executive.events import Event
 from executive.ledger.tracker import Tracker
 from tests.camera_poses import looking_down

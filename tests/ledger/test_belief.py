@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ledger_bench import Bench
 
-from executive.cell.detection import Detection, ErrorRates, Observation
+from executive.cell.frame import Detection, ErrorRates, Observation
 from executive.cell.objects import ObjectClass
 from executive.geometry import GRAVITY
 from executive.ledger.association import compute_association_distance

@@ -9,7 +9,7 @@ import pytest
 from ledger_bench import area_of, take_frame
 
 from executive.cell.config import LedgerConfig, TableConfig
-from executive.cell.detection import Detections, ErrorRates
+from executive.cell.frame import Detections, ErrorRates
 from executive.ledger.coverage import (
     MIN_MISS_PROBABILITY,
     PRIOR_IN_WORKSPACE,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from ledger_bench import Bench, Thing
 
-from executive.cell.detection import ErrorRates, assume_rates
+from executive.cell.frame import ErrorRates, assume_rates
 from executive.cell.objects import ObjectClass, Target
 from executive.errors import Fault
 from executive.events import DetectedObject, FrameSearched, ItemChanged

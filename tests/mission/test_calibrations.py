@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from executive.cell.config import CameraConfig
+from executive.cell.device_config import CameraConfig
 from executive.mission.findings import MissionError
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.camera_model import compute_calibration, find_calibration_doubts

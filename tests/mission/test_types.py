@@ -7,7 +7,7 @@ from typing import Any, Optional
 
 import pytest
 
-from executive.cell.detection import Detection
+from executive.cell.frame import Detection
 from executive.cell.objects import Target
 from executive.mission.model.port_types import find_element_type, is_assignable
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.cell.detection import Answer
+from executive.cell.frame import Answer
 from executive.cells.fake.cell import FakeCell
 from executive.plugins import load_cell_kind
 from executive.testing.faults import (

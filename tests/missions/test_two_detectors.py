@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from executive.cell.detection import Detection
+from executive.cell.frame import Detection
 from executive.cells.fake.cell import FakeCell
 from executive.events import FrameSearched
 from executive.testing.run_mission import MissionResult, run_mission

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from executive.cell.detection import Detection
+from executive.cell.frame import Detection
 from executive.cells.fake.cell import FakeCell
 from executive.events import ItemChanged
 from executive.testing.run_mission import MissionResult, run_mission

@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
 from executive.cell.layout import TOOL_RADIUS
-from executive.cell.objects import Load, ObjectClass, Obstacle
+from executive.cell.objects import BIN_THICKNESS, Load, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
 from executive.motion.clearance_model import (

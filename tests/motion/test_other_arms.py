@@ -8,7 +8,8 @@ from joint_states import passed, peaks
 from six_joint_arm import SixJointArm
 
 from executive.cell.arm import Goal, Task
-from executive.cell.config import ArmConfig, CellConfig, LimitsConfig
+from executive.cell.config import CellConfig
+from executive.cell.device_config import ArmConfig, LimitsConfig
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.motion.joints import JointLimits, Kinematics
 from executive.motion.planner import Planner

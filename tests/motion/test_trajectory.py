@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, positions, states
 
-from executive.cell.clock import STEP
+from executive.cell.protocols import STEP
 from executive.errors import Fault, Unreachable
 from executive.motion.joints import JointState
 from executive.motion.trajectory import (

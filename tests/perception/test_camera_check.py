@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import BinConfig
 from executive.cell.frame import Frame
 from executive.cell.layout import build_bin
+from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.geometry import Array, Pose
 from executive.perception.camera_check import MAX_OUTLINE_DISTANCE, describe_displacement, estimate_offset
 from executive.perception.camera_model import compute_camera_matrix, project

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from executive.cell.config import CameraConfig
+from executive.cell.device_config import CameraConfig
 from executive.cell.frame import Frame
 from executive.perception.camera_model import (
     NEAR_PLANE,

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from executive.cell.detection import Answer, Detection, ErrorRates
+from executive.cell.frame import Answer, Detection, ErrorRates
 from executive.errors import DeadlinePassed
 from executive.perception.detectors.requests import PendingSearch
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import TableConfig
-from executive.cell.detection import Answer, ErrorRates, assume_rates
-from executive.cell.frame import Frame
+from executive.cell.frame import Answer, ErrorRates, Frame, assume_rates
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.envelope import (
     FrameRange,

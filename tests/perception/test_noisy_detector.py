@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import DetectorConfig
-from executive.cell.detection import Answer, Detection
+from executive.cell.frame import Answer, Detection
 from executive.perception.detectors.noisy import NoisyDetector
 from executive.perception.detectors.requests import DetectorContext
 

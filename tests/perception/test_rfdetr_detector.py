@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import DetectorConfig
-from executive.cell.detection import Detection
+from executive.cell.frame import Detection
 from executive.errors import InputError
 from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH, EmbeddedDetector
 from executive.perception.detectors.requests import DetectorContext

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from executive.cell.detection import Answer, Detection, ErrorRates
-from executive.cell.frame import Frame
+from executive.cell.frame import Answer, Detection, ErrorRates, Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import Crowded, Unavailable
 from executive.geometry import Pose

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.cell.detection import Detection
+from executive.cell.frame import Detection
 from executive.perception.detectors.views import (
     list_regions,
     merge_detections,

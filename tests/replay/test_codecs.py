@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from executive.cell.detection import Answer, Detection, ErrorRates, Observation
-from executive.cell.frame import Frame
+from executive.cell.frame import Answer, Detection, ErrorRates, Frame, Observation
 from executive.cell.protocols import BehaviourStep
 from executive.geometry import Pose, rotate_about_z
 from executive.replay import codecs

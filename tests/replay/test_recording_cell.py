@@ -9,7 +9,7 @@ from events import at, read
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.cell.clock import StepClock
+from executive.cell.protocols import StepClock
 from executive.cell.proxy import IS_METHOD
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, Unreachable

@@ -9,8 +9,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from executive.cell.detection import Detection
-from executive.cell.frame import Frame
+from executive.cell.frame import Detection, Frame
 from executive.cells.fake.cell import FakeCell
 from executive.errors import NoDepth
 from executive.skill import SkillFailed

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.cell.detection import Detections
+from executive.cell.frame import Detections
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.errors import NoDepth

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from events import at
 
-from executive.cell.detection import Observation
+from executive.cell.frame import Observation
 from executive.cell.protocols import Request
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError, NoDepth, Unavailable, Unreachable

@@ -14,17 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.arm import Goal, Motion
-from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import CellConfig, DetectorConfig
-from executive.cell.detection import Detection
-from executive.cell.frame import Box, Frame
-from executive.cell.objects import ObjectClass
+from executive.cell.frame import Box, Detection, Frame
+from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
 from executive.cell.protocols import Clock, Routes
 from executive.cell.workcell import CellOptions, KeyPath
-from executive.cells.ground_truth import FinalObject
-from executive.cells.log_file import LogFile
 from executive.cells.table_views import find_view_errors
-from executive.cells.without_hardware import CellWithoutHardware, SilentOperator
+from executive.cells.without_hardware import CellWithoutHardware, FinalObject, LogFile, SilentOperator
 from executive.errors import InputError, Unavailable
 from executive.events import Emit, discard_event
 from executive.geometry import GRAVITY, Array, Pose

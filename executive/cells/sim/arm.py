@@ -8,9 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from executive.cell.arm import Goal, Motion, Task
-from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
-from executive.cell.protocols import Clock
+from executive.cell.protocols import STEP, Clock
 from executive.cells.sim import command_log
 from executive.cells.sim.rebuild import WorldRebuilder
 from executive.cells.sim.tool import LIP_LENGTH

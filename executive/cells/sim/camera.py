@@ -10,10 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.bins import Bin
-from executive.cell.config import CameraConfig, CellConfig, DepthConfig, NoiseConfig
+from executive.cell.config import CellConfig
+from executive.cell.device_config import CameraConfig, DepthConfig, NoiseConfig
 from executive.cell.frame import Frame
 from executive.cell.layout import compute_max_pile_height
+from executive.cell.objects import Bin
 from executive.cell.protocols import Clock
 from executive.cells.sim.renderer import CELL_LIGHT, FixedViewRenderer, Image, Light, RenderedImage, render
 from executive.cells.sim.world import World

@@ -6,11 +6,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import CellConfig
+from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
-from executive.cells.ground_truth import FinalObject
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.camera import ArmOcclusion, SimCamera
 from executive.cells.sim.collision import ClearanceChecker
@@ -23,7 +22,7 @@ from executive.cells.sim.spawn import build_initial_world, derive_seeds
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.visuals import SimVisuals
 from executive.cells.sim.world import World
-from executive.cells.without_hardware import CellWithoutHardware
+from executive.cells.without_hardware import CellWithoutHardware, FinalObject
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.text.file_search import get_shipped_folder

@@ -15,9 +15,8 @@ import numpy as np
 import pybullet
 
 from executive.cell.arm import Task
-from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
-from executive.cell.objects import ObjectClass, Obstacle
+from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
 from executive.cells.sim.world import DISTANCE, JOINT_AXIS, LINK_A, POSITION_B, World, name_load
 from executive.errors import Blocked
 from executive.geometry import Array

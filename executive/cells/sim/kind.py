@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.clock import StepClock
 from executive.cell.config import CellConfig
-from executive.cell.protocols import Routes
+from executive.cell.protocols import Routes, StepClock
 from executive.cell.workcell import CellOptions, KeyPath, Workcell
 from executive.cells.sim.camera import ArmOcclusion, SimCamera, get_camera_pose
 from executive.cells.sim.collision import ClearanceChecker

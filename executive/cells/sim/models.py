@@ -19,11 +19,11 @@ import pybullet_data
 from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.cell.clock import STEP
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.frame import Box
 from executive.cell.layout import build_object_class
 from executive.cell.objects import ObjectClass
+from executive.cell.protocols import STEP
 from executive.cell.workcell import KeyPath
 from executive.cells.sim import model_files
 from executive.cells.sim.model_files import find_model, make_rotation

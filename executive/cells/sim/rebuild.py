@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell.clock import STEP
+from executive.cell.protocols import STEP
 from executive.cells.sim import command_log
 from executive.cells.sim.command_log import Command
 from executive.cells.sim.tool import SuctionTool

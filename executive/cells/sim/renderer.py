@@ -11,7 +11,7 @@ import pybullet
 from numpy.typing import NDArray
 from pydantic import Field
 
-from executive.cell.config import Colour, Section
+from executive.cell.device_config import Colour, Section
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import compute_depths, compute_projection_matrix, compute_view_matrix

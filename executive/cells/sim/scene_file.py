@@ -11,18 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field
 
-from executive.cell.config import (
+from executive.cell.config import CellConfig, ObjectConfig
+from executive.cell.device_config import (
+    POSE_AND_FOV_KEYS,
     CalibrationConfig,
     CameraConfig,
-    CellConfig,
     Colour,
+    Fraction,
+    Natural,
     NoiseConfig,
-    ObjectConfig,
     Section,
+    TransformConfig,
+    check_ascending,
 )
-from executive.cell.config.calibration import TransformConfig
-from executive.cell.config.cameras import POSE_AND_FOV_KEYS
-from executive.cell.config.section import Fraction, Natural, check_ascending
 from executive.cells.sim.arrangements import (
     DAMAGED_MODEL_NUMBER,
     UNKNOWN_MODEL_COUNT,

@@ -9,7 +9,6 @@ import numpy as np
 
 from executive.cell.config import CellConfig
 from executive.cell.workcell import KeyPath
-from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import (
     DECLARED_SCENE,
@@ -19,6 +18,7 @@ from executive.cells.sim.scene_file import (
     draw_unknown_models,
 )
 from executive.cells.sim.world import World
+from executive.cells.without_hardware import UNKNOWN_LABEL
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
 

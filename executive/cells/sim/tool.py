@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from executive.cell.config import ToolConfig
+from executive.cell.device_config import ToolConfig
 from executive.cells.sim import command_log
 from executive.cells.sim.world import POSITION_A, World
 from executive.geometry import Array, Pose

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import pybullet
 
-from executive.cell.visuals import Shape
+from executive.cell.workcell import Shape
 from executive.cells.sim.models import get_inertial_pose
 from executive.cells.sim.world import World
 from executive.geometry import Pose
@@ -24,7 +24,7 @@ _SHAPE_KINDS = {
 
 
 class SimVisuals:
-    """Shapes of all bodies except the floor; implements `executive.cell.visuals.Visuals`.
+    """Shapes of all bodies except the floor; implements `executive.cell.workcell.Visuals`.
 
     A call of `poses` takes about 0.3 ms.
 

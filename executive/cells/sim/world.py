@@ -18,9 +18,10 @@ import pybullet
 from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.cell.clock import STEP
-from executive.cell.config import BinConfig, CellConfig, Colour, ObjectConfig
+from executive.cell.config import BinConfig, CellConfig, ObjectConfig
+from executive.cell.device_config import Colour
 from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, list_bin_boxes
+from executive.cell.protocols import STEP
 from executive.cells.sim import command_log
 from executive.cells.sim.command_log import CommandLog
 from executive.cells.sim.model_files import find_model

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import BinConfig, CellConfig, ObjectConfig
+from executive.cell.objects import BIN_THICKNESS
 from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.geometry import Array

@@ -10,7 +10,8 @@ from typing import TypeVar
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from executive.cell.config import CameraConfig, DetectorConfig, Section
+from executive.cell.config import DetectorConfig
+from executive.cell.device_config import CameraConfig, Section
 from executive.cell.protocols import Clock
 from executive.cell.workcell import KeyPath
 from executive.errors import InputError

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from executive.cell.config import DetectorConfig
-from executive.cell.detection import Answer, Detection
-from executive.cell.frame import Frame
+from executive.cell.frame import Answer, Detection, Frame
 from executive.cell.protocols import Detector
 from executive.perception.detectors.detector_registry import DetectorOptions, OptionErrors
 from executive.perception.detectors.requests import ChangedRequest, DetectorContext

@@ -19,8 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.detection import Detection
-from executive.cell.frame import Box
+from executive.cell.frame import Box, Detection
 from executive.errors import InputError, Unavailable
 from executive.perception.detectors.views import remove_duplicates
 from executive.processes import build_command

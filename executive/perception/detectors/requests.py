@@ -12,9 +12,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.config import CameraConfig, DetectorConfig
-from executive.cell.detection import Answer, Detection, ErrorRates
-from executive.cell.frame import Frame
+from executive.cell.config import DetectorConfig
+from executive.cell.device_config import CameraConfig
+from executive.cell.frame import Answer, Detection, ErrorRates, Frame
 from executive.cell.protocols import Clock, Detector, Request
 from executive.errors import DeadlinePassed, Unavailable
 from executive.perception.detectors.views import Region, list_regions

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from executive.cell.config import DetectorConfig
-from executive.cell.detection import Detection
+from executive.cell.frame import Detection
 from executive.errors import InputError
 from executive.perception.detectors import onnx_model
 from executive.perception.detectors.detector_registry import (

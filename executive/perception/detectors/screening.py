@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from executive.cell.detection import Answer, Detection
-from executive.cell.frame import Frame
+from executive.cell.frame import Answer, Detection, Frame
 from executive.cell.objects import ObjectClass
 from executive.cell.protocols import Detector
 from executive.errors import Crowded, Unavailable

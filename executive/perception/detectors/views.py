@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.detection import Detection
-from executive.cell.frame import Box
+from executive.cell.frame import Box, Detection
 from executive.geometry import Array
 
 Region = tuple[int, int, int, int]

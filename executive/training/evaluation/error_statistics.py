@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.detection import Detection
-from executive.cell.frame import Box, Frame
+from executive.cell.frame import Box, Detection, Frame
 from executive.cell.protocols import Localizer
 from executive.errors import NoDepth
 from executive.geometry import Array

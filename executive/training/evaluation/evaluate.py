@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell.clock import STEP, StepClock
-from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
-from executive.cell.detection import Answer, Detection
-from executive.cell.frame import Box, Frame
-from executive.cell.protocols import Localizer
+from executive.cell.config import CellConfig, DetectorConfig
+from executive.cell.device_config import CameraConfig
+from executive.cell.frame import Answer, Box, Detection, Frame
+from executive.cell.protocols import STEP, Localizer, StepClock
 from executive.errors import Unavailable
 from executive.perception.detectors.detector_registry import build_detectors
 from executive.perception.envelope import FrameRange, compute_frame_statistics

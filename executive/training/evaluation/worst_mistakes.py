@@ -11,8 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.detection import Detection
-from executive.cell.frame import Box
+from executive.cell.frame import Box, Detection
 from executive.training.dataset import LabelledImage
 from executive.training.evaluation.error_statistics import BoxMatch
 

@@ -12,7 +12,7 @@ import trimesh
 import viser
 import websockets.asyncio.server
 
-from executive.cell.visuals import Shape
+from executive.cell.workcell import Shape
 
 CAMERA_POSITION, CAMERA_TARGET = (1.35, -0.68, 0.95), (0.33, 0.0, 0.2)
 """Initial position of the virtual camera, and the point at which it looks, in the world frame [m]."""

@@ -17,7 +17,7 @@ from dataclasses import replace
 from importlib.util import find_spec
 
 from executive.cell.frame import Frame, FrameCaptured
-from executive.cell.visuals import Visuals
+from executive.cell.workcell import Visuals
 from executive.errors import InputError
 from executive.events import FrameSearched, InputRead, TimedEvent
 from executive.mission.outline import make_outline

@@ -12,7 +12,7 @@ import numpy as np
 
 from executive import events
 from executive.cell.frame import Frame
-from executive.cell.visuals import Shape
+from executive.cell.workcell import Shape
 from executive.events import FrameSearched, TimedEvent
 from executive.geometry import Pose
 from executive.record.timeline import Timeline

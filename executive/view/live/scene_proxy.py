@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import aiohttp
 from aiohttp import WSMsgType, web
 
-from executive.cell.visuals import Shape
+from executive.cell.workcell import Shape
 
 if TYPE_CHECKING:
     from executive.view.live.live_scene import LiveScene

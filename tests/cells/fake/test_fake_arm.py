@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from executive.cell.arm import Goal, Motion, Task
-from executive.cell.bins import BIN_THICKNESS
-from executive.cell.clock import STEP
-from executive.cell.objects import Load, Obstacle
+from executive.cell.objects import BIN_THICKNESS, Load, Obstacle
+from executive.cell.protocols import STEP
 from executive.cells.fake.cell import FakeCell, load_empty_cell
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Event, MotionPlanned

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cell.detection import Detections
+from executive.cell.frame import Detections
 from executive.cell.workcell import AUDIT_KEYS, CellOptions
 from executive.cells.fake.cell import FakeCell
 from executive.cells.without_hardware import SilentOperator

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 
 from executive.cell.arm import Goal, Task
-from executive.cell.clock import STEP, StepClock
 from executive.cell.config import CellConfig
+from executive.cell.protocols import STEP, StepClock
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.tool import SuctionTool

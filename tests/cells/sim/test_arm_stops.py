@@ -9,10 +9,10 @@ import pytest
 from rig import Rig
 
 from executive.cell.arm import Goal, Task
-from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.layout import build_object_class
 from executive.cell.objects import Load
+from executive.cell.protocols import STEP
 from executive.motion.trajectory import Trajectory
 from tests.benchmarks.halts import measure_distance
 

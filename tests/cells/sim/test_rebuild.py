@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from executive.cell.clock import STEP
+from executive.cell.protocols import STEP
 from executive.cell.workcell import CellOptions, ResumePoint
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.command_log import JOINT_TARGETS, CommandLog

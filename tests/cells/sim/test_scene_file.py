@@ -17,14 +17,13 @@ from executive.cell.config import CellConfig
 from executive.cell.frame import Frame
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import SHIPPED_ROUTES
-from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.renderer import CELL_LIGHT
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, apply_scene, load_scene
 from executive.cells.sim.spawn import build_initial_world
 from executive.cells.sim.world import World
-from executive.cells.without_hardware import SilentOperator
+from executive.cells.without_hardware import UNKNOWN_LABEL, SilentOperator
 from executive.errors import InputError
 from executive.events import discard_event
 from executive.geometry import Pose

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from executive.cell.config import CellConfig, DepthConfig
+from executive.cell.config import CellConfig
+from executive.cell.device_config import DepthConfig
 from executive.cells.sim.camera import ArmOcclusion, SimCamera, add_depth_noise, get_camera_pose
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.renderer import CELL_LIGHT, render

@@ -7,7 +7,7 @@ import pybullet
 import pytest
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.cell.config import ToolConfig
+from executive.cell.device_config import ToolConfig
 from executive.cells.sim.tool import CupContact, compute_breakaway_force, measure_contact
 from executive.geometry import make_tool_down_pose
 

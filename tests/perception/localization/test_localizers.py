@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from executive.cell.detection import Detection
-from executive.cell.frame import Frame
+from executive.cell.frame import Detection, Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.perception.camera_model import compute_camera_matrix, compute_look_at_pose, project

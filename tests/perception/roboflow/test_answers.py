@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.cell.detection import Detection
+from executive.cell.frame import Detection
 from executive.perception.detectors.roboflow.answers import read_answer, read_output
 from executive.perception.detectors.roboflow.detector import (
     RoboflowOptions,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.cell.detection import Answer, Detection, ErrorRates
+from executive.cell.frame import Answer, Detection, ErrorRates
 from executive.errors import Unavailable
 from executive.training.dataset import LabelledImage
 

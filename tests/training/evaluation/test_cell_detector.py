@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from executive.cell.config import DetectorConfig
-from executive.cell.detection import Answer, Detection
+from executive.cell.frame import Answer, Detection
 from executive.errors import Unavailable
 from executive.training.evaluation import evaluate
 from executive.training.evaluation.evaluate import CellDetector

@@ -7,7 +7,7 @@ from dataclasses import replace
 import cv2
 import pytest
 
-from executive.cell.detection import Detection
+from executive.cell.frame import Detection
 from executive.training.dataset import save_image
 from executive.training.evaluation.error_statistics import is_ignored, match_detections
 from executive.training.evaluation.worst_mistakes import (

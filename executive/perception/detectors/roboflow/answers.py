@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from executive.cell.detection import Detection
+from executive.cell.frame import Detection
 
 MAX_PREDICTIONS = 300
 """Maximum number of predictions in one answer; RF-DETR has 300 queries."""

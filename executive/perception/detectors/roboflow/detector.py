@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from executive.cell.config import DetectorConfig
-from executive.cell.detection import Detection
+from executive.cell.frame import Detection
 from executive.errors import DeadlinePassed, InputError, Unavailable
 from executive.perception.detectors.detector_registry import (
     DetectorOptions,
