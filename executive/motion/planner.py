@@ -26,7 +26,7 @@ from executive.events import Emit, MotionPlanned
 from executive.geometry import Array, Pose
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import JointLimits, Kinematics
-from executive.motion.payload import PayloadLimit
+from executive.motion.optimizer import PayloadLimit
 from executive.motion.search import MotionSearch
 from executive.motion.trajectory import JointLimitError, Trajectory, downsample_path
 from executive.processes import wait_until_done

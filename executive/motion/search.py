@@ -17,17 +17,16 @@ from executive.cell.layout import compute_travel_height
 from executive.cell.protocols import STEP
 from executive.errors import Unreachable
 from executive.geometry import Array, make_tool_down_pose
-from executive.motion.cartesian_line import CartesianLine
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
 from executive.motion.configurations import (
     Candidate,
+    CartesianLine,
     find_candidates,
     find_vertical_waypoints,
     solve_vertical_waypoints,
 )
 from executive.motion.joints import BranchKey, JointLimits, JointState, Kinematics
-from executive.motion.optimizer import OptimizationProblem, Optimizer
-from executive.motion.payload import PayloadLimit
+from executive.motion.optimizer import OptimizationProblem, Optimizer, PayloadLimit
 from executive.motion.trajectory import Connector, JointLimitError, MotionPiece, Trajectory, sample_pieces
 from executive.motion.transcription import SAMPLE_FRACTIONS
 

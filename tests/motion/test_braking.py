@@ -6,9 +6,8 @@ from hypothesis import strategies as st
 from joint_states import positions
 
 from executive.geometry import Array
-from executive.motion.braking import plan_braking
 from executive.motion.joints import JointState
-from executive.motion.trajectory import Trajectory
+from executive.motion.trajectory import Trajectory, plan_braking
 
 STEP = 1 / 240
 

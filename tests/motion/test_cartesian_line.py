@@ -11,8 +11,7 @@ from joint_states import LIMITS, SOONER, passed, peaks, tool_velocities
 
 from executive.cell.arm import Goal
 from executive.geometry import Array
-from executive.motion.cartesian_line import CartesianLine
-from executive.motion.configurations import find_configuration_pairs, solve_vertical_waypoints
+from executive.motion.configurations import CartesianLine, find_configuration_pairs, solve_vertical_waypoints
 from executive.motion.iiwa14_kinematics import Iiwa14
 
 ARM = Iiwa14(0.12, LIMITS.position)

@@ -1,4 +1,4 @@
-"""Of executive/motion/payload.py: how gently a load is carried."""
+"""Of executive/motion/optimizer.py: how gently a load is carried."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from executive.cell.objects import Load, ObjectClass
 from executive.geometry import GRAVITY
 from executive.motion.joints import JointState
-from executive.motion.payload import DISTANCE_PER_ACCELERATION, SAFETY_FACTOR, SAMPLE_STRIDE, PayloadLimit
+from executive.motion.optimizer import DISTANCE_PER_ACCELERATION, SAFETY_FACTOR, SAMPLE_STRIDE, PayloadLimit
 from executive.motion.trajectory import Trajectory
 from executive.motion.transcription import SAMPLE_FRACTIONS, SAMPLES_PER_STEP, STEP_COUNT
 

@@ -17,9 +17,8 @@ from executive.cells.sim.world import BODY_B, LINK_A, NORMAL_FORCE, POSITION_A, 
 from executive.errors import Fault
 from executive.events import Emit, discard_event
 from executive.geometry import Array
-from executive.motion.braking import plan_braking, plan_retreat
 from executive.motion.planner import Planner, PlanningArm
-from executive.motion.trajectory import Trajectory
+from executive.motion.trajectory import Trajectory, plan_braking, plan_retreat
 
 MIN_CONTACT_FORCE = 2.0
 """Minimum force of a detected contact [N], an assumption for joint torque sensors."""

@@ -15,7 +15,7 @@ from executive.mission.findings import Finding, make_error, make_warning, sugges
 from executive.mission.model.mission import Mission
 from executive.mission.model.values import Literal, LocatedName
 from executive.mission.parse.cell_file import CellFile
-from executive.motion.payload import MIN_LIFT_ACCELERATION, SAFETY_FACTOR
+from executive.motion.optimizer import MIN_LIFT_ACCELERATION, SAFETY_FACTOR
 from executive.tree.keys import Key
 
 _LIMIT_KEY = Key(doc="Maximum number of objects.", ge=1, value_type=int)

@@ -11,7 +11,7 @@ from rig import Rig
 
 from executive.cell.arm import Goal
 from executive.errors import Fault
-from executive.motion.braking import RETREAT_TIME
+from executive.motion.trajectory import RETREAT_TIME
 
 OVER = Goal((0.5, 0.1, 0.15))
 BESIDE = Goal((0.5, -0.1, 0.15))

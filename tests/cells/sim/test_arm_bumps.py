@@ -13,8 +13,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.layout import build_object_class
 from executive.cell.objects import Load, Obstacle
 from executive.geometry import Array
-from executive.motion.braking import RETREAT_TIME
-from executive.motion.trajectory import Trajectory
+from executive.motion.trajectory import RETREAT_TIME, Trajectory
 from tests.benchmarks.halts import measure_distance
 
 LEFT, RIGHT = Goal((0.5, 0.25, 0.15)), Goal((0.5, -0.2, 0.15))
