@@ -14,8 +14,8 @@ from executive.cell.frame import Detections, ErrorRates, Observation
 from executive.cell.objects import BIN_THICKNESS, Bin, Quotas, is_quota_reached
 from executive.cell.protocols import Presence, Routes
 from executive.geometry import Array
-from executive.ledger.association import MAX_STANDARD_DEVIATIONS
 from executive.ledger.item import ItemRecord, ItemRecords, State
+from executive.ledger.look import MAX_STANDARD_DEVIATIONS
 
 WALL_MARGIN = 0.035
 """Minimum distance from the walls at which an object that lands in a bin certainly stays there [m]."""

@@ -1,11 +1,134 @@
-"""Final states of the items at the end of a run, and their counts."""
+"""Decisions whether the evidence about an item suffices, and final states of the items."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 
-from executive.ledger.certainty import Certainty
+from executive.cell.config import LedgerConfig
 from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, State
+
+MIN_EXISTENCE_PROBABILITY = 0.9
+"""Minimum probability of existence of an item that is picked, or matched to a moved item."""
+MIN_P_VALUE = 0.01
+"""Minimum p-value of the class-consistency test (`Belief.confusion_p_value`) of an item that is sorted."""
+MAX_P_VALUE_TO_REJECT = 0.001
+"""Upper limit of the p-value of an item that is rejected because the looks disagree about its class."""
+RETRY_STANDARD_ERROR_FACTOR = 2 / 3
+"""Maximum standard error of an item's position after a failed grasp, as a fraction of `max_position_std`."""
+MIN_MISS_PROBABILITY_OF_PICK = 0.1
+"""Minimum miss probability (`Belief.miss_probability`) of an item that is picked."""
+MIN_LOOKS_TO_REJECT = 40
+"""Minimum number of looks at an item that is rejected because the looks disagree about its class."""
+MIN_CONTRADICTIONS_TO_REJECT = 3
+"""Minimum number of looks that contradict the class (`ItemRecord.contradiction_count`) of a rejected item."""
+MIN_REPEATS_FOR_SATURATION = 2
+"""Number of repeated classes after which more looks from a viewpoint add hardly any evidence."""
+MAX_CLASS_ERROR_FOR_TOUCH = 0.2
+"""Maximum class error of an item that the tool may touch to determine the class by the height."""
+MIN_UNCERTAIN_LOOKS_TO_REJECT = 10
+"""Minimum number of looks in a row with only doubtful detections of a rejected item."""
+
+
+@dataclass(frozen=True)
+class Certainty:
+    """Decides which items are certain enough to be sorted, and which are rejected.
+
+    Attributes:
+        config: Thresholds of the ledger, from the cell file.
+        labels_with_unique_height: Classes whose height distinguishes them from all others.
+    """
+
+    config: LedgerConfig
+    labels_with_unique_height: Collection[str]
+
+    def is_certain(self, record: ItemRecord) -> bool:
+        """Return True if an item's existence, class and position are certain enough to touch the item.
+
+        After a failed grasp, the position must be known more precisely.
+        """
+        belief = record.belief
+        error_factor = RETRY_STANDARD_ERROR_FACTOR if record.failed_pick_count else 1.0
+        return (
+            belief.existence_probability >= MIN_EXISTENCE_PROBABILITY
+            and record.contradiction_count <= belief.look_count
+            and belief.miss_probability >= MIN_MISS_PROBABILITY_OF_PICK
+            and self.is_class_certain(record)
+            and belief.confusion_p_value >= MIN_P_VALUE
+            and math.hypot(record.standard_error, record.bias_std)
+            <= error_factor * self.config.max_position_std
+        )
+
+    def is_class_certain(self, record: ItemRecord) -> bool:
+        """Return True if an item's class is certain enough to touch the item.
+
+        A larger class error is permitted if further looks from the same viewpoint cannot prove the class, but
+        the height of a touch can.
+        """
+        is_saturated = record.belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
+        has_unique_height = record.label in self.labels_with_unique_height
+        max_error = self.config.max_class_error
+        if is_saturated and has_unique_height:
+            max_error = MAX_CLASS_ERROR_FOR_TOUCH
+        return record.belief.class_error <= max_error
+
+    def may_be_on_table(self, record: ItemRecord) -> bool:
+        """Return True if an item in the state SEEN may still lie on the table."""
+        may_exist = record.belief.existence_probability > self.config.max_miss_probability
+        return record.state is State.SEEN and may_exist and not self.is_position_empty(record)
+
+    def is_position_empty(self, record: ItemRecord) -> bool:
+        """Return True if an item's position is almost certainly empty, because looks have missed the item."""
+        return record.belief.miss_probability <= self.config.max_miss_probability
+
+    def reject_if_uncertain(self, record: ItemRecord, *, is_unmoved: bool) -> None:
+        """Reject an item in the state SEEN if more looks are unlikely to make the item certain.
+
+        `is_unmoved` is True if the item cannot have moved since its last detection.
+        """
+        belief = record.belief
+        is_certain = is_unmoved and self.is_certain(record)
+        if is_certain:
+            belief.low_confidence_count = 0
+        if record.state is not State.SEEN:
+            return
+        if belief.look_count >= MIN_LOOKS_TO_REJECT and belief.confusion_p_value < MAX_P_VALUE_TO_REJECT:
+            counts = ", ".join(f"{count} {label}" for label, count in belief.label_counts.most_common())
+            record.set_state(State.REJECTED, f"looks disagree about its class: {counts}")
+        elif self._needs_other_viewpoint(record):
+            record.set_state(
+                State.REJECTED,
+                f"{belief.look_count} looks from one pose leave a probability of {belief.class_error:.1%} "
+                f"that it is no {record.label}; at most {self.config.max_class_error:.1%} is allowed",
+            )
+        elif not is_certain and (
+            belief.low_confidence_count >= MIN_UNCERTAIN_LOOKS_TO_REJECT
+            or record.contradiction_count >= max(MIN_CONTRADICTIONS_TO_REJECT, belief.look_count + 1)
+        ):
+            details = f": {record.last_contradiction}" if record.last_contradiction else ""
+            record.set_state(State.REJECTED, REASON_UNCERTAIN + details)
+            # A rejected item counts as existing, so that the end of the run does not discard it as a phantom.
+            belief.log_odds = max(belief.log_odds, 0.0)
+
+    def register_low_touch(self, record: ItemRecord) -> bool:
+        """Count a touch below the height of the class; return False if the touch contradicts the class.
+
+        The first low touch is no contradiction if the looks prove the class: the cup may have missed the top.
+        """
+        record.low_touch_count += 1
+        return record.low_touch_count == 1 and record.belief.class_error <= self.config.max_class_error
+
+    def _needs_other_viewpoint(self, record: ItemRecord) -> bool:
+        """Return True if only looks from a second viewpoint can prove the class of an item."""
+        belief = record.belief
+        return (
+            belief.class_error > self.config.max_class_error
+            and belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
+            and len(belief.last_label_by_viewpoint) == 1
+            and record.label not in self.labels_with_unique_height
+        )
+
 
 MIN_EMPTY_PROBES = 3
 """Minimum number of descents that touched only the table (`ItemRecord.empty_probe_count`) at a phantom."""

@@ -17,13 +17,12 @@ from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
 from executive.ledger import outcomes
-from executive.ledger.association import AMBIGUITY_FACTOR
 from executive.ledger.belief import make_viewpoint_key
 from executive.ledger.bin_contents import BinContents, find_probable_bin
-from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage, Staleness
 from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
-from executive.ledger.look import LookUpdate, make_look_event
+from executive.ledger.look import AMBIGUITY_FACTOR, LookUpdate, make_look_event
+from executive.ledger.outcomes import Certainty
 from executive.perception.evidence import (
     compute_weight_log_ratios,
     describe_weight,

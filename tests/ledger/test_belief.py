@@ -13,10 +13,10 @@ from ledger_bench import Bench
 from executive.cell.frame import Detection, ErrorRates, Observation
 from executive.cell.objects import ObjectClass
 from executive.geometry import GRAVITY
-from executive.ledger.association import compute_association_distance
 from executive.ledger.belief import Belief
 from executive.ledger.bin_contents import update_bin_log_odds
 from executive.ledger.item import ItemRecord
+from executive.ledger.look import compute_association_distance
 from executive.perception.evidence import compute_weight_log_ratios
 
 GOOD = ErrorRates(threshold=0.5, miss_rate=0.02, confusion_rate=0.0025, false_detections=0.02, jitter=0.7)
