@@ -181,7 +181,7 @@ class Answer:
     """Result of a detector for one frame: its detections, grouped by certainty.
 
     A detector puts all detections into `confident`. Before a skill reads the answer, the function
-    `executive.perception.detectors.screening.screen_answer` moves detections to `doubtful` and `unknown`.
+    `executive.perception.detectors.requests.screen_answer` moves detections to `doubtful` and `unknown`.
 
     Attributes:
         detector: Name of the detector in the cell file.

@@ -23,7 +23,7 @@ from executive.geometry import Array
 from executive.ledger.item import ItemRecord, State
 from executive.ledger.tracker import Tracker
 from executive.perception.camera_model import MountedCamera
-from executive.perception.detectors.screening import screen_detectors
+from executive.perception.detectors.requests import screen_detectors
 
 UNKNOWN_LABEL = "unknown"
 """Label of an object without a class."""

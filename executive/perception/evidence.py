@@ -15,8 +15,7 @@ from executive.cell.frame import Box, Detection, Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import GRAVITY, Array
-from executive.perception.camera_model import project
-from executive.perception.depth_image import measure_top_height
+from executive.perception.camera_model import measure_top_height, project
 
 MAX_TOUCH_HEIGHT_ERROR = 0.003
 """Maximum difference between the height of a touch and the height of a class [m]; 52 touches of the mission

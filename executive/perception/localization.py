@@ -13,8 +13,7 @@ from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception import evidence
-from executive.perception.camera_model import compute_pixel_ray, intersect_plane
-from executive.perception.depth_image import measure_top_height
+from executive.perception.camera_model import compute_pixel_ray, intersect_plane, measure_top_height
 
 RayTest = Callable[[Array, Array], Array | None]
 """Function of origin `(3,)` [m] and direction `(3,)` of a ray; returns the first hit `(3,)` [m], or None."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined
 
 from executive.errors import InputError
-from executive.perception.detectors.onnx_model import read_labels
+from executive.perception.detectors.rfdetr import read_labels
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.evaluation.evaluate import evaluate_model, find_label_file
 from executive.training.evaluation.metrics import Evaluation

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
+from executive.perception.detectors.rfdetr import LABELS_PATH, MODEL_PATH
 from executive.perception.envelope import read_measurements
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 

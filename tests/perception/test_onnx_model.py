@@ -10,9 +10,14 @@ import pytest
 from onnx_files import make_model
 
 from executive.errors import InputError, Unavailable
-from executive.perception.detectors import onnx_model
-from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
-from executive.perception.detectors.onnx_model import OnnxModel, find_model_errors, read_labels
+from executive.perception.detectors import rfdetr as onnx_model
+from executive.perception.detectors.rfdetr import (
+    LABELS_PATH,
+    MODEL_PATH,
+    OnnxModel,
+    find_model_errors,
+    read_labels,
+)
 
 
 @pytest.fixture(scope="module")

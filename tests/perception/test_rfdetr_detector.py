@@ -10,9 +10,8 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.cell.frame import Detection
 from executive.errors import InputError
-from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH, EmbeddedDetector
 from executive.perception.detectors.requests import DetectorContext
-from executive.perception.detectors.rfdetr import RfdetrDetector
+from executive.perception.detectors.rfdetr import LABELS_PATH, MODEL_PATH, EmbeddedDetector, RfdetrDetector
 
 ONNX = str(MODEL_PATH)
 

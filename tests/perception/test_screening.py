@@ -13,7 +13,7 @@ from executive.cell.frame import Answer, Detection, ErrorRates, Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import Crowded, Unavailable
 from executive.geometry import Pose
-from executive.perception.detectors.screening import MAX_BOXES, screen_answer, screen_detectors
+from executive.perception.detectors.requests import MAX_BOXES, screen_answer, screen_detectors
 
 RATES = ErrorRates(threshold=0.5, miss_rate=0.02, confusion_rate=0.0025, false_detections=0.02, jitter=0.7)
 VISIBLE = np.ones((20, 20), bool)

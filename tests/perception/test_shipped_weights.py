@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from executive.mission.parse.cell_file import load_cell
-from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
-from executive.perception.detectors.onnx_model import read_labels
+from executive.perception.detectors.rfdetr import LABELS_PATH, MODEL_PATH, read_labels
 
 
 def test_the_weights_fit_into_a_package_and_a_card_goes_with_them(missions):

@@ -38,7 +38,7 @@ def test_a_model_restored_from_its_export_gives_the_same_answers(tmp_path):
     import onnx
     import onnxruntime
 
-    from executive.perception.detectors.embedded import MODEL_PATH
+    from executive.perception.detectors.rfdetr import MODEL_PATH
     from executive.training.model import compress_weights, export_model, restore_model
 
     exported = export_model(restore_model(MODEL_PATH), tmp_path)
