@@ -7,7 +7,7 @@ from contextlib import closing
 from pathlib import Path
 
 from executive.cell.workcell import CellOptions, ResumePoint, Workcell
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.cells.without_hardware import SilentOperator
 from executive.events import discard_event
 from executive.mission.load import LoadedMission

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 from guide_blocks import GUIDES, ROOT, TUTORIAL, blocks, files, read, shown, transcripts
 
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.cells.sim.scene_file import (
     load_scene,
 )

@@ -20,10 +20,9 @@ from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.device_config import CameraConfig
 from executive.cell.frame import Detection, Frame
 from executive.cell.protocols import Clock
-from executive.cells.sim.camera import SimCamera
+from executive.cells.sim.camera import Image, SimCamera
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import compute_bounding_box, load_mesh
-from executive.cells.sim.renderer import Image
 from executive.cells.sim.world import World
 from executive.cells.without_hardware import UNKNOWN_LABEL
 from executive.geometry import Array

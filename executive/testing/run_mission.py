@@ -11,7 +11,7 @@ from typing import Any
 from py_trees.visitors import VisitorBase
 
 from executive.cell.workcell import Accounts, Workcell, find_innermost_cell
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.errors import InputError
 from executive.events import FaultInjected, NodeEnded, NodeStarted, Observer, RunEnded, TimedEvent
 from executive.mission.load import load_mission

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from executive.cell.workcell import Workcell, find_innermost_cell
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 

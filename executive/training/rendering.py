@@ -23,14 +23,21 @@ from executive.cell.config import CellConfig
 from executive.cell.frame import Box
 from executive.cells.sim import arrangements
 from executive.cells.sim.arrangements import SceneObject
-from executive.cells.sim.camera import add_depth_noise, add_noise, get_camera_pose
+from executive.cells.sim.camera import (
+    CELL_LIGHT,
+    Image,
+    RenderedImage,
+    add_depth_noise,
+    add_noise,
+    get_camera_pose,
+    render,
+)
 from executive.cells.sim.models import (
     compute_bounding_box,
     compute_silhouette_area,
     find_model_errors,
     load_mesh,
 )
-from executive.cells.sim.renderer import CELL_LIGHT, Image, RenderedImage, render
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, build_world
 from executive.cells.sim.spawn import spawn_objects
 from executive.cells.sim.world import WOOD_TEXTURE

@@ -13,9 +13,9 @@ import numpy as np
 import PIL.Image
 
 from executive.cell.config import CellConfig
+from executive.cells.sim.camera import Image, Light, render
 from executive.cells.sim.command_log import RUN_STEP, read_commands
 from executive.cells.sim.rebuild import WorldRebuilder
-from executive.cells.sim.renderer import Image, Light, render
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import build_initial_world
 from executive.cells.sim.tool import SuctionTool

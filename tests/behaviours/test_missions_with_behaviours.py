@@ -11,7 +11,7 @@ import pytest
 from guide_blocks import blocks
 from py_trees.blackboard import Blackboard
 
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.errors import InputError
 from executive.events import NodeEnded, TimedEvent
 from executive.mission.findings import MissionError

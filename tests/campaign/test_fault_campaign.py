@@ -18,7 +18,7 @@ from executive.campaign.faults.fault_list import INJECTED_MESSAGE, FaultLister, 
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.campaign.pool import JobOptions
 from executive.cell.workcell import AUDIT_KEYS
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.errors import InputError
 from executive.events import RunEnded
 from executive.mission.flow_analysis import UnhandledFailure

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.cells.sim.cell import SimCell
 from executive.cells.table_views import find_view_errors
 from executive.mission.parse.cell_file import load_cell, read_cell

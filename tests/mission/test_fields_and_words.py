@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.events import NodeEnded
 from executive.mission.findings import MissionError
 from executive.mission.load import load_mission

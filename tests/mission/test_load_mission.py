@@ -10,7 +10,7 @@ from unittest.mock import Mock
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.errors import InputError
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.errors import InputError
 from executive.mission.findings import MissionError
 from executive.mission.load import load_mission

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.cell.frame import Answer
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.plugins import load_cell_kind
 from executive.testing.faults import (
     Effect,

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from executive.cell.workcell import Workcell
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.events import ItemChanged, MotionPlanned, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import load_cell_kind, load_skills

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.events import RunEnded
 from executive.mission.load import load_mission
 from executive.plugins import load_skills

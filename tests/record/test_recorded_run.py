@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cell.json_values import to_json
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.cli.main import main
 from executive.errors import InputError
 from executive.events import RunEnded, RunStarted, TargetSelected

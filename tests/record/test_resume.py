@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from executive.cell.json_values import to_json
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.errors import InputError
 from executive.events import InputRead, ItemChanged, TimedEvent, ToolCommanded
 from executive.mission.load import LoadedMission, load_mission

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from py_trees.blackboard import Blackboard
 
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import load_skills
 from executive.record.recorder import Trace

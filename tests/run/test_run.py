@@ -7,7 +7,7 @@ from typing import Any
 
 from py_trees.common import Status
 
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.events import Event, RequestGiven, RunEnded, TimedEvent, ToolCommanded
 from executive.mission.load import load_mission
 from executive.plugins import load_skills

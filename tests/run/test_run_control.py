@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.errors import Fault
 from executive.events import Event, FaultRaised, ItemChanged, RunEnded, TimedEvent
 from executive.mission.load import load_mission

@@ -8,7 +8,7 @@ import at_hand
 import pytest
 
 from executive.cell.objects import Target
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 
 
 @pytest.fixture(autouse=True)

@@ -10,7 +10,7 @@ from at_hand import look
 
 from executive.cell.arm import Goal
 from executive.cell.workcell import CellOptions
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.cells.without_hardware import SilentOperator
 from executive.testing.run_skill import SkillResult, run_skill
 from skills.items import Defer, ListItems

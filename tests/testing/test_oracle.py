@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from executive.cell.workcell import CellOptions
-from executive.cells.fake.cell import SHIPPED_ROUTES
+from executive.cells.fake import SHIPPED_ROUTES
 from executive.cells.without_hardware import SilentOperator
 from executive.events import discard_event
 from executive.geometry import Pose

@@ -20,8 +20,7 @@ from executive.cells.sim.rebuild import WorldRebuilder
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import build_initial_world, derive_seeds
 from executive.cells.sim.tool import SuctionTool
-from executive.cells.sim.visuals import SimVisuals
-from executive.cells.sim.world import World
+from executive.cells.sim.world import SimVisuals, World
 from executive.cells.without_hardware import CellWithoutHardware, FinalObject
 from executive.errors import InputError
 from executive.events import Emit

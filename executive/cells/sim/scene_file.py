@@ -30,7 +30,7 @@ from executive.cells.sim.arrangements import (
     load_unknown_model,
     scale_model,
 )
-from executive.cells.sim.renderer import Light
+from executive.cells.sim.camera import Light
 from executive.cells.sim.world import PATTERN_COUNT, PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE, World
 from executive.errors import InputError
 from executive.geometry import Pose

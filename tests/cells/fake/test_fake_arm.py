@@ -10,7 +10,7 @@ import pytest
 from executive.cell.arm import Goal, Motion, Task
 from executive.cell.objects import BIN_THICKNESS, Load, Obstacle
 from executive.cell.protocols import STEP
-from executive.cells.fake.cell import FakeCell, load_empty_cell
+from executive.cells.fake import FakeCell, load_empty_cell
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Event, MotionPlanned
 from executive.geometry import Array

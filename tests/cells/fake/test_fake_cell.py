@@ -11,7 +11,7 @@ import pytest
 from executive.cell.config import CellConfig
 from executive.cell.frame import Detections
 from executive.cell.workcell import AUDIT_KEYS, CellOptions
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.cells.without_hardware import SilentOperator
 from executive.errors import InputError
 from executive.mission.parse.cell_file import load_cell

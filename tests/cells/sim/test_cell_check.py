@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.kind import find_pose_errors
 from executive.motion.arms import build_kinematics

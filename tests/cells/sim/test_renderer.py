@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.sim.camera import get_camera_pose
-from executive.cells.sim.renderer import CELL_LIGHT, FixedViewRenderer, RenderedImage, render
+from executive.cells.sim.camera import CELL_LIGHT, FixedViewRenderer, RenderedImage, get_camera_pose, render
 from executive.cells.sim.world import World
 from executive.geometry import Pose
 from executive.perception.camera_model import compute_calibration

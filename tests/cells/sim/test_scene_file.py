@@ -16,10 +16,10 @@ import yaml
 from executive.cell.config import CellConfig
 from executive.cell.frame import Frame
 from executive.cell.workcell import CellOptions
-from executive.cells.fake.cell import SHIPPED_ROUTES
+from executive.cells.fake import SHIPPED_ROUTES
+from executive.cells.sim.camera import CELL_LIGHT
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.renderer import CELL_LIGHT
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, apply_scene, load_scene
 from executive.cells.sim.spawn import build_initial_world
 from executive.cells.sim.world import World

@@ -8,9 +8,15 @@ import pytest
 
 from executive.cell.config import CellConfig
 from executive.cell.device_config import DepthConfig
-from executive.cells.sim.camera import ArmOcclusion, SimCamera, add_depth_noise, get_camera_pose
+from executive.cells.sim.camera import (
+    CELL_LIGHT,
+    ArmOcclusion,
+    SimCamera,
+    add_depth_noise,
+    get_camera_pose,
+    render,
+)
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.renderer import CELL_LIGHT, render
 from executive.cells.sim.world import World
 from executive.geometry import Pose, rotate_about_z
 from executive.motion.arms import build_kinematics

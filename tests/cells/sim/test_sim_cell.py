@@ -11,7 +11,7 @@ import pytest
 
 from executive.cell.arm import Goal
 from executive.cell.workcell import CellOptions
-from executive.cells.fake.cell import SHIPPED_ROUTES
+from executive.cells.fake import SHIPPED_ROUTES
 from executive.cells.sim.cell import SimCell
 from executive.cells.without_hardware import SilentOperator
 from executive.events import discard_event

@@ -9,8 +9,7 @@ import pytest
 
 from executive.cell.config import CellConfig
 from executive.cells.sim.spawn import spawn_objects
-from executive.cells.sim.visuals import SimVisuals
-from executive.cells.sim.world import World
+from executive.cells.sim.world import SimVisuals, World
 
 
 @pytest.fixture

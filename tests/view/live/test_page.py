@@ -16,7 +16,7 @@ import pytest
 from events import at
 
 from executive.cell.frame import FrameCaptured
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.record.result import Result

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from executive.cells.fake.cell import FakeCell
+from executive.cells.fake import FakeCell
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.record.recorded_run import record_run

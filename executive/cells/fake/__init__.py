@@ -1,1 +1,0 @@
-"""Fake cell: a kinematic cell without physics, for tests of missions and skills."""
