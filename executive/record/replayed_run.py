@@ -15,7 +15,7 @@ from executive.mission.load import LoadedMission
 from executive.record.journal import find_run_end
 from executive.record.recorded_mission import read_mission_of_run
 from executive.record.timeline import get_skill_name
-from executive.replay.input_log import InputLog
+from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import assemble_replay
 from executive.run.resumed_run import ResumedRun
 from executive.skill import Skill

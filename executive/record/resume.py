@@ -17,7 +17,7 @@ from executive.record.recorder import Recorder
 from executive.record.replayed_run import replay_and_compare
 from executive.record.result import Result, is_resumable, read_result
 from executive.record.run_directory import RunDirectory
-from executive.replay.input_log import InputLog
+from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions, assemble_resumed
 from executive.skill import Skill
 

@@ -14,8 +14,7 @@ from executive.events import Observer, RequestGiven, RunStarted
 from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission
 from executive.plugins import load_cell_kind
-from executive.replay.input_log import InputLog
-from executive.replay.replayed_cell import ReplayedCell
+from executive.replay.replayed_cell import InputLog, ReplayedCell
 from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.operator import ScriptedOperator, TerminalOperator
 from executive.run.resumed_run import ResumedRun

@@ -10,8 +10,7 @@ from py_trees.common import Status
 from executive.cell.protocols import Cell
 from executive.errors import Fault
 from executive.events import Observer, RunEnded, RunResumed
-from executive.replay.input_log import Interruption
-from executive.replay.replayed_cell import ReplayedCell
+from executive.replay.replayed_cell import Interruption, ReplayedCell
 from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.run import Run
 from executive.run.run_context import RunContext, brake_arm

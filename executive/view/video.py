@@ -27,7 +27,7 @@ from executive.record.journal import find_run_start, read_journal
 from executive.record.recorded_mission import read_cell
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline import Timeline, get_skill_name
-from executive.replay.input_log import InputLog
+from executive.replay.replayed_cell import InputLog
 
 FRAME_RATE = 10
 """Frames per second of a video."""

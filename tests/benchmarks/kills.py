@@ -28,7 +28,7 @@ from executive.record.replayed_run import replay_and_compare
 from executive.record.result import Result
 from executive.record.resume import resume_run
 from executive.record.run_directory import LATEST_LINK, find_run
-from executive.replay.input_log import InputLog
+from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions
 from executive.testing.world_access import WorldAccess
 from tests.benchmarks.forks import ForkRunner

@@ -25,7 +25,7 @@ from executive.record.replayed_run import ReplayResult, replay_and_compare, repl
 from executive.record.result import Result
 from executive.record.resume import resume_run
 from executive.record.run_directory import find_run
-from executive.replay.input_log import InputLog
+from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions
 from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_mission import run_mission

@@ -13,8 +13,18 @@ from hypothesis.extra.numpy import arrays
 from executive.cell.frame import Answer, Detection, ErrorRates, Frame, Observation
 from executive.cell.protocols import BehaviourStep
 from executive.geometry import Pose, rotate_about_z
-from executive.replay import codecs
-from executive.replay.codecs import Codec, RecordedMotion
+from executive.replay.recording_cell import (
+    ANSWER,
+    ARRAY,
+    BEHAVIOUR_STEP,
+    BOX,
+    FRAME,
+    MOTION,
+    OBSERVATIONS,
+    POSE,
+    Codec,
+    RecordedMotion,
+)
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 few = settings(max_examples=25)
@@ -28,12 +38,12 @@ def back(codec: Codec, answer: Any) -> Any:
 @few
 @given(arrays(np.float64, (3, 2), elements=finite), st.floats(-4, 4))
 def test_numbers_come_back_bit_by_bit(array: np.ndarray, angle: float) -> None:
-    assert np.array_equal(back(codecs.ARRAY, array), array)
+    assert np.array_equal(back(ARRAY, array), array)
     pose = Pose(rotate_about_z(angle), array[:, 0])
-    assert np.array_equal(back(codecs.POSE, pose).rotation, pose.rotation)
-    assert np.array_equal(back(codecs.POSE, pose).position, pose.position)
-    assert back(codecs.MOTION, RecordedMotion(angle)) == RecordedMotion(angle)
-    assert back(codecs.BOX, (1, 2, 3.5, angle)) == (1, 2, 3.5, angle)
+    assert np.array_equal(back(POSE, pose).rotation, pose.rotation)
+    assert np.array_equal(back(POSE, pose).position, pose.position)
+    assert back(MOTION, RecordedMotion(angle)) == RecordedMotion(angle)
+    assert back(BOX, (1, 2, 3.5, angle)) == (1, 2, 3.5, angle)
 
 
 @few
@@ -44,7 +54,7 @@ def test_a_frame_comes_back_without_its_image(visible: np.ndarray, change_count:
         7, "overhead", np.full((*size, 3), 9, np.uint8), np.ones(size), np.eye(3) / 3, Pose.identity(), 1 / 3,
         visible, change_count,
     )  # fmt: skip
-    read = back(codecs.FRAME, frame)
+    read = back(FRAME, frame)
     assert (read.id, read.camera, read.stamp, read.change_count) == (7, "overhead", 1 / 3, change_count)
     assert np.array_equal(read.visible, visible)
     assert np.array_equal(read.matrix, frame.matrix)
@@ -61,7 +71,7 @@ some = st.lists(detections, max_size=4).map(tuple)
 @given(some, some, some, finite)
 def test_an_answer_comes_back(found: tuple, doubtful: tuple, unknown: tuple, misses: float) -> None:
     answer = Answer("eye", found, ErrorRates(0.5, misses, 0.1, 0.2, 0.7), doubtful, unknown)
-    assert back(codecs.ANSWER, answer) == answer
+    assert back(ANSWER, answer) == answer
 
 
 @few
@@ -69,7 +79,7 @@ def test_an_answer_comes_back(found: tuple, doubtful: tuple, unknown: tuple, mis
 def test_observations_come_back(
     detection: Detection, position: np.ndarray, std: float, confident: bool, contradiction: str
 ) -> None:
-    (read,) = back(codecs.OBSERVATIONS, [Observation(detection, position, std, confident, contradiction)])
+    (read,) = back(OBSERVATIONS, [Observation(detection, position, std, confident, contradiction)])
     assert np.array_equal(read.position, position)
     others = (read.detection, read.std, read.is_confident, read.contradiction)
     assert others == (detection, std, confident, contradiction)
@@ -78,5 +88,5 @@ def test_observations_come_back(
 def test_collections_that_a_behaviour_wrote_keep_their_types() -> None:
     values = {"place": (0.5, [1]), "seen": {"duck", "cube"}, "nested": [(1, 2)]}
     step = BehaviourStep("SUCCESS", "", values)
-    restored = back(codecs.BEHAVIOUR_STEP, step).values
+    restored = back(BEHAVIOUR_STEP, step).values
     assert restored == {"place": (0.5, [1]), "seen": {"duck", "cube"}}, "JSON cannot restore the nested tuple"

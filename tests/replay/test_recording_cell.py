@@ -14,7 +14,6 @@ from executive.cell.proxy import IS_METHOD
 from executive.cells.fake import FakeCell
 from executive.errors import Fault, Unreachable
 from executive.events import Event, TimedEvent, ToolCommanded
-from executive.replay.input_log import InputLog
 from executive.replay.recording_cell import (
     COMMANDS,
     INPUT_FORMATS,
@@ -22,7 +21,7 @@ from executive.replay.recording_cell import (
     InputRecorder,
     make_recording_cell,
 )
-from executive.replay.replayed_cell import InputReplayer
+from executive.replay.replayed_cell import InputLog, InputReplayer
 
 
 def test_every_member_of_a_part_is_a_question_or_a_command() -> None:

@@ -8,8 +8,7 @@ from events import STEP, at, read, run_started
 from executive.cells.fake import FakeCell
 from executive.errors import Stopped
 from executive.events import RunHalted, TimedEvent
-from executive.replay.input_log import InputLog, Interruption
-from executive.replay.replayed_cell import ReplayedCell
+from executive.replay.replayed_cell import InputLog, Interruption, ReplayedCell
 
 
 def sense(tick: int, name: str, value: object, raised: str = "") -> TimedEvent:

@@ -19,7 +19,7 @@ from executive.events import Event, NodeEnded, NodeStarted, OperatorAsked, Reque
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.record.replayed_run import replay_and_compare
-from executive.replay.input_log import InputLog
+from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions, assemble
 from executive.run.operator import ScriptedOperator, TerminalOperator, parse_request
 from executive.run.run_control import RunControl
