@@ -1,24 +1,24 @@
-"""Plugins: skills, cell kinds and other classes that packages register as entry points.
-
-The entry points of the project in the working directory are found even if the project is not installed.
-"""
+"""Installed skills, cells, detectors and control nodes, from entry points, and software versions."""
 
 from __future__ import annotations
 
 import difflib
 import functools
 import os
+import platform
 import re
 import stat
 import sys
 import traceback
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib import import_module
+from importlib import import_module, metadata
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
+from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from py_trees.behaviour import Behaviour
 
@@ -288,3 +288,33 @@ def _read_project(file: Path) -> Project:
     if not isinstance(table, dict):
         raise InputError(f"{file}: project is not a table; begin it with a line [project]")
     return Project(file, str(table.get("name", "")), table)
+
+
+DISTRIBUTION = "pick-place-executive"
+"""Name of the distribution of this project; `executive` in the package index is another project."""
+
+
+@functools.cache
+def list_versions() -> Mapping[str, str]:
+    """Return the versions by name, without packages that are not installed."""
+    versions = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
+    versions |= {name: find_version(name) for name in (DISTRIBUTION, *list_requirements())}
+    return MappingProxyType({name: version for name, version in versions.items() if version})
+
+
+def list_requirements(extra: str = "") -> tuple[str, ...]:
+    """Return the packages that this project or its `extra` requires; () if the project is not installed."""
+    try:
+        requirements = [Requirement(line) for line in metadata.requires(DISTRIBUTION) or ()]
+    except metadata.PackageNotFoundError:
+        return ()
+    required = [r for r in requirements if r.marker is None or r.marker.evaluate({"extra": extra})]
+    return tuple(r.name for r in required if not extra or "extra" in str(r.marker))
+
+
+def find_version(name: str) -> str:
+    """Return the version of a distribution, or "" if the distribution is not installed."""
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return ""

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from executive.processes import WorkerPool, kill_workers
-from executive.run.signals import HALT_SIGNALS, handle_signals
+from executive.run.run_control import HALT_SIGNALS, handle_signals
 
 Job = TypeVar("Job")
 JobResult = TypeVar("JobResult")

@@ -72,7 +72,7 @@ def check_packages() -> Iterator[CheckResult]:
     """Check the required packages, the packages that provide `cv2`, and the extras."""
     from importlib.metadata import packages_distributions
 
-    from executive.run.versions import DISTRIBUTION, find_version, list_requirements
+    from executive.plugins import DISTRIBUTION, find_version, list_requirements
 
     opencv_packages = sorted(set(packages_distributions().get("cv2", ())))
     if len(opencv_packages) > 1:

@@ -17,8 +17,8 @@ import click
 
 from executive.cli.streams import use_tolerant_streams
 from executive.errors import ExecutiveError, ExitCode, shorten_quotations
-from executive.run.garbage_collection import START_THRESHOLD
-from executive.run.signals import TERMINATION_SIGNALS, handle_signals
+from executive.run.run import START_THRESHOLD
+from executive.run.run_control import TERMINATION_SIGNALS, handle_signals
 
 COMMANDS = (
     "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "sweep",

@@ -13,15 +13,12 @@ from executive.errors import InputError
 from executive.events import Observer, RequestGiven, RunStarted
 from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission
-from executive.plugins import load_cell_kind
+from executive.plugins import list_versions, load_cell_kind
 from executive.replay.replayed_cell import InputLog, ReplayedCell
-from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.operator import ScriptedOperator, TerminalOperator
 from executive.run.resumed_run import ResumedRun
-from executive.run.run import Run
-from executive.run.run_context import RunContext
+from executive.run.run import LookaheadPlanner, Run, RunContext
 from executive.run.run_control import RunControl
-from executive.run.versions import list_versions
 from executive.skill import Skill
 from executive.tree.tree_node import Blackboard, TreeNode
 

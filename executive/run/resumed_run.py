@@ -10,12 +10,10 @@ from py_trees.common import Status
 from executive.cell.protocols import Cell
 from executive.errors import Fault
 from executive.events import Observer, RunEnded, RunResumed
+from executive.plugins import list_versions
 from executive.replay.replayed_cell import Interruption, ReplayedCell
-from executive.run.lookahead_planner import LookaheadPlanner
-from executive.run.run import Run
-from executive.run.run_context import RunContext, brake_arm
+from executive.run.run import LookaheadPlanner, Run, RunContext, brake_arm
 from executive.run.run_control import RunControl
-from executive.run.versions import list_versions
 from executive.tree.skill_leaf import SkillLeaf
 from executive.tree.tree_node import TreeNode, halt
 

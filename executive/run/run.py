@@ -1,24 +1,225 @@
-"""Run of a mission: ticks its tree once in every control step of a work cell."""
+"""Run of a mission: ticks its tree once in every control step, and plans the next motion ahead."""
 
 from __future__ import annotations
 
+import gc
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
+from executive.cell.objects import Item
+from executive.cell.protocols import Cell, StepClock
 from executive.cell.workcell import Accounts, Workcell
 from executive.errors import ExecutiveError, Fault, Stopped
-from executive.events import FaultRaised, Observer, RunEnded, RunHalted, RunStarted
+from executive.events import (
+    Event,
+    FaultRaised,
+    FrameSearched,
+    MotionPlanned,
+    Observer,
+    RunEnded,
+    RunHalted,
+    RunStarted,
+    TargetSelected,
+    TimedEvent,
+    ToolCommanded,
+)
 from executive.ledger.outcomes import is_balanced
-from executive.run.garbage_collection import shorten_collections
-from executive.run.run_context import RunContext, brake_arm
-from executive.run.run_control import RunControl
-from executive.run.signals import halt_on_signals
+from executive.manipulation.motions import make_transport_task
+from executive.manipulation.tool_goals import (
+    make_approach,
+    make_bin_goal,
+    sort_by_tour,
+    sort_pickable_targets,
+)
+from executive.replay.recording_cell import InputRecorder, make_recording_cell
+from executive.run.run_control import RunControl, halt_on_signals
 from executive.tree.tree_node import TreeNode, halt
+
+START_THRESHOLD = 100_000
+"""Number of new objects after which Python collects garbage during the start of a command.
+
+The number is large, because imports create many objects that remain."""
+CONTROL_THRESHOLD = 700
+"""Number of new objects after which Python collects garbage between control steps: the default of Python."""
+
+
+@contextmanager
+def shorten_collections() -> Iterator[None]:
+    """Exclude all existing objects from garbage collection until the context ends.
+
+    Otherwise a collection of all objects would take 0.1 s of a control step.
+    """
+    start_threshold, *_ = gc.get_threshold()
+    gc.freeze()
+    gc.set_threshold(CONTROL_THRESHOLD)
+    try:
+        yield
+    finally:
+        gc.set_threshold(start_threshold)
+        gc.unfreeze()
+
+
+class LookaheadPlanner:
+    """Lets the arm plan the motion that the mission will probably need next.
+
+    When the tool holds an item, the planner plans the transit of the item to its bin. During a transit, the
+    planner plans the approach to the first target of the shortest tour, which the skill `SelectTarget`
+    prefers by default.
+
+    The planner changes no decision, and its reads of the cell are not recorded: a replay needs no planner.
+
+    Args:
+        cell: The real cell, without the recorder of inputs.
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        self._cell = cell
+        self._item_and_bin: tuple[Item, str] | None = None
+        """Last selected target and its bin."""
+        self._grip_tick: int | None = None
+        """Control step of the last command to close the tool; None after the plan of the transit."""
+        self._change_tick: int | None = None
+        """Control step of the last detections or motion; None if the approach has been planned since then."""
+
+    def on_event(self, timed: TimedEvent) -> None:
+        """Update the expected motions from an event of the run."""
+        event = timed.event
+        if isinstance(event, TargetSelected):
+            item, bin = event.item, event.bin
+            # The selection of an item or a bin that does not exist is ignored.
+            items = {target.item for target in self._cell.ledger.find_targets()}
+            self._item_and_bin = (item, bin) if bin in self._cell.bins and item in items else None
+        elif isinstance(event, ToolCommanded):
+            self._grip_tick = timed.tick if event.action == "close" else None
+        elif isinstance(event, FrameSearched | MotionPlanned):
+            self._change_tick = timed.tick
+
+    def plan_next_motion(self, tick: int) -> None:
+        """Plan the next motion if the events of the run make it predictable; called after each tick.
+
+        `tick` is the current control step. Nothing is planned in a control step with new detections, a new
+        motion or a command to grip, because such a control step already has a high computational load.
+        """
+        cell, held_item = self._cell, self._cell.ledger.find_held_item()
+        may_hold = self._grip_tick not in (None, tick) and held_item is None
+        if may_hold and self._item_and_bin and cell.tool.holding:
+            self._grip_tick = None
+            item, bin = self._item_and_bin
+            cell.arm.plan_ahead(make_bin_goal(cell, bin, item), make_transport_task(cell, item))
+        elif self._change_tick not in (None, tick) and held_item is not None and self._is_moving_to_bin():
+            self._change_tick = None
+            pickable_targets = sort_pickable_targets(cell, cell.ledger.find_targets())
+            if targets := sort_by_tour(cell, pickable_targets):
+                cell.arm.plan_ahead(*make_approach(cell, targets[0]))
+
+    def _is_moving_to_bin(self) -> bool:
+        """Return True if the destination of the arm is in a bin."""
+        destination = self._cell.arm.destination
+        return any(bin.contains(destination) for bin in self._cell.bins.values())
+
+
+MAX_BRAKING_TIME = 2.0
+"""Maximum time from the command to brake until the arm is at rest [s]."""
+MAX_BRAKING_ATTEMPTS = 4
+"""Maximum number of commands to brake; a command may fail, because an observer may raise an exception."""
+
+
+class RunContext:
+    """Cell and events of a run.
+
+    The context is created before the work cell, because the work cell emits events during its creation.
+
+    Attributes:
+        tick: Number of the current control step.
+        workcell: Work cell of the run.
+        cell: Cell for the skills, which records each value that a skill reads; its clock shows the start of
+            the control step.
+        planner: Planner of the probable next motion, or None.
+    """
+
+    workcell: Workcell
+    cell: Cell
+
+    def __init__(self, observers: Sequence[Observer] = ()) -> None:
+        self.tick = 0
+        self.planner: LookaheadPlanner | None = None
+        self._observers = list(observers)
+        self._recorder = InputRecorder(self.emit)
+        self._control_period = 0.0
+        """Duration of a control step [s]."""
+        self._clock_offset = 0.0
+        """Time of the cell's clock minus the time of all control steps [s]; 0 in simulation."""
+
+    @property
+    def now(self) -> float:
+        """Time on the run's clock at the start of the current control step [s]."""
+        return self.tick * self._control_period + self._clock_offset
+
+    def connect(self, workcell: Workcell, planner: LookaheadPlanner | None = None) -> None:
+        """Set the work cell and the planner of the run."""
+        self.workcell, self.planner = workcell, planner
+        if planner is not None:
+            self.add_observer(planner.on_event)
+        self._control_period = workcell.cell.clock.step
+        clock = StepClock(lambda: self.now, self._control_period)
+        self.cell = make_recording_cell(workcell.cell, self._recorder, clock, self.emit)
+
+    def add_observer(self, observer: Observer, *, is_first: bool = False) -> None:
+        """Call `observer` with every later event; if `is_first` is True, before all other observers."""
+        self._observers.insert(0 if is_first else len(self._observers), observer)
+
+    def emit(self, event: Event) -> None:
+        """Pass an event with its control step and time to all observers."""
+        timed = TimedEvent(self.tick, round(self.now, 6), event)
+        for observer in self._observers:
+            observer(timed)
+
+    def begin_step(self, tick: int) -> None:
+        """Begin the control step number `tick`, and record the time of the cell's clock."""
+        self.tick = tick
+        self._recorder.begin_step()
+        clock, step_time = self.workcell.cell.clock, tick * self._control_period
+        self._clock_offset = self._recorder.read("clock", lambda: clock.now - step_time)
+
+    def advance(self) -> None:
+        """Execute one control step of the work cell, and begin the next control step."""
+        self.workcell.advance()
+        self.begin_step(self.tick + 1)
+
+    def plan_ahead(self) -> None:
+        """Let the planner plan the probable next motion."""
+        if self.planner is not None:
+            self.planner.plan_next_motion(self.tick)
+
+
+def brake_arm(cell: Cell, advance: Callable[[], None]) -> None:
+    """Brake the arm of a cell until it is at rest; `advance` executes one control step.
+
+    Raises:
+        Fault: The arm is not at rest, or a command to brake failed.
+    """
+    deadline = cell.clock.now + MAX_BRAKING_TIME
+    problems: list[str] = []
+    for _ in range(MAX_BRAKING_ATTEMPTS):
+        try:
+            cell.arm.stop()
+            while not (is_at_rest := cell.arm.at_rest) and cell.clock.now <= deadline:
+                advance()
+        except Exception as error:
+            problems.append(str(error))
+            continue
+        if not is_at_rest:
+            raise Fault(f"the arm is not at rest {MAX_BRAKING_TIME:.0f} s after the command to brake")
+        if problems:
+            raise Fault(problems[0])
+        return
+    raise Fault(f"the arm could not be braked: {problems[-1]}")
 
 
 @dataclass(frozen=True)

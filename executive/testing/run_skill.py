@@ -14,7 +14,7 @@ from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
 from executive.errors import InputError
 from executive.replay.recording_cell import COMMANDS
-from executive.run.run_context import MAX_BRAKING_TIME
+from executive.run.run import MAX_BRAKING_TIME
 from executive.skill import Skill, SkillFailed
 from executive.tree.skill_run import SkillRun
 

@@ -26,8 +26,7 @@ from executive.plugins import load_skills
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions
-from executive.run.run_control import RunControl
-from executive.run.signals import HALT_SIGNALS, halt_on_signals
+from executive.run.run_control import HALT_SIGNALS, RunControl, halt_on_signals
 
 SLOW = pytest.mark.slow
 SETTINGS = SweepSettings(

@@ -10,13 +10,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from executive import plugins as versions
 from executive.cli import doctor
 from executive.cli.doctor import CheckResult
 from executive.cli.main import main
 from executive.errors import InputError
-from executive.plugins import load_skills
-from executive.run import versions
-from executive.run.versions import DISTRIBUTION
+from executive.plugins import DISTRIBUTION, load_skills
 
 
 def find_statuses(results: Iterator[CheckResult]) -> dict[str, str]:

@@ -17,8 +17,7 @@ from executive.events import FrameSearched, MotionPlanned, TargetSelected, Timed
 from executive.manipulation.tool_goals import sort_pickable_targets
 from executive.motion.configurations import ConfigurationPairs, find_configuration_pairs
 from executive.motion.joints import Kinematics
-from executive.run.lookahead_planner import LookaheadPlanner
-from executive.run.run_context import RunContext
+from executive.run.run import LookaheadPlanner, RunContext
 from executive.skill import Skill, SkillFailed
 from skills.approach import Approach
 from skills.grasp import Grasp

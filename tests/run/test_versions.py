@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 
-from executive.run.versions import DISTRIBUTION, find_version, list_requirements, list_versions
+from executive.plugins import DISTRIBUTION, find_version, list_requirements, list_versions
 
 
 def test_names_this_project_python_and_every_package_asked_for_but_no_extras() -> None:
@@ -22,6 +22,6 @@ def test_names_this_project_python_and_every_package_asked_for_but_no_extras() -
 
 def test_markers_decide_what_is_asked_for(monkeypatch):
     lines = ["a>=1", "b; python_version < '3.0'", "c<2; python_version >= '3.10'", "d[x]; extra == 'view'"]
-    monkeypatch.setattr("executive.run.versions.metadata.requires", lambda name: lines)
+    monkeypatch.setattr("executive.plugins.metadata.requires", lambda name: lines)
     assert list_requirements() == ("a", "c")
     assert list_requirements("view") == ("d",)

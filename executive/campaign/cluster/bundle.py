@@ -18,8 +18,7 @@ from executive.errors import InputError
 from executive.mission.text.file_search import find_mission
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.envelope import MEASUREMENT_SUFFIX
-from executive.plugins import CELL_KIND_GROUP, SKILL_GROUP, find_project, list_entries
-from executive.run.versions import DISTRIBUTION
+from executive.plugins import CELL_KIND_GROUP, DISTRIBUTION, SKILL_GROUP, find_project, list_entries
 from executive.tree.node_registry import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
 
 PACKAGES_FOLDER = ".packages"

@@ -16,8 +16,8 @@ from executive.campaign.pool import MAX_CRASHES, JobOptions
 from executive.campaign.results.rows import RunRecord
 from executive.campaign.sweep_job import SweepJob, make_fault_record
 from executive.errors import InputError
-from executive.run.signals import HALT_SIGNALS, handle_signals
-from executive.run.versions import DISTRIBUTION
+from executive.plugins import DISTRIBUTION
+from executive.run.run_control import HALT_SIGNALS, handle_signals
 
 if TYPE_CHECKING:
     from distributed import Client, Future

@@ -20,9 +20,8 @@ from executive.errors import InputError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.text.file_search import read_source
 from executive.perception.envelope import FAKE_KIND, compute_fingerprint
-from executive.plugins import load_cell_kind, load_skills
+from executive.plugins import list_versions, load_cell_kind, load_skills
 from executive.record.run_directory import make_dated_folder
-from executive.run.versions import list_versions
 
 SIDES = ("a", "b")
 """Names of the folders of the two sweeps of a comparison."""

@@ -21,10 +21,10 @@ from executive.cell.workcell import Visuals
 from executive.errors import InputError
 from executive.events import FrameSearched, InputRead, TimedEvent
 from executive.mission.outline import make_outline
+from executive.plugins import DISTRIBUTION
 from executive.processes import build_command
 from executive.record.result import Result
 from executive.run.run import Run
-from executive.run.versions import DISTRIBUTION
 from executive.view.live import page_state
 from executive.view.tree.svg import NodeResult, make_svg
 
