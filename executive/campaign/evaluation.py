@@ -19,7 +19,7 @@ from executive.mission.findings import suggest_choice
 from executive.perception import envelope
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 from executive.perception.localization import CellLocalizer
-from executive.record.atomic_file import write_atomically
+from executive.record.run_directory import write_atomically
 from executive.training.dataset import LabelledImage
 from executive.training.evaluation import evaluate
 from executive.training.evaluation.evaluate import CellDetector

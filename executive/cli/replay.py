@@ -33,9 +33,8 @@ def command(
     with keep_stdout_clean():
         from executive.plugins import load_skills
         from executive.record.journal import read_journal
-        from executive.record.recorded_mission import read_cell
         from executive.record.replayed_run import replay_run
-        from executive.record.run_directory import find_run
+        from executive.record.run_directory import find_run, read_cell
 
         path = find_run(run, runs_folder)
         if video is not None:

@@ -67,11 +67,10 @@ def command(
     )
     with keep_stdout_clean():
         from executive.cell.json_values import to_json
-        from executive.record.diagnosis.diagnosis import format_diagnosis
-        from executive.record.recorded_mission import read_cell
+        from executive.record.diagnosis import format_diagnosis
         from executive.record.recorded_run import GuardedView, RecordOptions, record_run
         from executive.record.result import find_exit_code
-        from executive.record.run_directory import RunDirectory, find_run
+        from executive.record.run_directory import RunDirectory, find_run, read_cell
         from executive.run.assembly import RunOptions
         from executive.view.live.page import LivePage
         from executive.view.report.page import try_write_report
@@ -155,7 +154,7 @@ def _resume(path: Path, run_options: RunOptions, record: RecordOptions) -> tuple
     """Resume an interrupted run; return the result and the start event of the run."""
     from executive.plugins import load_skills
     from executive.record.journal import find_run_start, read_journal
-    from executive.record.resume import resume_run
+    from executive.record.replayed_run import resume_run
 
     result = resume_run(path, load_skills(), run_options, record)
     return result, find_run_start(read_journal(path / "journal.jsonl"), path, "run the mission again")

@@ -52,7 +52,7 @@ def command(
         from executive.mission.load import load_mission
         from executive.mission.outline import make_outline
         from executive.plugins import load_skills
-        from executive.record.recorded_mission import format_tree
+        from executive.record.run_directory import format_tree
         from executive.tree.tree_node import Blackboard
         from executive.view.tree import btcpp, svg, tree_text
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, FrameSearched, NodeEnded, RunEnded, TargetSelected, TimedEvent
-from executive.record.atomic_file import replace_atomically
+from executive.record.run_directory import replace_atomically
 from executive.record.timeline import Timeline, get_skill_name
 
 MAX_STORED_LOOKS = 24

@@ -18,11 +18,10 @@ from executive.events import Observer, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission
 from executive.mission.outline import make_outline
 from executive.mission.text.file_search import read_source
-from executive.record.diagnosis.diagnose import diagnose
-from executive.record.recorded_mission import format_tree
-from executive.record.recorder import Recorder
+from executive.record.diagnose import diagnose
+from executive.record.journal import Recorder
 from executive.record.result import Audit, ItemCounts, Result, is_resumable, list_requests, write_result
-from executive.record.run_directory import SCENE_FILE, RunDirectory, make_dated_folder
+from executive.record.run_directory import SCENE_FILE, RunDirectory, format_tree, make_dated_folder
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run

@@ -13,10 +13,9 @@ from executive.cell.json_values import to_json
 from executive.cell.workcell import AUDIT_KEYS
 from executive.errors import ExecutiveError, ExitCode, explain_os_errors
 from executive.events import RunResumed, RunStatus, TimedEvent
-from executive.record.atomic_file import write_atomically
-from executive.record.diagnosis.diagnosis import Diagnosis
+from executive.record.diagnosis import Diagnosis
 from executive.record.journal import find_run_end
-from executive.record.run_directory import RunDirectory
+from executive.record.run_directory import RunDirectory, write_atomically
 from executive.record.timeline import PlanningTotals, Timeline
 
 QUIT_REQUEST = "quit"

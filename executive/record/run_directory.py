@@ -1,16 +1,61 @@
-"""Run directory: names of its files, creation of the directory, and search for a directory."""
+"""Run directory: names of its files, creation, atomic writing, search, and the recorded mission."""
 
 from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import yaml
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from executive.cell.config import CellConfig
 from executive.errors import InputError, explain_os_errors
-from executive.record.atomic_file import write_atomically
+from executive.events import RunStarted
+from executive.mission.outline import OutlineNode
+from executive.mission.parse.cell_file import CellFile
+from executive.mission.source import Source
+from executive.skill import Skill
+
+if TYPE_CHECKING:
+    from executive.mission.load import LoadedMission
+
+
+@contextlib.contextmanager
+def replace_atomically(path: Path) -> Iterator[Path]:
+    """Yield the path of a temporary file that replaces `path` after the `with` block.
+
+    After an exception in the block, the temporary file is removed.
+
+    Raises:
+        OSError: The file cannot be written; `path` is unchanged.
+    """
+    temporary_path = path.with_name(f".{path.name}.part")
+    try:
+        temporary_path.touch()
+        yield temporary_path
+        temporary_path.replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            temporary_path.unlink()
+        raise
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Replace the content of the file `path` by `text`, and sync the file to the disk.
+
+    Raises:
+        OSError: The file cannot be written; `path` is unchanged.
+    """
+    with replace_atomically(path) as temporary_path, temporary_path.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+
 
 LATEST_LINK = "latest"
 """Name of the link to the last run directory."""
@@ -128,3 +173,62 @@ def _update_latest_link(runs: Path, path: Path) -> None:
     with contextlib.suppress(OSError):
         temporary_link.symlink_to(path.relative_to(runs), target_is_directory=True)
         temporary_link.replace(runs / LATEST_LINK)
+
+
+_NODES_ADAPTER = TypeAdapter(list[OutlineNode], config=ConfigDict(ser_json_inf_nan="strings"))
+"""Encoder and decoder of `tree.json`."""
+
+
+def read_mission_of_run(
+    path: Path, start: RunStarted, skills: Mapping[str, type[Skill]], mission: Path | None = None
+) -> LoadedMission:
+    """Return the mission of a run directory, with the params and the cell of the run.
+
+    Args:
+        path: The run directory.
+        start: Event of the start of the run.
+        skills: Installed skills by name.
+        mission: Mission file that replaces the recorded mission, or None.
+
+    Raises:
+        MissionError: The mission has errors, for instance because installed skills have changed.
+        InputError: A file in the directory cannot be read.
+    """
+    from executive.mission.load import load_mission
+
+    # The recorded cell file already contains the overrides of the cell.
+    overrides = {key: text for key, text in start.overrides.items() if not key.startswith("cell.")}
+    cell_path = Path(start.base) / "cell.yaml"
+    recorded_cell = CellFile(cell_path, read_cell(path), Source(str(cell_path), ""))
+    return load_mission(mission or path / "mission.yaml", skills, overrides, recorded_cell=recorded_cell)
+
+
+def read_cell(path: Path) -> CellConfig:
+    """Return the content of the cell file in the run directory `path`.
+
+    Raises:
+        InputError: The cell file cannot be read.
+    """
+    try:
+        return CellConfig(**yaml.safe_load((path / "cell.yaml").read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError, yaml.YAMLError) as error:
+        raise InputError(f'cannot read the cell file in the run directory "{path}": {error}') from error
+
+
+def format_tree(nodes: Sequence[OutlineNode]) -> str:
+    """Return an outline as the text of `tree.json`; values that JSON cannot represent become strings."""
+    return _NODES_ADAPTER.dump_json(list(nodes), by_alias=True, fallback=str, indent=1).decode() + "\n"
+
+
+def read_tree(path: Path) -> list[OutlineNode]:
+    """Return the outline of the tree of a run from its file `tree.json`.
+
+    Raises:
+        InputError: The file cannot be read or contains no outline.
+    """
+    with explain_os_errors(InputError, f'cannot read the tree "{path}"'):
+        content = path.read_bytes()
+    try:
+        return _NODES_ADAPTER.validate_json(content)
+    except ValidationError as error:
+        raise InputError(f'"{path}" contains no tree of a run: {error.errors()[0]["msg"].lower()}') from error

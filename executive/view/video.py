@@ -22,10 +22,8 @@ from executive.cells.sim.tool import SuctionTool
 from executive.errors import InputError, explain_os_errors
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import compute_camera_matrix, compute_look_at_pose
-from executive.record.atomic_file import replace_atomically
 from executive.record.journal import find_run_start, read_journal
-from executive.record.recorded_mission import read_cell
-from executive.record.run_directory import RunDirectory
+from executive.record.run_directory import RunDirectory, read_cell, replace_atomically
 from executive.record.timeline import Timeline, get_skill_name
 from executive.replay.replayed_cell import InputLog
 

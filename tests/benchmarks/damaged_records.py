@@ -26,9 +26,8 @@ from executive.errors import InputError
 from executive.events import NodeEnded, TimedEvent
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.replayed_run import replay_and_compare
+from executive.record.replayed_run import replay_and_compare, resume_run
 from executive.record.result import Result
-from executive.record.resume import resume_run
 from executive.record.run_directory import LATEST_LINK, RunDirectory, find_run
 from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions

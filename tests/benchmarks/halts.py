@@ -29,8 +29,7 @@ from executive.geometry import Array
 from executive.ledger.outcomes import is_balanced
 from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
-from executive.record.journal import Journal, read_journal
-from executive.record.recorder import Trace
+from executive.record.journal import Journal, Trace, read_journal
 from executive.run.assembly import RunOptions, assemble
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_subject, run_command

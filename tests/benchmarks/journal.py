@@ -9,7 +9,7 @@ from pathlib import Path
 
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.events import TimedEvent
-from executive.record.recorder import Recorder
+from executive.record.journal import Recorder
 from executive.record.run_directory import RunDirectory
 from executive.run.assembly import RunOptions, assemble
 from tests.benchmarks.report import Figures, describe, run_command

@@ -22,12 +22,10 @@ from executive.errors import ExecutiveError
 from executive.events import ItemChanged, NodeEnded, NodeStarted, TimedEvent
 from executive.geometry import Array
 from executive.record.journal import find_run_end, read_journal
-from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import RecordOptions
-from executive.record.replayed_run import replay_and_compare
+from executive.record.replayed_run import replay_and_compare, resume_run
 from executive.record.result import Result
-from executive.record.resume import resume_run
-from executive.record.run_directory import LATEST_LINK, find_run
+from executive.record.run_directory import LATEST_LINK, find_run, read_mission_of_run
 from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions
 from executive.testing.world_access import WorldAccess

@@ -25,7 +25,7 @@ from py_trees.common import Status
 from executive.cell.protocols import Cell
 from executive.cells.fake import FakeCell
 from executive.events import Event, Observer, TimedEvent
-from executive.record.recorder import Recorder
+from executive.record.journal import Recorder
 from executive.record.run_directory import RunDirectory
 from executive.skill import Skill
 from executive.tree.decorators import Timeout

@@ -10,8 +10,8 @@ from executive.cells.fake import FakeCell
 from executive.events import RunEnded
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
-from executive.record.diagnosis.diagnose import diagnose
-from executive.record.diagnosis.diagnosis import Diagnosis
+from executive.record.diagnose import diagnose
+from executive.record.diagnosis import Diagnosis
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 

@@ -23,10 +23,16 @@ from events import (
 from executive import events as kinds
 from executive.errors import Fault, InputError, RecordLost
 from executive.events import InputRead, NodeEnded, NodeStarted, RunResumed, TargetSelected, ToolCommanded
-from executive.record import journal_format
-from executive.record.journal import Journal, find_run_end, read_journal
-from executive.record.journal_format import EVENT_CLASSES, encode_event, make_journal_schema
-from executive.record.recorder import Trace
+from executive.record.journal import (
+    EVENT_CLASSES,
+    Journal,
+    Trace,
+    __file__,
+    encode_event,
+    find_run_end,
+    make_journal_schema,
+    read_journal,
+)
 
 NODE, END = NodeStarted("a"), run_ended()
 FIRST = encode_event(at(1, run_started()))
@@ -237,7 +243,7 @@ def test_every_kind_of_event_comes_back_as_it_was(path):
 
 
 def test_the_schema_that_ships_describes_the_events():
-    shipped = Path(journal_format.__file__).with_name("journal.schema.json")
+    shipped = Path(__file__).with_name("journal.schema.json")
     made = "executive schema --journal > executive/record/journal.schema.json"
     assert json.loads(shipped.read_text(encoding="utf-8")) == make_journal_schema(), f"run: {made}"
 

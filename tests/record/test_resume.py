@@ -21,9 +21,8 @@ from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.replayed_run import ReplayResult, replay_and_compare, replay_run
+from executive.record.replayed_run import ReplayResult, replay_and_compare, replay_run, resume_run
 from executive.record.result import Result
-from executive.record.resume import resume_run
 from executive.record.run_directory import find_run
 from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions

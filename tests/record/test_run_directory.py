@@ -11,9 +11,13 @@ import pytest
 
 from executive.errors import InputError
 from executive.mission.outline import Connection, OutlineNode
-from executive.record.atomic_file import write_atomically
-from executive.record.recorded_mission import format_tree, read_tree
-from executive.record.run_directory import RunDirectory, make_dated_folder
+from executive.record.run_directory import (
+    RunDirectory,
+    format_tree,
+    make_dated_folder,
+    read_tree,
+    write_atomically,
+)
 
 STARTED = datetime(2026, 11, 21, 3, 15, 42)
 

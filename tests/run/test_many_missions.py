@@ -14,7 +14,7 @@ from py_trees.blackboard import Blackboard
 from executive.cells.fake import FakeCell
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import load_skills
-from executive.record.recorder import Trace
+from executive.record.journal import Trace
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import make_oracle_kind
 

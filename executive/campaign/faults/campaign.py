@@ -21,8 +21,8 @@ from executive.ledger.outcomes import is_balanced
 from executive.mission.flow_analysis import UnhandledFailure
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, SubtreeNode
+from executive.record.journal import Recorder
 from executive.record.recorded_run import RecordedRun, make_run_directory
-from executive.record.recorder import Recorder
 from executive.record.result import is_confirmed_by_audit
 from executive.record.timeline import Timeline, group_by_node
 from executive.run.assembly import RunOptions, assemble

@@ -8,8 +8,7 @@ from xml.etree import ElementTree
 
 from executive.campaign.results.rows import RunRow
 from executive.campaign.results.sweep_summary import RepeatCommandFactory
-from executive.record.atomic_file import write_atomically
-from executive.record.run_directory import convert_os_errors
+from executive.record.run_directory import convert_os_errors, write_atomically
 from executive.view.text import replace_invalid_xml_characters
 
 

@@ -10,8 +10,7 @@ from urllib.parse import quote
 
 from executive.campaign.results.rows import describe_variant
 from executive.campaign.results.sweep_summary import Difference, RunPair, SweepResults, VariantSummary
-from executive.record.atomic_file import write_atomically
-from executive.record.run_directory import RunDirectory, convert_os_errors
+from executive.record.run_directory import RunDirectory, convert_os_errors, write_atomically
 from executive.view.report.page import try_write_report
 from executive.view.text import render_template
 

@@ -17,13 +17,11 @@ from markupsafe import Markup
 from executive.errors import ExecutiveError
 from executive.mission.text.file_search import get_shipped_folder
 from executive.perception.evidence import describe_unknown_labels
-from executive.record.atomic_file import write_atomically
-from executive.record.diagnosis.diagnosis import list_labelled_sentences, make_resume_command
+from executive.record.diagnosis import list_labelled_sentences, make_resume_command
 from executive.record.journal import find_run_end, find_run_start, read_journal
 from executive.record.picture_recorder import PALETTE
-from executive.record.recorded_mission import read_tree
 from executive.record.result import is_resumable, list_requests, read_result
-from executive.record.run_directory import RunDirectory, convert_os_errors
+from executive.record.run_directory import RunDirectory, convert_os_errors, read_tree, write_atomically
 from executive.record.timeline import Timeline, find_last_failure, format_counts, group_by_node
 from executive.view.report.activity_times import FAILED_ATTEMPTS, LOOK, WAITING, compute_activity_times
 from executive.view.report.lanes import draw_lanes

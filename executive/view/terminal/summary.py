@@ -9,7 +9,7 @@ from pathlib import Path
 
 from executive.events import ItemChanged
 from executive.perception.evidence import describe_unknown_labels
-from executive.record.diagnosis.diagnosis import format_diagnosis, make_resume_command, wrap_lines
+from executive.record.diagnosis import format_diagnosis, make_resume_command, wrap_lines
 from executive.record.result import Result
 
 

@@ -12,7 +12,7 @@ from events import at, run_ended
 
 from executive.cell.json_values import to_json
 from executive.events import Event, RunResumed
-from executive.record.journal_format import encode_event
+from executive.record.journal import encode_event
 from executive.view.report import page
 from executive.view.report.page import INTERRUPTED, ReportData, collect_pictures, try_write_report
 

@@ -12,7 +12,7 @@ from executive.events import RunEnded
 from executive.mission.load import LoadedMission
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
-from executive.record.diagnosis.diagnosis import Diagnosis, FailureNode, LostItem
+from executive.record.diagnosis import Diagnosis, FailureNode, LostItem
 from executive.record.picture_recorder import find_picture
 from executive.record.result import is_resumable
 from executive.record.run_directory import RunDirectory

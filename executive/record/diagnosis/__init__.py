@@ -1,1 +1,0 @@
-"""Diagnosis of a run that did not succeed, from its timeline."""
