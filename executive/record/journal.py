@@ -328,7 +328,7 @@ def _lock(fd: int, path: Path) -> None:
         ) from error
 
 
-_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), check_circular=False)
+_DECISION_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), check_circular=False)
 """Encoder with a unique text for each value, so that equal decisions have equal hashes."""
 
 
@@ -357,7 +357,7 @@ class Trace:
                 decision = ["decision", item, label, frame]
             case _:
                 return
-        self._hash.update(_ENCODER.encode([timed.tick, *decision]).encode() + b"\n")
+        self._hash.update(_DECISION_ENCODER.encode([timed.tick, *decision]).encode() + b"\n")
 
     def hexdigest(self) -> str:
         """Return the first 16 hexadecimal digits of the SHA-256 of all decisions up to now."""

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import gc
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from py_trees.common import Status
@@ -37,32 +35,10 @@ from executive.manipulation.tool_goals import (
     sort_by_tour,
     sort_pickable_targets,
 )
+from executive.processes import shorten_collections
 from executive.replay.recording_cell import InputRecorder, make_recording_cell
 from executive.run.run_control import RunControl, halt_on_signals
 from executive.tree.tree_node import TreeNode, halt
-
-START_THRESHOLD = 100_000
-"""Number of new objects after which Python collects garbage during the start of a command.
-
-The number is large, because imports create many objects that remain."""
-CONTROL_THRESHOLD = 700
-"""Number of new objects after which Python collects garbage between control steps: the default of Python."""
-
-
-@contextmanager
-def shorten_collections() -> Iterator[None]:
-    """Exclude all existing objects from garbage collection until the context ends.
-
-    Otherwise a collection of all objects would take 0.1 s of a control step.
-    """
-    start_threshold, *_ = gc.get_threshold()
-    gc.freeze()
-    gc.set_threshold(CONTROL_THRESHOLD)
-    try:
-        yield
-    finally:
-        gc.set_threshold(start_threshold)
-        gc.unfreeze()
 
 
 class LookaheadPlanner:

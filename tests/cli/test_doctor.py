@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from executive import plugins as versions
+from executive import plugins
 from executive.cli import doctor
 from executive.cli.doctor import CheckResult
 from executive.cli.main import main
@@ -44,8 +44,8 @@ def test_missing_packages_are_problems_and_missing_extras_are_notes(
     monkeypatch: pytest.MonkeyPatch, missing: tuple[str, ...], status_by_subject: dict[str, str]
 ) -> None:
     names = {"": ("pybullet", "av"), "view": ("viser", "aiohttp"), "cluster": ("dask",), "train": ("torch",)}
-    monkeypatch.setattr(versions, "find_version", lambda name: "" if name in missing else "1.0")
-    monkeypatch.setattr(versions, "list_requirements", names.__getitem__)
+    monkeypatch.setattr(plugins, "find_version", lambda name: "" if name in missing else "1.0")
+    monkeypatch.setattr(plugins, "list_requirements", names.__getitem__)
     results = list(doctor.check_packages())
     assert find_statuses(iter(results)) == status_by_subject
     assert all(any(name in result.message for name in missing) for result in results)

@@ -10,7 +10,7 @@ import pytest
 from onnx_files import make_model
 
 from executive.errors import InputError, Unavailable
-from executive.perception.detectors import rfdetr as onnx_model
+from executive.perception.detectors import rfdetr
 from executive.perception.detectors.rfdetr import (
     LABELS_PATH,
     MODEL_PATH,
@@ -134,5 +134,5 @@ def test_the_trial_of_a_model_survives_what_the_model_does(tmp_path, monkeypatch
     path = write(tmp_path, make_images(1, 3, 8, 8), make_outputs(), "Nonsense")
     assert "onnxruntime can run: Load model from" in find_model_errors(path, ("cube",), 1)[0]
     abort = [sys.executable, "-c", "import os; os.abort()"]
-    monkeypatch.setattr(onnx_model, "build_command", lambda *arguments: abort)
+    monkeypatch.setattr(rfdetr, "build_command", lambda *arguments: abort)
     assert "crashes, or takes over" in find_model_errors(path, ("cube",), 2)[0]

@@ -23,11 +23,11 @@ from events import (
 from executive import events as kinds
 from executive.errors import Fault, InputError, RecordLost
 from executive.events import InputRead, NodeEnded, NodeStarted, RunResumed, TargetSelected, ToolCommanded
+from executive.record import journal
 from executive.record.journal import (
     EVENT_CLASSES,
     Journal,
     Trace,
-    __file__,
     encode_event,
     find_run_end,
     make_journal_schema,
@@ -243,7 +243,7 @@ def test_every_kind_of_event_comes_back_as_it_was(path):
 
 
 def test_the_schema_that_ships_describes_the_events():
-    shipped = Path(__file__).with_name("journal.schema.json")
+    shipped = Path(journal.__file__).with_name("journal.schema.json")
     made = "executive schema --journal > executive/record/journal.schema.json"
     assert json.loads(shipped.read_text(encoding="utf-8")) == make_journal_schema(), f"run: {made}"
 
