@@ -92,7 +92,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("executive.testing.run_mission", "testing/run_mission.py", ""),
         ("result = run_mission(...)", "testing/run_mission.py", "MissionResult"),
         ("class MissionResult(RunEnded)", "events.py", "RunEnded"),
-        ("executive.testing.substitutes", "testing/substitutes.py", ""),
+        ("executive.testing.run_mission", "testing/substitutes.py", ""),
     ],
     "Test kit: faults": [
         ("Times and effects", "testing/faults.py", ""),

@@ -11,7 +11,7 @@ from executive.cells.fake import FakeCell
 from executive.cells.without_hardware import SilentOperator
 from executive.events import discard_event
 from executive.mission.load import LoadedMission
-from executive.testing.world_access import WorldAccess
+from executive.testing.oracle import WorldAccess
 
 SETTLING_STEPS = 240
 """Control steps until the arm and the objects of a simulated world are at rest."""

@@ -31,7 +31,7 @@ from executive.cell.workcell import CellWrapper, Workcell
 from executive.errors import Fault, InputError, NoDepth, Unavailable, Unreachable
 from executive.events import Emit, FaultInjected, NodeEnded, NodeStarted, TimedEvent, discard_event
 from executive.geometry import Array
-from executive.testing.world_access import TrueObject, WorldAccess
+from executive.testing.oracle import TrueObject, WorldAccess
 
 MAX_ITEM_POSITION_ERROR = 0.05
 """Maximum horizontal distance between the position of an item in the ledger and its true object [m]."""

@@ -28,7 +28,7 @@ from executive.record.result import Result
 from executive.record.run_directory import LATEST_LINK, find_run, read_mission_of_run
 from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions
-from executive.testing.world_access import WorldAccess
+from executive.testing.oracle import WorldAccess
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_subject, run_command, show_progress
 from tests.meanwhile import meanwhile

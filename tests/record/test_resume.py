@@ -27,8 +27,7 @@ from executive.record.run_directory import find_run
 from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions
 from executive.testing.oracle import make_oracle_kind
-from executive.testing.run_mission import run_mission
-from executive.testing.substitutes import make_raising
+from executive.testing.run_mission import make_raising, run_mission
 
 SEED = 3
 

@@ -12,8 +12,7 @@ from executive.cells.fake import FakeCell
 from executive.errors import Fault, InputError
 from executive.events import RunEnded, RunStarted, TimedEvent
 from executive.testing.faults import FaultyCell, after, detector_dead, during, seal_fails
-from executive.testing.run_mission import run_mission
-from executive.testing.substitutes import make_failing
+from executive.testing.run_mission import make_failing, run_mission
 from skills.wait import Wait
 
 LOOK = """\

@@ -13,8 +13,8 @@ from executive.cell.protocols import Cell, Steps
 from executive.cells.fake import FakeCell
 from executive.errors import Fault, InputError
 from executive.skill import In, Out, Skill, param, port
+from executive.testing.run_mission import make_failing, make_raising
 from executive.testing.run_skill import run_skill
-from executive.testing.substitutes import make_failing, make_raising
 from skills.approach import Approach
 from skills.await_request import AwaitRequest
 from skills.detect import Detect

@@ -9,8 +9,7 @@ from build_nodes import sequence
 
 from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
-from executive.testing.run_mission import run_mission
-from executive.testing.substitutes import make_substitute
+from executive.testing.run_mission import make_substitute, run_mission
 from executive.tree.sequences import Guard
 from skills.conditions import HasElapsed
 

@@ -14,7 +14,7 @@ from executive.record.timeline import Activation
 from executive.skill import EMPTY, HOLDING, Skill
 from executive.testing import faults as effects
 from executive.testing.faults import Effect, ObjectChoice, ScheduledFault, after, between, during
-from executive.testing.substitutes import make_raising, make_substitute
+from executive.testing.run_mission import make_raising, make_substitute
 
 FAULT_DURATIONS = (0.5, 5.0)
 """Durations of short faults of detectors and tool [s]."""

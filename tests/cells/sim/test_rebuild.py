@@ -22,8 +22,7 @@ from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
-from executive.testing.oracle import make_oracle_kind
-from executive.testing.world_access import WorldAccess
+from executive.testing.oracle import WorldAccess, make_oracle_kind
 from tests.meanwhile import meanwhile
 
 SEED = 3
