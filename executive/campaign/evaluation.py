@@ -20,11 +20,10 @@ from executive.perception import envelope
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 from executive.perception.localization import CellLocalizer
 from executive.record.run_directory import write_atomically
+from executive.training import evaluate
 from executive.training.dataset import LabelledImage
-from executive.training.evaluation import evaluate
-from executive.training.evaluation.evaluate import CellDetector
-from executive.training.evaluation.metrics import NO_OBJECT, ClassMetrics, Evaluation
-from executive.training.evaluation.worst_mistakes import Mistake
+from executive.training.evaluate import CellDetector, Mistake
+from executive.training.metrics import NO_OBJECT, ClassMetrics, Evaluation
 from executive.training.rendering import generate_dataset, render_run_frames
 from executive.training.samples import LabelledDataset
 

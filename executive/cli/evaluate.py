@@ -130,7 +130,7 @@ def command(
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:
             from executive.training.dataset import save_image
-            from executive.training.evaluation.worst_mistakes import draw_sheet
+            from executive.training.evaluate import draw_sheet
 
             save_image(sheet, draw_sheet(worst_mistakes, ", ".join(results)))
             click.echo(f"{sheet}: the {len(worst_mistakes)} worst mistakes", err=True)

@@ -12,8 +12,8 @@ from jinja2 import Environment, StrictUndefined
 from executive.errors import InputError
 from executive.perception.detectors.rfdetr import read_labels
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
-from executive.training.evaluation.evaluate import evaluate_model, find_label_file
-from executive.training.evaluation.metrics import Evaluation
+from executive.training.evaluate import evaluate_model, find_label_file
+from executive.training.metrics import Evaluation
 from executive.training.samples import LabelledDataset, read_image, read_image_header
 
 CARD_THRESHOLD = 0.5
@@ -63,8 +63,7 @@ def train(
     if start_model is not None and not start_model.is_file():
         raise InputError(f"there is no model {start_model} to start from; train one first, or omit --from")
     try:
-        from executive.training.model import describe_architecture, export_onnx
-        from executive.training.model_fitting import fit_model
+        from executive.training.model import describe_architecture, export_onnx, fit_model
     except ImportError as error:
         advice = "install the extra, about 3 GB to download on Linux: uv sync --extra train"
         raise InputError(f'training needs the package "{error.name}"; {advice}') from error

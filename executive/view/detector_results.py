@@ -8,7 +8,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
 from rich.table import Table
 
-from executive.training.evaluation.metrics import NO_OBJECT, Evaluation
+from executive.training.metrics import NO_OBJECT, Evaluation
 
 
 def list_metrics(source: str, detector: str, evaluation: Evaluation) -> Iterator[RenderableType]:

@@ -12,7 +12,7 @@ from executive.campaign.evaluation import ImageSettings, check_detector, list_de
 from executive.cell.config import CellConfig
 from executive.cli.cells import find_cell
 from executive.cli.progress import show_progress
-from executive.training.evaluation.metrics import NO_OBJECT, Evaluation
+from executive.training.metrics import NO_OBJECT, Evaluation
 from tests.benchmarks.outside_the_envelope import SCENES
 from tests.benchmarks.report import Figures, run_command, write_json
 

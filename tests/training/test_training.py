@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from executive.errors import InputError
-from executive.training.evaluation.metrics import Distribution, Evaluation
+from executive.training.metrics import Distribution, Evaluation
 from executive.training.train import (
     choose_learning_rate,
     load_dataset,
@@ -56,7 +56,7 @@ def test_each_of_eight_symmetries_moves_boxes_with_the_pixels(element):
     pytest.importorskip("rfdetr")
     import torch
 
-    from executive.training.model_fitting import SYMMETRY_COUNT, transform_boxes, transform_image
+    from executive.training.model import SYMMETRY_COUNT, transform_boxes, transform_image
 
     square = torch.arange(16.0).reshape(4, 4)
     others = [transform_image(square, other) for other in range(SYMMETRY_COUNT) if other != element]

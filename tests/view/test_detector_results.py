@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from executive.cli.progress import print_report
-from executive.training.evaluation.metrics import (
+from executive.training.metrics import (
     ClassMetrics,
     CountedRate,
     Distribution,

@@ -9,8 +9,8 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.cell.frame import Answer, Detection
 from executive.errors import Unavailable
-from executive.training.evaluation import evaluate
-from executive.training.evaluation.evaluate import CellDetector
+from executive.training import evaluate
+from executive.training.evaluate import CellDetector
 
 CONFIGS = {"eye": DetectorConfig(kind="embedded", threshold=0.6)}
 FOUND = tuple(Detection(label, 0.9, (1.0, 2.0, 3.0, 4.0)) for label in ("cube", "boat"))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from executive.errors import NoDepth
-from executive.training.evaluation.evaluate import evaluate
-from executive.training.evaluation.metrics import (
+from executive.training.evaluate import evaluate
+from executive.training.metrics import (
     ClassMetrics,
     CountedRate,
     MeasuredErrorRates,

@@ -9,8 +9,8 @@ import pytest
 
 from executive.cell.frame import Detection
 from executive.training.dataset import save_image
-from executive.training.evaluation.error_statistics import is_ignored, match_detections
-from executive.training.evaluation.worst_mistakes import (
+from executive.training.error_statistics import is_ignored, match_detections
+from executive.training.evaluate import (
     collect_mistakes,
     draw_sheet,
     find_mistakes,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.training.evaluation.evaluate import evaluate
+from executive.training.evaluate import evaluate
 
 
 @pytest.fixture

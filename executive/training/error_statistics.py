@@ -17,7 +17,7 @@ from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception.camera_model import intersect_plane
 from executive.training.dataset import LabelledImage
-from executive.training.evaluation.metrics import NO_OBJECT, ClassMetrics, CountedRate, MeasuredErrorRates
+from executive.training.metrics import NO_OBJECT, ClassMetrics, CountedRate, MeasuredErrorRates
 
 MIN_OCCLUDING_IOU = 0.2
 """Minimum intersection over union (IoU) of the boxes of two objects that occlude each other."""

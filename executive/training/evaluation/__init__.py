@@ -1,1 +1,0 @@
-"""Evaluation of detectors: error rates, average precision, position errors, latency, worst mistakes."""
