@@ -1,7 +1,11 @@
-"""The small RF-DETR, that is the Nano model with three encoder layers and fifty queries: creation, fitting, export."""
+"""The small RF-DETR (Nano with three encoder layers and fifty queries): creation, fitting and export.
+
+The training images are augmented by symmetries of the square.
+"""
 
 from __future__ import annotations
 
+import os
 import re
 import tempfile
 import warnings
@@ -17,11 +21,14 @@ from lightning_utilities import apply_to_collection
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 from pytorch_lightning.callbacks import LambdaCallback
-from rfdetr import RFDETRNano
-from rfdetr.training import RFDETRDataModule, RFDETRModelModule, build_trainer
 
 from executive.errors import InputError
 from executive.geometry import Array
+
+# Without this variable, albumentations, which rfdetr imports, queries a package index for its newest version.
+os.environ.setdefault("NO_ALBUMENTATIONS_UPDATE", "1")
+from rfdetr import RFDETRNano
+from rfdetr.training import RFDETRDataModule, RFDETRModelModule, build_trainer
 
 RESOLUTION = 256
 """Side of the square input image [pixel]."""
