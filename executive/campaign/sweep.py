@@ -12,7 +12,7 @@ from executive.campaign.results.database import ResultsDatabase
 from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings
 from executive.campaign.results.sweep_summary import SweepResults, summarize_runs
 from executive.campaign.sweep_job import SweepJob, list_jobs, make_fault_record, run_job
-from executive.view.terminal.summary import format_repeat_command
+from executive.view.terminal import format_repeat_command
 
 
 def make_repeat_command(settings: SweepSettings, run: RunRow) -> str:

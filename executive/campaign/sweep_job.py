@@ -15,7 +15,7 @@ from executive.plugins import load_skills
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions
-from executive.view.report.page import try_write_report
+from executive.view.report import try_write_report
 
 
 @dataclass(frozen=True)

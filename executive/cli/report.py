@@ -22,7 +22,7 @@ def command(run: str, runs_folder: Path, as_json: bool) -> None:
     """
     with keep_stdout_clean():
         from executive.record.run_directory import find_run
-        from executive.view.report.page import write_report
+        from executive.view.report import write_report
 
         file = write_report(find_run(run, runs_folder))
     if as_json:

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from executive.record.recorded_run import RecordOptions
     from executive.record.result import Result
     from executive.run.assembly import RunOptions
-    from executive.view.terminal.lines import LineView
-    from executive.view.terminal.screen import TerminalView
+    from executive.view.terminal import LineView, TerminalView
 
 
 @click.command(name="run")
@@ -73,8 +72,8 @@ def command(
         from executive.record.run_directory import RunDirectory, find_run, read_cell
         from executive.run.assembly import RunOptions
         from executive.view.live.page import LivePage
-        from executive.view.report.page import try_write_report
-        from executive.view.terminal.summary import describe_end, format_repeat_command, format_summary
+        from executive.view.report import try_write_report
+        from executive.view.terminal import describe_end, format_repeat_command, format_summary
 
         terminal_view = None if quiet else _make_terminal_view(has_keyboard)
         with contextlib.ExitStack() as exit_stack:
@@ -162,13 +161,13 @@ def _resume(path: Path, run_options: RunOptions, record: RecordOptions) -> tuple
 
 def _make_terminal_view(has_keyboard: bool) -> LineView | TerminalView:
     """Return a view that redraws the terminal; if stderr is no terminal, return a view that prints lines."""
-    from executive.view.terminal.lines import LineView
+    from executive.view.terminal import LineView
 
     if sys.stderr.isatty():
         # The import of `rich` takes 0.06 s, and only a terminal needs `rich`.
         from rich.console import Console
 
-        from executive.view.terminal.screen import TerminalView
+        from executive.view.terminal import TerminalView
 
         console = Console(file=open_unescaped_stderr())
         if console.is_terminal and not console.is_dumb_terminal:

@@ -16,7 +16,7 @@ from executive.campaign.results.sweep_summary import (
     RunPair,
     VariantSummary,
 )
-from executive.view.terminal.summary import describe_end
+from executive.view.terminal import describe_end
 
 MAX_LISTED_SEEDS = 10
 """Maximum number of seeds that are listed for a group of failures."""

@@ -54,20 +54,22 @@ def command(
         from executive.plugins import load_skills
         from executive.record.run_directory import format_tree
         from executive.tree.tree_node import Blackboard
-        from executive.view.tree import btcpp, svg, tree_text
+        from executive.view.btcpp import format_btcpp
+        from executive.view.svg import make_svg
+        from executive.view.text import draw_text, fold_subtrees
 
         loaded = load_mission(mission, load_skills(), overrides)
         # No node of the tree is executed, so that none needs a clock or a ledger.
         placeholder_cell = cast("Cell", SimpleNamespace(clock=None, ledger=None))
         nodes = make_outline(build_tree(loaded, loaded.skills, placeholder_cell, Blackboard(), discard_event))
-        nodes = tree_text.fold_subtrees(nodes) if fold else nodes
+        nodes = fold_subtrees(nodes) if fold else nodes
         match "".join(formats).removeprefix("--format ").removeprefix("--"):
             case "svg":
-                output = svg.make_svg(nodes, loaded.mission.name)
+                output = make_svg(nodes, loaded.mission.name)
             case "json":
                 output, as_json = json.loads(format_tree(nodes)), True
             case "btcpp":
-                output = btcpp.format_btcpp(loaded.mission, loaded.skills)
+                output = format_btcpp(loaded.mission, loaded.skills)
             case _:
-                output = tree_text.draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
+                output = draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
     print_json(output) if as_json else click.echo(output)

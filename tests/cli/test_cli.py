@@ -55,7 +55,7 @@ def project(monkeypatch):
     monkeypatch.setattr("executive.mission.load.load_mission", load_mission)
     monkeypatch.setattr("executive.record.recorded_run.record_run", record_run)
     monkeypatch.setattr("executive.plugins.load_skills", dict)
-    monkeypatch.setattr("executive.view.report.page.try_write_report", lambda run: ("runs/x/report.html", ""))
+    monkeypatch.setattr("executive.view.report.try_write_report", lambda run: ("runs/x/report.html", ""))
     return asked
 
 

@@ -40,7 +40,7 @@ def test_without_its_report_a_run_ends_as_it_did(tmp_path, monkeypatch, quiet, s
     def broken(path: Path) -> Path:
         raise ZeroDivisionError("no ink")
 
-    monkeypatch.setattr("executive.view.report.page.write_report", broken)
+    monkeypatch.setattr("executive.view.report.write_report", broken)
     shown = invoke("run", "sort_fruit", *FEW, *quiet, "--json", "--runs", str(tmp_path))
     assert shown.exit_code == 0
     assert json.loads(shown.stdout)["status"] == "SUCCESS"

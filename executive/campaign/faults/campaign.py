@@ -28,8 +28,8 @@ from executive.record.timeline import Timeline, group_by_node
 from executive.run.assembly import RunOptions, assemble
 from executive.skill import Skill
 from executive.testing.faults import FaultyCell, with_faults
-from executive.view.report.page import try_write_report
-from executive.view.terminal.summary import describe_end
+from executive.view.report import try_write_report
+from executive.view.terminal import describe_end
 
 MAX_FAULTS_PER_RUN = 4
 """Maximum number of faults in a run: the fault under test, and the faults that activate its node."""

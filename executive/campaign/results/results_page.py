@@ -11,7 +11,7 @@ from urllib.parse import quote
 from executive.campaign.results.rows import describe_variant
 from executive.campaign.results.sweep_summary import Difference, RunPair, SweepResults, VariantSummary
 from executive.record.run_directory import RunDirectory, convert_os_errors, write_atomically
-from executive.view.report.page import try_write_report
+from executive.view.report import try_write_report
 from executive.view.text import render_template
 
 PAGE_NAME = "results.html"
@@ -53,7 +53,7 @@ def write_page(
     problems = [(sweep, run) for sweep in sweeps for run in sweep.runs if run.problem]
     path = folder / PAGE_NAME
     page = render_template(
-        "results/results.html",
+        "results.html",
         sweeps=sweeps,
         groups=groups,
         skills=list(dict.fromkeys(skill.skill for group in groups for skill in group.summary.skills)),

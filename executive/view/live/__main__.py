@@ -16,9 +16,8 @@ from pathlib import Path
 
 from aiohttp import web
 
-from executive.view.live.page_state import Message, PageCommand, PageState, SceneChange
-from executive.view.live.scene_proxy import SceneProxy
-from executive.view.live.server import Server
+from executive.view.live.page import Message, PageCommand, PageState, SceneChange
+from executive.view.live.server import SceneProxy, Server
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Server of the live page: access control, files, messages to browsers, and commands from browsers."""
+"""Server of the live page: access, files, messages to and from browsers, and proxy of the 3-D scene."""
 
 from __future__ import annotations
 
@@ -6,14 +6,109 @@ import asyncio
 import contextlib
 import json
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+import aiohttp
 from aiohttp import WSMsgType, web
 from aiohttp.typedefs import Handler
 
-from executive.view.live.page_state import PageCommand, PageState
-from executive.view.live.scene_proxy import SceneProxy
+from executive.cell.workcell import Shape
+from executive.view.live.page import PageCommand, PageState
+
+if TYPE_CHECKING:
+    from executive.view.live.live_scene import LiveScene
+
+
+SCENE_CONTENT_POLICY = (
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' data: blob:; "
+    "connect-src 'self' data: blob:; frame-ancestors 'self'"
+)
+"""Content security policy of the page of viser, which must not load anything from other servers."""
+MAX_SCENE_MESSAGE_SIZE = 64 * 1024 * 1024
+"""Maximum size of a message of the scene, which may contain a mesh [bytes]."""
+
+Connection = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
+"""WebSocket connection with a browser or with the scene server."""
+
+
+class SceneProxy:
+    """Forwards requests to the socket of the scene server; stores shapes and poses before its start."""
+
+    def __init__(self, socket_path: Path) -> None:
+        self._socket_path = socket_path
+        self._shapes: asyncio.Future[Sequence[Shape]] = asyncio.get_running_loop().create_future()
+        self._body_poses: Mapping[str, Sequence[float]] = {}
+        self._scene: LiveScene | None = None
+        self._start_lock = asyncio.Lock()
+
+    def set_shapes(self, shapes: Sequence[Shape]) -> None:
+        """Set the shapes of the scene; the next or a waiting request of a browser starts the scene server."""
+        self._shapes.set_result(shapes)
+
+    def set_body_poses(self, poses: Mapping[str, Sequence[float]]) -> None:
+        """Set the poses of bodies by name: position [m] and quaternion (w, x, y, z)."""
+        self._body_poses = poses
+        if self._scene is not None:
+            self._scene.set_body_poses(poses)
+
+    async def forward_file(self, request: web.Request) -> web.Response:
+        """Forward the request for a file to the scene server, and return the response."""
+        async with await self.open_session() as session:
+            response = await session.get(f"http://scene/{request.match_info['file']}")
+            return web.Response(
+                status=response.status, body=await response.read(), content_type=response.content_type,
+                headers={"Content-Security-Policy": SCENE_CONTENT_POLICY},
+            )  # fmt: skip
+
+    async def forward_messages(self, request: web.Request) -> web.WebSocketResponse:
+        """Forward WebSocket messages between browser and scene server until one connection ends."""
+        header = request.headers.get("Sec-WebSocket-Protocol", "")
+        protocols = [name.strip() for name in header.split(",") if name.strip()]
+        browser = web.WebSocketResponse(protocols=protocols, max_msg_size=MAX_SCENE_MESSAGE_SIZE)
+        await browser.prepare(request)
+        async with (
+            await self.open_session() as session,
+            session.ws_connect(
+                "http://scene/", protocols=protocols, max_msg_size=MAX_SCENE_MESSAGE_SIZE
+            ) as scene,
+        ):
+            directions = (_forward(browser, scene), _forward(scene, browser))
+            tasks = [asyncio.create_task(direction) for direction in directions]
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in tasks:
+                task.cancel()
+        await browser.close()
+        return browser
+
+    async def open_session(self) -> aiohttp.ClientSession:
+        """Return a session with the scene server; wait for the shapes and start the server if necessary."""
+        shapes = await asyncio.shield(self._shapes)
+        async with self._start_lock:
+            if self._scene is None:
+                # The start takes 1.5 s (imports and meshes), which would block other requests.
+                self._scene = await asyncio.to_thread(_start_scene_server, self._socket_path, shapes)
+                self._scene.set_body_poses(self._body_poses)
+        return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path=str(self._socket_path)))
+
+
+def _start_scene_server(socket_path: Path, shapes: Sequence[Shape]) -> LiveScene:
+    """Import viser and start the scene server."""
+    from executive.view.live.live_scene import LiveScene
+
+    return LiveScene(socket_path, shapes)
+
+
+async def _forward(source: Connection, target: Connection) -> None:
+    """Forward the messages from `source` to `target` until a connection ends."""
+    async for message in source:
+        if message.type is WSMsgType.BINARY:
+            await target.send_bytes(message.data)
+        elif message.type is WSMsgType.TEXT:
+            await target.send_str(message.data)
+
 
 MESSAGE_PERIOD = 1 / 8
 """Period of the messages to the browsers [s]."""
@@ -41,12 +136,12 @@ COMMANDS = ("pause", "resume", "step", "stop", "render_on_cpu")
 MAX_MESSAGE_SIZE = 4096
 """Maximum size of a message of a browser [bytes]."""
 _FILES = {
-    "": ("live/page.html", "text/html"),
-    "page.js": ("live/page.js", "text/javascript"),
-    "page.css": ("live/page.css", "text/css"),
+    "": ("live_page.html", "text/html"),
+    "page.js": ("live_page.js", "text/javascript"),
+    "page.css": ("live_page.css", "text/css"),
     "colours.css": ("colours.css", "text/css"),
 }
-"""Path in `executive/view` and content type of each served file, by the last part of its address."""
+"""Path in `executive/view/templates` and content type of each served file, by the end of its address."""
 
 
 class Server:
@@ -110,7 +205,7 @@ class Server:
         if name not in _FILES:
             raise web.HTTPNotFound(text="there is no such file\n")
         file, content_type = _FILES[name]
-        text = files("executive.view").joinpath(file).read_text(encoding="utf-8")
+        text = files("executive.view").joinpath("templates", file).read_text(encoding="utf-8")
         headers = {"Content-Security-Policy": CONTENT_POLICY}
         return web.Response(text=text, content_type=content_type, headers=headers)
 

@@ -21,7 +21,7 @@ from events import (
 
 from executive.events import Event, OperatorAsked, RequestGiven, TargetSelected
 from executive.geometry import Pose
-from executive.view.live.page_state import CameraImage, PageState, encode_poses
+from executive.view.live.page import CameraImage, PageState, encode_poses
 
 
 @pytest.mark.parametrize(

@@ -14,11 +14,11 @@ from aiohttp import web
 from aiohttp.test_utils import make_mocked_request
 from events import at, run_started
 
-from executive.view.live.page_state import PageChange, PageCommand, PageState
-from executive.view.live.scene_proxy import SceneProxy
+from executive.view.live.page import PageChange, PageCommand, PageState
 from executive.view.live.server import (
     CONTENT_POLICY,
     SECURITY_HEADERS,
+    SceneProxy,
     Server,
     find_access_error,
     parse_command,

@@ -13,8 +13,8 @@ from events import at, run_ended
 from executive.cell.json_values import to_json
 from executive.events import Event, RunResumed
 from executive.record.journal import encode_event
-from executive.view.report import page
-from executive.view.report.page import INTERRUPTED, ReportData, collect_pictures, try_write_report
+from executive.view import report
+from executive.view.report import INTERRUPTED, ReportData, collect_pictures, try_write_report
 
 
 def append(run: Path, tick: int, event: Event) -> None:
@@ -86,7 +86,7 @@ def test_a_file_name_states_step_item_and_reason(folder):
 
 
 def test_what_there_is_no_room_for_is_a_link_and_decisions_come_first(folder, monkeypatch):
-    monkeypatch.setattr(page, "MAX_EMBEDDED_SIZE", 1000)
+    monkeypatch.setattr(report, "MAX_EMBEDDED_SIZE", 1000)
     save(folder, "000001_größe #2?_50%.jpg", "000003_duck-1.jpg", "000004_duck-1_missed.jpg", size=600)
     save(folder, "000005_unsure.jpg", size=90)
     seen = collect_pictures(folder, ["cube-1", "duck-1"])

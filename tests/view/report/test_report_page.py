@@ -11,7 +11,7 @@ from typing import Any
 from page_reader import SECTIONS, Page
 
 from executive.record.journal import find_run_start, read_journal
-from executive.view.report.page import ReportData, render_report
+from executive.view.report import ReportData, render_report
 
 NASTY = """</style></title><script>alert("x")</script><img src=x onerror='y'> & {{ 7 * 7 }} {% raw %} \x00"""
 WORDS = {"kind", "status", "state", "file", "node", "path", "item", "origin", "picture"}

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import pytest
 
 from executive.run.run_control import RunControl
-from executive.view.terminal.screen import KeyReader
+from executive.view.terminal import KeyReader
 
 PATIENCE = 10.0
 

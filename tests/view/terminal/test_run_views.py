@@ -15,9 +15,7 @@ from rich.console import Console
 from executive.events import BranchChosen, NodeEnded, NodeStarted, TimedEvent
 from executive.record.result import Result
 from executive.run.run_control import RunControl
-from executive.view.terminal.lines import LineView
-from executive.view.terminal.screen import TerminalView
-from executive.view.terminal.summary import format_repeat_command, format_summary
+from executive.view.terminal import LineView, TerminalView, format_repeat_command, format_summary
 
 GRASP = "tree/sort/repeat/Grasp"
 

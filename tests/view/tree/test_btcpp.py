@@ -13,7 +13,7 @@ from executive.mission.text.file_search import find_mission, get_shipped_folder
 from executive.plugins import load_skills
 from executive.skill import In, Out, Skill, param, port
 from executive.tree.node_registry import load_control_nodes
-from executive.view.tree.btcpp import format_btcpp
+from executive.view.btcpp import format_btcpp
 
 COUNTERPARTS = {
     "Sequence": "", "Fallback": "", "ReactiveSequence": "", "ReactiveFallback": "", "Inverter": "",

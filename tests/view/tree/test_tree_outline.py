@@ -15,7 +15,7 @@ from executive.tree.sequences import Sequence
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 from executive.tree.tree_node import NodeContext, make_inspection_context
 from executive.tree.try_catch import Catch, TryCatch
-from executive.view.tree.tree_text import draw_text, fold_subtrees
+from executive.view.text import draw_text, fold_subtrees
 
 CELL: Any = SimpleNamespace()
 MISSED = (Reason("Pick", "missed"),)

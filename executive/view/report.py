@@ -23,11 +23,10 @@ from executive.record.picture_recorder import PALETTE
 from executive.record.result import is_resumable, list_requests, read_result
 from executive.record.run_directory import RunDirectory, convert_os_errors, read_tree, write_atomically
 from executive.record.timeline import Timeline, find_last_failure, format_counts, group_by_node
-from executive.view.report.activity_times import FAILED_ATTEMPTS, LOOK, WAITING, compute_activity_times
-from executive.view.report.lanes import draw_lanes
-from executive.view.terminal.summary import describe_place_on_table, format_repeat_command
+from executive.view.report_timeline import FAILED_ATTEMPTS, LOOK, WAITING, compute_activity_times, draw_lanes
+from executive.view.svg import NodeResult, make_svg
+from executive.view.terminal import describe_place_on_table, format_repeat_command
 from executive.view.text import render_template
-from executive.view.tree.svg import NodeResult, make_svg
 
 ACTIVITY_COLOURS = {LOOK: "#56B4E9", FAILED_ATTEMPTS: "#D55E00", WAITING: "#9aa5b4"}
 """Colours of the activities that are not skills; the colour of a skill is another colour of the palette."""
@@ -141,7 +140,7 @@ def render_report(data: ReportData) -> str:
     reason = "" if outcome is None or outcome.reason.upper() == data.status else outcome.reason
     warning = "" if result is None else result.disagreement
     return render_template(
-        "report/report.html",
+        "report.html",
         data=data,
         result=result,
         reason=reason,

@@ -18,8 +18,13 @@ from types import MappingProxyType
 
 from executive.mission.outline import OutlineNode, list_child_indices
 from executive.tree.node import ControlNode
-from executive.view.text import estimate_text_width, render_template, wrap_and_truncate
-from executive.view.tree.tree_text import describe_connections, describe_reasons
+from executive.view.text import (
+    describe_connections,
+    describe_reasons,
+    estimate_text_width,
+    render_template,
+    wrap_and_truncate,
+)
 
 MAX_LINE_LENGTH = 28
 """Maximum length of a line of text in the box of a node [characters]."""
@@ -106,7 +111,7 @@ def make_svg(nodes: Sequence[OutlineNode], name: str, results: Mapping[str, Node
     depths = [node.depth for node in nodes]
     layout = compute_layout(depths, child_indices, list(map(_compute_size, drawings)))
     edges = [_make_edge(layout, parents.get(index), index, depth) for index, depth in enumerate(depths)]
-    return render_template("tree/tree.svg", name=name, layout=layout, drawings=drawings, edges=edges)
+    return render_template("tree.svg", name=name, layout=layout, drawings=drawings, edges=edges)
 
 
 def make_group_id(path: str) -> str:

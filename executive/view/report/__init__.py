@@ -1,1 +1,0 @@
-"""Report of a finished run: one self-contained HTML file."""

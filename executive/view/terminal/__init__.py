@@ -1,1 +1,0 @@
-"""Views of a run on a terminal: live screen, plain lines, key commands, and summary."""

@@ -1,1 +1,0 @@
-"""Drawings of a behaviour tree: text for a terminal, and SVG picture."""
