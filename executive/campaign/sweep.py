@@ -1,18 +1,155 @@
-"""Sweep: runs of one mission with many seeds and variants, in worker processes, stored in a database."""
+"""Sweep: runs of one mission with many seeds and variants, in worker processes, and its folder."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
 
-from executive.campaign.cluster.cluster import run_jobs_on_cluster
-from executive.campaign.pool import JobOptions, run_jobs
-from executive.campaign.results.database import ResultsDatabase
-from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings
-from executive.campaign.results.sweep_summary import SweepResults, summarize_runs
-from executive.campaign.sweep_job import SweepJob, list_jobs, make_fault_record, run_job
+from executive.campaign.cluster import run_jobs_on_cluster
+from executive.campaign.jobs import JobOptions, SweepJob, list_jobs, make_fault_record, run_job, run_jobs
+from executive.campaign.results import (
+    FILE_NAME,
+    ResultsDatabase,
+    RunRecord,
+    RunRow,
+    SweepSettings,
+    get_database_path,
+)
+from executive.campaign.sweep_summary import SweepResults, summarize_runs
+from executive.cells.sim.scene_file import load_scene
+from executive.errors import InputError
+from executive.mission.load import LoadedMission, load_mission
+from executive.mission.text.file_search import read_source
+from executive.perception.envelope import FAKE_KIND, compute_fingerprint
+from executive.plugins import list_versions, load_cell_kind, load_skills
+from executive.record.run_directory import make_dated_folder
 from executive.view.terminal import format_repeat_command
+
+SIDES = ("a", "b")
+"""Names of the folders of the two sweeps of a comparison."""
+
+
+def create_sweep(settings: SweepSettings, runs_folder: Path) -> ResultsDatabase:
+    """Create the folder `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_sweep_<mission>` with a locked database.
+
+    Raises:
+        InputError: The folder cannot be made.
+    """
+    folder = make_dated_folder(runs_folder, f"sweep_{settings.mission_name}", datetime.now())
+    return create_database(folder, settings)
+
+
+def create_database(folder: Path, settings: SweepSettings) -> ResultsDatabase:
+    """Create the database of a sweep in an empty folder, and reserve the sweep for this process."""
+    database = ResultsDatabase(folder / FILE_NAME, settings)
+    database.lock()
+    return database
+
+
+def make_settings(
+    mission: str, seeds: range, overrides: Mapping[str, str], variations: Mapping[str, tuple[str, ...]],
+    scene: Path | None, saves_images: bool,
+) -> SweepSettings:  # fmt: skip
+    """Check the inputs of a sweep, and return its settings.
+
+    Args:
+        mission: Mission file, or name of a shipped mission.
+        seeds: Seeds of each variant.
+        overrides: Values of params of the mission and keys of the cell, as given with `--set`.
+        variations: Values of `--vary`, by param of the mission or key of the cell.
+        scene: Scene file; None: no change of the simulated world.
+        saves_images: True to save the images on which decisions are based.
+
+    Raises:
+        MissionError: A variant has errors.
+        InputError: An input does not exist.
+    """
+    settings = SweepSettings(
+        mission=mission, mission_name="", cell="", overrides=overrides, variations=variations,
+        first_seed=seeds[0], last_seed=seeds[-1], scene=scene,
+        saves_images=saves_images, inputs_hash="", versions=dict(list_versions()),
+    )  # fmt: skip
+    missions = _load_variants(settings)
+    name, cell, inputs_hash = missions[0].mission.name, missions[0].cell_path, _hash_inputs(missions, scene)
+    return replace(settings, mission_name=name, cell=str(cell), inputs_hash=inputs_hash)
+
+
+def open_sweep(path: Path) -> ResultsDatabase:
+    """Open the database of a sweep to resume the sweep; `path` is the file, or the folder of the sweep.
+
+    Raises:
+        InputError: There is no such sweep, another process executes the sweep, or an input has changed.
+    """
+    with ExitStack() as stack:  # It closes the database after an error.
+        database = stack.enter_context(closing(ResultsDatabase(get_database_path(path))))
+        settings = database.settings
+        if _hash_inputs(_load_variants(settings), settings.scene) != settings.inputs_hash:
+            raise InputError(
+                f'the mission "{settings.mission}", its libraries, its cell, its weights or its scene '
+                f'changed after the sweep "{path}" began, and the results would mix both versions; restore '
+                "the files, or start a new sweep without --resume"
+            )
+        database.lock()
+        stack.pop_all()
+    return database
+
+
+def create_comparison(settings: Sequence[SweepSettings], runs_folder: Path) -> list[ResultsDatabase]:
+    """Create the folder `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_compare_<mission>` with the databases of two sweeps.
+
+    Raises:
+        InputError: The folder cannot be made.
+    """
+    name = "_".join(dict.fromkeys(side_settings.mission_name for side_settings in settings))
+    folder = make_dated_folder(runs_folder, f"compare_{name}", datetime.now())
+    for side in SIDES:
+        (folder / side).mkdir()
+    return [create_database(folder / side, values) for side, values in zip(SIDES, settings, strict=True)]
+
+
+def open_comparison(folder: Path) -> list[ResultsDatabase]:
+    """Open the databases of a comparison to resume the comparison.
+
+    Raises:
+        InputError: There is no such comparison, another process executes it, or an input has changed.
+    """
+    with ExitStack() as stack:  # It closes the first database if the second one cannot be opened.
+        databases = [stack.enter_context(closing(open_sweep(folder / side))) for side in SIDES]
+        stack.pop_all()
+    return databases
+
+
+def _load_variants(settings: SweepSettings) -> list[LoadedMission]:
+    """Load the mission of each variant and check the scene, to report an error before the first run."""
+    skills, mission = load_skills(), settings.mission
+    missions = [
+        load_mission(mission, skills, {**settings.overrides, **variant}, load_cell_kind)
+        for variant in settings.variants
+    ]
+    for loaded in missions if settings.scene else ():
+        load_scene(settings.scene, loaded.cell_config)
+    return missions
+
+
+def _hash_inputs(missions: Iterable[LoadedMission], scene: Path | None) -> str:
+    """Return a hash of all inputs.
+
+    The inputs are the texts of the missions, libraries and scene, the cell configurations, and the detector
+    weights.
+    """
+    inputs: list[object] = [] if scene is None else [read_source(scene).text]
+    for loaded in missions:
+        cell, base = loaded.cell_config, loaded.cell_path.parent
+        names = [] if cell.kind == FAKE_KIND else [*cell.detectors]
+        weights = [compute_fingerprint(cell, name, base)["weights"] for name in names]
+        inputs += [loaded.text, dict(loaded.libraries), cell.model_dump(mode="json"), weights]
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
 
 
 def make_repeat_command(settings: SweepSettings, run: RunRow) -> str:

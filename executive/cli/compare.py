@@ -42,10 +42,9 @@ def command(
     )  # fmt: skip
     options.check_disjoint(overrides, "--set-a or --set-b", {**overrides_a, **overrides_b})
     with keep_stdout_clean():
-        from executive.campaign.results.results_page import write_missing_reports, write_page
-        from executive.campaign.results.sweep_folder import create_comparison, make_settings, open_comparison
-        from executive.campaign.results.sweep_summary import SweepResults, compute_differences, pair_runs
-        from executive.campaign.sweep import read_results
+        from executive.campaign.results_page import write_missing_reports, write_page
+        from executive.campaign.sweep import create_comparison, make_settings, open_comparison, read_results
+        from executive.campaign.sweep_summary import SweepResults, compute_differences, pair_runs
         from executive.cell.json_values import to_json
         from executive.cli.progress import print_report
         from executive.cli.sweep_tables import render_differences

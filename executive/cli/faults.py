@@ -49,9 +49,8 @@ def command(
     has_conflict = sum((pairs is not None, fault_numbers is not None, list_only)) > 1
     options.check_usage((has_conflict, "--pairs, --fault and --list exclude each other; give one of them"))
     with keep_stdout_clean():
-        from executive.campaign.faults import campaign as fault_campaign
-        from executive.campaign.mission_under_test import load_mission_under_test
-        from executive.campaign.pool import JobOptions
+        from executive.campaign import faults as fault_campaign
+        from executive.campaign.jobs import JobOptions, load_mission_under_test
         from executive.cli.progress import print_halt, show_progress
 
         mission_under_test = load_mission_under_test(mission, overrides, oracle, seed)

@@ -14,7 +14,7 @@ from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import ExitCode
 
 if TYPE_CHECKING:
-    from executive.campaign.results.database import ResultsDatabase
+    from executive.campaign.results import ResultsDatabase
 
 
 @click.command(name="sweep")
@@ -51,11 +51,15 @@ def command(
     )  # fmt: skip
     options.check_disjoint(overrides, "--vary", variations)
     with keep_stdout_clean():
-        from executive.campaign.results.junit import write_junit
-        from executive.campaign.results.requirement import describe_unmet_conditions, parse_requirement
-        from executive.campaign.results.results_page import write_page
-        from executive.campaign.results.sweep_folder import create_sweep, make_settings, open_sweep
-        from executive.campaign.sweep import make_repeat_command, read_results
+        from executive.campaign.requirement import describe_unmet_conditions, parse_requirement, write_junit
+        from executive.campaign.results_page import write_page
+        from executive.campaign.sweep import (
+            create_sweep,
+            make_repeat_command,
+            make_settings,
+            open_sweep,
+            read_results,
+        )
         from executive.cell.json_values import to_json
         from executive.cli.progress import print_report
         from executive.cli.sweep_tables import render_summary
@@ -100,9 +104,8 @@ def execute_missing_runs(
         cluster: Address of a dask scheduler, whose workers execute the runs, or None.
         side: `A` or `B` in a comparison, else "".
     """
-    from executive.campaign.pool import JobOptions
+    from executive.campaign.jobs import JobOptions, list_jobs
     from executive.campaign.sweep import run_sweep
-    from executive.campaign.sweep_job import list_jobs
     from executive.cli.progress import print_halt, show_progress
 
     mission, jobs = database.settings.mission, list_jobs(database.settings, database.path.parent)

@@ -8,8 +8,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
 from rich.table import Table
 
-from executive.campaign.results.rows import describe_variant
-from executive.campaign.results.sweep_summary import (
+from executive.campaign.results import describe_variant
+from executive.campaign.sweep_summary import (
     Difference,
     Estimate,
     FailureGroup,

@@ -19,7 +19,7 @@ from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from executive.campaign.mission_under_test import MissionUnderTest
+from executive.campaign.jobs import MissionUnderTest
 from executive.cells.sim.command_log import FILE_HEADER
 from executive.cli.main import main
 from executive.errors import InputError

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from py_trees.common import Status
 
-from executive.campaign.mission_under_test import MissionUnderTest
+from executive.campaign.jobs import MissionUnderTest
 from executive.cell.protocols import STEP
 from executive.cell.workcell import CellWrapper, Workcell
 from executive.cells.sim.arm import SimArm

@@ -7,7 +7,7 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-from executive.campaign.mission_under_test import MissionUnderTest
+from executive.campaign.jobs import MissionUnderTest
 from executive.events import TimedEvent
 from executive.record.journal import Recorder
 from executive.record.run_directory import RunDirectory

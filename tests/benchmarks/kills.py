@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.campaign.mission_under_test import MissionUnderTest
+from executive.campaign.jobs import MissionUnderTest
 from executive.errors import ExecutiveError
 from executive.events import ItemChanged, NodeEnded, NodeStarted, TimedEvent
 from executive.geometry import Array

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from py_trees.trees import BehaviourTree
 
-from executive.campaign.mission_under_test import MissionUnderTest
+from executive.campaign.jobs import MissionUnderTest
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
 from executive.geometry import Array

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from executive.campaign.mission_under_test import MissionUnderTest
+from executive.campaign.jobs import MissionUnderTest
 from tests.benchmarks.report import Figures, describe, record_subject, run_command, show_progress
 
 PROCESS = Path("/proc/self")

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from events import at, item_changed
 
-from executive.campaign.mission_under_test import MissionUnderTest, load_mission_under_test
+from executive.campaign.jobs import MissionUnderTest, load_mission_under_test
 from executive.cli.cells import find_cell
 from executive.mission.parse.cell_file import load_cell
 from executive.record.result import Audit, ItemCounts, Result

@@ -20,15 +20,18 @@ from unittest.mock import patch
 
 import pytest
 
-from executive.campaign.cluster.bundle import PACKAGES_FOLDER, make_bundle
-from executive.campaign.cluster.cluster import run_jobs_on_cluster
-from executive.campaign.cluster.environment import FILES_KEY, check_environment, describe_environment
-from executive.campaign.cluster.returned_run import unpack_run
-from executive.campaign.pool import JobOptions
-from executive.campaign.results.rows import RunRow
-from executive.campaign.results.sweep_folder import create_sweep, make_settings
-from executive.campaign.sweep import run_sweep
-from executive.campaign.sweep_job import SweepJob, list_jobs, run_job
+from executive.campaign.cluster import run_jobs_on_cluster
+from executive.campaign.cluster_worker import (
+    FILES_KEY,
+    PACKAGES_FOLDER,
+    check_environment,
+    describe_environment,
+    make_bundle,
+    unpack_run,
+)
+from executive.campaign.jobs import JobOptions, SweepJob, list_jobs, run_job
+from executive.campaign.results import RunRow
+from executive.campaign.sweep import create_sweep, make_settings, run_sweep
 from executive.errors import InputError
 
 FAKE = {"cell.kind": "fake", "cell.table.objects": "[1, 2]"}
@@ -99,7 +102,7 @@ def test_an_absolute_path_to_a_file_is_refused(project: Path) -> None:
 @pytest.mark.slow
 def test_a_worker_runs_a_skill_of_another_package(project: Path, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    from executive.campaign.cluster.worker import BundlePlugin
+    from executive.campaign.cluster_worker import BundlePlugin
 
     jobs = list_sweep_jobs(tmp_path / "runs")
     local = run_job(jobs[0])

@@ -12,11 +12,10 @@ from typing import Any
 
 import pytest
 
-from executive.campaign.faults import campaign as campaigns
-from executive.campaign.faults.campaign import Campaign, Trial, run_trial
-from executive.campaign.faults.fault_list import INJECTED_MESSAGE, FaultLister, PlannedFault, SkillFault
-from executive.campaign.mission_under_test import MissionUnderTest
-from executive.campaign.pool import JobOptions
+from executive.campaign import faults as campaigns
+from executive.campaign.fault_list import INJECTED_MESSAGE, FaultLister, PlannedFault, SkillFault
+from executive.campaign.faults import Campaign, Trial, run_trial
+from executive.campaign.jobs import JobOptions, MissionUnderTest
 from executive.cell.workcell import AUDIT_KEYS
 from executive.cells.fake import FakeCell
 from executive.errors import InputError

@@ -11,12 +11,19 @@ from xml.etree import ElementTree
 
 import pytest
 
-from executive.campaign.results import sweep_folder
-from executive.campaign.results.database import ResultsDatabase, get_database_path
-from executive.campaign.results.junit import format_junit
-from executive.campaign.results.requirement import describe_unmet_conditions, parse_requirement
-from executive.campaign.results.rows import ItemRow, RunRecord, RunRow, SkillRow, SweepSettings, make_record
-from executive.campaign.results.sweep_summary import (
+from executive.campaign.requirement import describe_unmet_conditions, format_junit, parse_requirement
+from executive.campaign.results import (
+    ItemRow,
+    ResultsDatabase,
+    RunRecord,
+    RunRow,
+    SkillRow,
+    SweepSettings,
+    get_database_path,
+    make_record,
+)
+from executive.campaign.sweep import create_database, make_settings, open_sweep
+from executive.campaign.sweep_summary import (
     Estimate,
     FailureGroup,
     SkillSummary,
@@ -141,22 +148,22 @@ def test_another_file_is_refused(content: str | None, message: str, tmp_path: Pa
 
 @pytest.fixture(scope="module")
 def settings() -> SweepSettings:
-    return sweep_folder.make_settings("sort_fruit", range(2), {"cell.kind": "fake"}, {}, None, False)
+    return make_settings("sort_fruit", range(2), {"cell.kind": "fake"}, {}, None, False)
 
 
 def test_a_sweep_is_resumed_by_one_process_and_only_with_its_inputs(
     tmp_path: Path, settings: SweepSettings
 ) -> None:
     with (
-        closing(sweep_folder.create_database(tmp_path, settings)),
+        closing(create_database(tmp_path, settings)),
         pytest.raises(InputError, match="another process executes the sweep"),
     ):
-        sweep_folder.open_sweep(tmp_path)
-    sweep_folder.open_sweep(tmp_path).close()
+        open_sweep(tmp_path)
+    open_sweep(tmp_path).close()
     (tmp_path / "changed").mkdir()
-    sweep_folder.create_database(tmp_path / "changed", replace(settings, inputs_hash="other")).close()
+    create_database(tmp_path / "changed", replace(settings, inputs_hash="other")).close()
     with pytest.raises(InputError, match=r"changed after the sweep .*/changed\" began"):
-        sweep_folder.open_sweep(tmp_path / "changed")
+        open_sweep(tmp_path / "changed")
 
 
 def test_the_summary_counts_objects_and_groups_problems() -> None:

@@ -15,11 +15,9 @@ from typing import Any
 
 import pytest
 
-from executive.campaign.pool import JobOptions, run_jobs
-from executive.campaign.results.database import ResultsDatabase
-from executive.campaign.results.rows import RunRecord, RunRow, SweepSettings, make_record
+from executive.campaign.jobs import JobOptions, SweepJob, list_jobs, make_fault_record, run_job, run_jobs
+from executive.campaign.results import ResultsDatabase, RunRecord, RunRow, SweepSettings, make_record
 from executive.campaign.sweep import make_repeat_command, run_sweep
-from executive.campaign.sweep_job import SweepJob, list_jobs, make_fault_record, run_job
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.plugins import load_skills

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import pytest
 from click.testing import CliRunner
 
-import executive.campaign.results.sweep_folder  # noqa: F401 - imported before `load_mission` is replaced
+import executive.campaign.sweep  # noqa: F401 - imported before `load_mission` is replaced
 from executive.cell.json_values import to_json
 from executive.cli.main import main
 from executive.errors import Fault, InputError

@@ -12,8 +12,8 @@ import pytest
 from click.testing import CliRunner, Result
 from test_sweep_command import make_record
 
-from executive.campaign.results.database import ResultsDatabase
-from executive.campaign.sweep_job import SweepJob
+from executive.campaign.jobs import SweepJob
+from executive.campaign.results import ResultsDatabase
 from executive.cli.main import main
 
 

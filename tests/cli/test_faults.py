@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
-from executive.campaign.faults.campaign import Campaign, Trial
-from executive.campaign.faults.fault_list import PlannedFault, SkillFault
+from executive.campaign.fault_list import PlannedFault, SkillFault
+from executive.campaign.faults import Campaign, Trial
 from executive.cli.main import main
 
 FAKE = ("sort_overhead", "--set", "cell.kind=fake")

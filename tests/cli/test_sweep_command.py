@@ -10,9 +10,8 @@ from xml.etree import ElementTree
 import pytest
 from click.testing import CliRunner, Result
 
-from executive.campaign.results.database import ResultsDatabase
-from executive.campaign.results.rows import RunRecord, RunRow, SkillRow
-from executive.campaign.sweep_job import SweepJob
+from executive.campaign.jobs import SweepJob
+from executive.campaign.results import ResultsDatabase, RunRecord, RunRow, SkillRow
 from executive.cli.main import main
 from executive.record.result import Audit, ItemCounts
 

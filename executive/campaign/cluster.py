@@ -9,18 +9,22 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor
 from typing import TYPE_CHECKING
 
-from executive.campaign.cluster import environment
-from executive.campaign.cluster.bundle import make_bundle
-from executive.campaign.cluster.returned_run import unpack_run
-from executive.campaign.pool import MAX_CRASHES, JobOptions
-from executive.campaign.results.rows import RunRecord
-from executive.campaign.sweep_job import SweepJob, make_fault_record
+from executive.campaign.cluster_worker import (
+    INSTALLATION_ADVICE,
+    check_environment,
+    describe_environment,
+    make_bundle,
+    unpack_run,
+)
+from executive.campaign.jobs import MAX_CRASHES, JobOptions, SweepJob, make_fault_record
+from executive.campaign.results import RunRecord
 from executive.errors import InputError
 from executive.plugins import DISTRIBUTION
 from executive.run.run_control import HALT_SIGNALS, handle_signals
 
 if TYPE_CHECKING:
     from distributed import Client, Future
+
 
 CONNECTION_TIMEOUT = 10.0
 """Maximum time for the connection to the scheduler [s]."""
@@ -37,7 +41,7 @@ def run_jobs_on_cluster(
     """Execute all jobs on the workers of the scheduler at `address`.
 
     Another worker executes the jobs of a lost worker. After Ctrl-C or SIGTERM all unfinished jobs are
-    cancelled. The other arguments have the same meaning as in `executive.campaign.pool.run_jobs`.
+    cancelled. The other arguments have the same meaning as in `executive.campaign.jobs.run_jobs`.
 
     Raises:
         InputError: The extra `cluster` is not installed, the scheduler cannot be reached, has no workers or
@@ -49,10 +53,10 @@ def run_jobs_on_cluster(
     with handle_signals(HALT_SIGNALS, lambda *_: signal_event.set()), _connect(address) as client:
         from distributed import CancelledError, KilledWorker, as_completed
 
-        from executive.campaign.cluster.worker import BundlePlugin, execute_on_worker
+        from executive.campaign.cluster_worker import BundlePlugin, execute_on_worker
 
         _check_workers(client, address)
-        plugin = BundlePlugin(make_bundle(jobs), environment.describe_environment())
+        plugin = BundlePlugin(make_bundle(jobs), describe_environment())
         client.register_plugin(plugin)
 
         def submit(index: int) -> Future:
@@ -111,9 +115,9 @@ def _connect(address: str) -> Client:
 def _check_workers(client: Client, address: str) -> None:
     """Raise InputError unless there are workers, and all have the software of this computer."""
     try:
-        results = client.run(environment.check_environment, environment.describe_environment())
+        results = client.run(check_environment, describe_environment())
     except (ImportError, AttributeError) as error:
-        message = f"a worker cannot import this project: {error}; {environment.INSTALLATION_ADVICE}"
+        message = f"a worker cannot import this project: {error}; {INSTALLATION_ADVICE}"
         raise InputError(message) from error
     if not results:
         raise InputError(f"the scheduler has no workers; start one: `dask worker {address} --nthreads 1`")

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from executive.campaign.results.rows import describe_variant
-from executive.campaign.results.sweep_summary import Difference, RunPair, SweepResults, VariantSummary
+from executive.campaign.results import describe_variant
+from executive.campaign.sweep_summary import Difference, RunPair, SweepResults, VariantSummary
 from executive.record.run_directory import RunDirectory, convert_os_errors, write_atomically
 from executive.view.report import try_write_report
 from executive.view.text import render_template

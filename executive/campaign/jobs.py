@@ -1,20 +1,80 @@
-"""Execution of many jobs in worker processes; the first signal halts the runs, the second kills them."""
+"""Jobs of a campaign: one run of a mission with a seed and a variant, and worker processes for many jobs."""
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import multiprocessing
 import os
 import signal
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
 from typing import TypeVar
 
+from executive.campaign.results import RunRecord, RunRow, SweepSettings, make_record
+from executive.cell.workcell import Workcell
+from executive.errors import ExecutiveError, InputError
+from executive.mission.load import LoadedMission, load_mission
+from executive.plugins import load_cell_kind, load_skills
 from executive.processes import WorkerPool, kill_workers
+from executive.record.recorded_run import RecordOptions, record_run
+from executive.record.timeline import Timeline
+from executive.run.assembly import RunOptions
 from executive.run.run_control import HALT_SIGNALS, handle_signals
+from executive.view.report import try_write_report
+
+
+@dataclass(frozen=True)
+class MissionUnderTest:
+    """A mission with the cell and the seed of its test runs.
+
+    Attributes:
+        loaded: The mission, checked together with its cell file.
+        make_cell: Function that makes the work cell.
+        cell_description: Kind of the cell, and source of the detections, for reports.
+        seed: Random seed; in a series of runs, the seed of the first run.
+    """
+
+    loaded: LoadedMission
+    make_cell: Callable[..., Workcell]
+    cell_description: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Name of the mission."""
+        return self.loaded.mission.name
+
+    @property
+    def requests(self) -> list[str]:
+        """Requests of the operator: for each class of the mission, as many as objects can be on the table."""
+        return [*self.loaded.routes] * self.loaded.cell_config.table.objects[1]
+
+
+def load_mission_under_test(
+    mission: str, overrides: Mapping[str, str], has_oracle: bool, seed: int
+) -> MissionUnderTest:
+    """Load a mission; if `has_oracle` is True, the detectors of its simulated cell return true detections.
+
+    Raises:
+        InputError: The mission does not exist or has errors, or `has_oracle` requires a simulated cell.
+    """
+    loaded = load_mission(mission, load_skills(), overrides, load_cell_kind)
+    kind = loaded.cell_config.kind
+    if not has_oracle:
+        return MissionUnderTest(loaded, load_cell_kind(kind), kind, seed)
+    if kind != "sim":
+        name = loaded.mission.name
+        raise InputError(f"--oracle requires a simulated cell, but the cell of {name} is of kind {kind}")
+    from executive.testing.oracle import make_oracle_kind
+
+    return MissionUnderTest(loaded, make_oracle_kind(), "sim, true detections", seed)
+
 
 Job = TypeVar("Job")
 JobResult = TypeVar("JobResult")
@@ -123,3 +183,60 @@ def _halt_runs() -> None:
         assert process.pid is not None
         with contextlib.suppress(ProcessLookupError):
             os.kill(process.pid, signal.SIGINT)
+
+
+@dataclass(frozen=True)
+class SweepJob:
+    """One run of a sweep.
+
+    Attributes:
+        settings: Settings of the sweep.
+        index: Index of the run in the sweep.
+        variant: Values of the varied params and keys of the cell, by name.
+        seed: Random seed.
+        runs_folder: Folder in which the run directory is made.
+    """
+
+    settings: SweepSettings
+    index: int
+    variant: Mapping[str, str]
+    seed: int
+    runs_folder: Path
+
+
+def list_jobs(settings: SweepSettings, runs_folder: Path) -> list[SweepJob]:
+    """Return all jobs of a sweep, variant by variant and seed by seed."""
+    combinations = product(settings.variants, range(settings.first_seed, settings.last_seed + 1))
+    return [
+        SweepJob(settings, index, variant, seed, runs_folder)
+        for index, (variant, seed) in enumerate(combinations)
+    ]
+
+
+def run_job(job: SweepJob) -> RunRecord:
+    """Execute and record one run, and return its rows; write a report if the run has a problem."""
+    settings = job.settings
+    timeline = Timeline()
+    loaded = _load_mission(settings.mission, tuple({**settings.overrides, **job.variant}.items()))
+    options = RunOptions(job.seed, scene=settings.scene)
+    record_options = RecordOptions(saves_pictures=settings.saves_images, timeline=timeline)
+    result = record_run(loaded, options, job.runs_folder, record_options)
+    record = make_record(job.index, job.variant, result, timeline)
+    if record.run.problem:
+        try_write_report(result.run)
+    return record
+
+
+def make_fault_record(job: SweepJob, error: BaseException) -> RunRecord:
+    """Return the record of a run that raised an exception or whose processes died."""
+    text = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
+    run = RunRow(
+        run_index=job.index, seed=job.seed, variant=job.variant, status="FAULT", reason="fault", message=text
+    )
+    return RunRecord(run)
+
+
+@functools.lru_cache(maxsize=4)
+def _load_mission(mission: str, overrides: tuple[tuple[str, str], ...]) -> LoadedMission:
+    """Return the mission; cached, because a worker runs the same mission many times."""
+    return load_mission(mission, load_skills(), dict(overrides))

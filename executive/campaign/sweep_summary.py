@@ -11,7 +11,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.campaign.results.rows import RunRow, SkillRow, SweepSettings
+from executive.campaign.results import RunRow, SkillRow, SweepSettings
 from executive.record.timeline import PlanningTotals
 
 FloatArray = NDArray[np.float64]

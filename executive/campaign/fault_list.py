@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from executive.campaign.mission_under_test import MissionUnderTest
+from executive.campaign.jobs import MissionUnderTest
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import detect_and_record_drop

@@ -12,9 +12,8 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 
-from executive.campaign.faults.fault_list import INJECTED_MESSAGE, FaultLister, PlannedFault, SkillFault
-from executive.campaign.mission_under_test import MissionUnderTest
-from executive.campaign.pool import JobOptions, run_jobs
+from executive.campaign.fault_list import INJECTED_MESSAGE, FaultLister, PlannedFault, SkillFault
+from executive.campaign.jobs import JobOptions, MissionUnderTest, run_jobs
 from executive.errors import InputError
 from executive.events import RunEnded
 from executive.ledger.outcomes import is_balanced

@@ -1,1 +1,0 @@
-"""Execution of the jobs of a sweep by the workers of a dask scheduler."""

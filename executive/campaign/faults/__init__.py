@@ -1,1 +1,0 @@
-"""Fault campaigns: runs of a mission with all possible faults, singly and in pairs."""
