@@ -111,10 +111,6 @@ def wait_until_done(future: Future[T]) -> None:
         wait([future], MAX_BLOCKING_TIME)
 
 
-START_THRESHOLD = 100_000
-"""Number of new objects after which Python collects garbage during the start of a command.
-
-The number is large, because imports create many objects that remain."""
 CONTROL_THRESHOLD = 700
 """Number of new objects after which Python collects garbage between control steps: the default of Python."""
 

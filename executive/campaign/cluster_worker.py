@@ -1,4 +1,4 @@
-"""Worker side of the cluster execution: bundle, software comparison, returned run, and plugin of dask.""""""
+"""Worker side of the cluster execution: bundle, software comparison, returned run, and plugin of dask."""
 
 from __future__ import annotations
 

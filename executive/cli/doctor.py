@@ -33,7 +33,7 @@ class CheckResult(NamedTuple):
 
 @click.command(name="doctor")
 @json_option
-def command(as_json: bool) -> ExitCode:
+def doctor_command(as_json: bool) -> ExitCode:
     """Check this installation.
 
     Checks Python, display, key of Roboflow, packages, plugins and simulator. Exit code 1 if a problem
@@ -98,8 +98,8 @@ def check_plugins() -> Iterator[CheckResult]:
 
 def check_simulator() -> Iterator[CheckResult]:
     """Load a simulated cell."""
+    from executive.campaign.evaluation import load_cells
     from executive.cells.sim.world import World
-    from executive.cli.cells import load_cells
 
     World(load_cells(("overhead",))["overhead"])
     yield CheckResult("ok", "simulator", "loads the cell overhead")

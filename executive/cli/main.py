@@ -9,7 +9,7 @@ import signal
 import sys
 import tempfile
 import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
@@ -17,14 +17,31 @@ import click
 
 from executive.cli.streams import use_tolerant_streams
 from executive.errors import ExecutiveError, ExitCode, shorten_quotations
-from executive.processes import START_THRESHOLD
 from executive.run.run_control import TERMINATION_SIGNALS, handle_signals
 
-COMMANDS = (
-    "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "sweep",
-    "compare", "faults", "replay", "report", "doctor", "init",
-)  # fmt: skip
-"""Names of all commands in the order of `--help`; the module of a command has the name of the command."""
+COMMANDS: Mapping[str, str] = {
+    "run": "run",
+    "check": "check",
+    "tree": "check",
+    "skills": "skills",
+    "schema": "check",
+    "dataset": "training",
+    "train": "training",
+    "evaluate": "training",
+    "sweep": "sweep",
+    "compare": "sweep",
+    "faults": "sweep",
+    "replay": "run",
+    "report": "run",
+    "doctor": "doctor",
+    "init": "init",
+}
+"""Module in `executive.cli` of each command, in the order of `--help`."""
+
+START_THRESHOLD = 100_000
+"""Number of new objects after which Python collects garbage during the start of a command.
+
+The number is large, because imports create many objects that remain."""
 
 
 class CommandGroup(click.Group):
@@ -38,7 +55,11 @@ class CommandGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return the command with the name `cmd_name`; None if there is no such command."""
         del ctx
-        return import_module(f"executive.cli.{cmd_name}").command if cmd_name in COMMANDS else None
+        if cmd_name not in COMMANDS:
+            return None
+        module = import_module(f"executive.cli.{COMMANDS[cmd_name]}")
+        command: click.Command = getattr(module, f"{cmd_name}_command")
+        return command
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

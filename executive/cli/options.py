@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share."""
+"""Options and arguments of several commands."""
 
 from __future__ import annotations
 

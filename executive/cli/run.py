@@ -1,4 +1,4 @@
-"""`executive run`: run a mission once."""
+"""Commands of one run: `run`, `replay` and `report`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 import click
 
 from executive.cli import options
+from executive.cli.options import json_option, runs_option
 from executive.cli.streams import keep_stdout_clean, open_unescaped_stderr, print_json
+from executive.errors import ExitCode
 
 if TYPE_CHECKING:
     from executive.errors import ExitCode
@@ -43,7 +45,7 @@ if TYPE_CHECKING:
     help="Class that the operator requests; repeat the option for further requests, in their order.",
 )  # fmt: skip
 @click.pass_context
-def command(
+def run_command(
     ctx: click.Context, mission: str | None, resume: str | None, seed: int, overrides: dict[str, str],
     scene: Path | None, video: Path | None, force: bool, runs_folder: Path, as_json: bool, quiet: bool,
     has_page: bool, paused: bool, gui: bool, realtime: bool, requests: tuple[str, ...],
@@ -173,3 +175,65 @@ def _make_terminal_view(has_keyboard: bool) -> LineView | TerminalView:
         if console.is_terminal and not console.is_dumb_terminal:
             return TerminalView(console, sys.stdin.fileno() if has_keyboard else None)
     return LineView(sys.stderr)
+
+
+@click.command(name="replay")
+@click.argument("run", metavar="RUN")
+@click.option(
+    "--mission", "mission_file", type=options.FILE, help="Mission file instead of the recorded mission."
+)
+@options.video_option
+@options.force_option
+@options.runs_option
+@options.json_option
+def replay_command(
+    run: str, mission_file: Path | None, video: Path | None, force: bool, runs_folder: Path, as_json: bool
+) -> ExitCode:
+    """Repeat the decisions of a recorded run.
+
+    RUN is a run directory or `latest`. Nothing moves and nothing is simulated: tree, skills and ledger get
+    the recorded inputs from arm, tool, camera, detectors and operator. Exit code 1 if a decision differs
+    from the record; the first difference is printed. With --video, the world of the run is simulated again,
+    also after a halt or an interruption.
+    """
+    with keep_stdout_clean():
+        from executive.plugins import load_skills
+        from executive.record.journal import read_journal
+        from executive.record.replayed_run import replay_run
+        from executive.record.run_directory import find_run, read_cell
+
+        path = find_run(run, runs_folder)
+        if video is not None:
+            # The import takes 0.1 s, and only a video needs it.
+            from executive.view.video import write_video
+
+            options.check_video(video, read_cell(path).kind, force=force)
+            write_video(path, video)
+            click.echo(f"video: {video}", err=True)
+        result = replay_run(path, read_journal(path / "journal.jsonl"), load_skills(), mission_file)
+        comparison = ", all as recorded" if result.is_equal else f" as recorded, then {result.difference}"
+        click.echo(f"{result.decisions} decisions{comparison} ({path})", err=True)
+    if as_json:
+        print_json({"run": str(path), "same": result.is_equal, **result.as_json()})
+    return ExitCode.SUCCESS if result.is_equal else ExitCode.FAILURE
+
+
+@click.command(name="report")
+@click.argument("run", metavar="RUN")
+@runs_option
+@json_option
+def report_command(run: str, runs_folder: Path, as_json: bool) -> None:
+    """Write the report of a recorded run.
+
+    RUN is a run directory or `latest`. Prints the path of the report. Every run writes its report when it
+    ends; this command writes the report again, or for the first time if the run was killed.
+    """
+    with keep_stdout_clean():
+        from executive.record.run_directory import find_run
+        from executive.view.report import write_report
+
+        file = write_report(find_run(run, runs_folder))
+    if as_json:
+        print_json({"report": str(file), "bytes": file.stat().st_size})
+    else:
+        click.echo(file)

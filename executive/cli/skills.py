@@ -30,7 +30,7 @@ Declaration = Mapping[str, Any]
 @click.argument("name", required=False)
 @click.option("--conform", is_flag=True, help="Check that NAME, or every skill, conforms to the skill rules.")
 @json_option
-def command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
+def skills_command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
     """List the installed skills, or describe one skill.
 
     With NAME, prints all ports, params and failure reasons of this skill. Exit code 1 if a check of --conform

@@ -1,11 +1,12 @@
-"""`executive sweep`: run a mission for many seeds, and summarize the results."""
+"""Commands of many runs: `sweep`, `compare` and `faults`."""
 
 from __future__ import annotations
 
 import functools
+import re
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option("--junit", type=options.FILE, help="Write a report in the JUnit XML format to this file.")
 @click.pass_context
-def command(
+def sweep_command(
     ctx: click.Context, mission: str | None, seeds: range | None, variations: dict[str, tuple[str, ...]],
     resume: Path | None, workers: int, cluster: str | None, save_images: bool, overrides: dict[str, str],
     scene: Path | None, runs_folder: Path, require: str | None, junit: Path | None, as_json: bool,
@@ -61,8 +62,7 @@ def command(
             read_results,
         )
         from executive.cell.json_values import to_json
-        from executive.cli.progress import print_report
-        from executive.cli.sweep_tables import render_summary
+        from executive.cli.tables import print_report
 
         conditions = parse_requirement(require) if require else ()
         if resume is not None:
@@ -75,6 +75,8 @@ def command(
             click.echo(f"results: {database.path}", err=True)
             execute_missing_runs(database, workers, cluster)
             results = read_results(database)
+            from executive.cli.tables import render_summary
+
             print_report(render_summary(results.summaries, results.planned_run_count))
             page = write_page(database.path.parent, [results])
             click.echo(f"page: {page}", err=True)
@@ -106,10 +108,146 @@ def execute_missing_runs(
     """
     from executive.campaign.jobs import JobOptions, list_jobs
     from executive.campaign.sweep import run_sweep
-    from executive.cli.progress import print_halt, show_progress
+    from executive.cli.tables import print_halt, show_progress
 
     mission, jobs = database.settings.mission, list_jobs(database.settings, database.path.parent)
     stored_indices = {run.run_index for run in database.read_runs()}
     missing_jobs = [job for job in jobs if job.index not in stored_indices]
     with show_progress(f"{side}: {mission}" if side else mission) as progress:
         run_sweep(missing_jobs, database, JobOptions(workers, progress, print_halt), cluster)
+
+
+@click.command(name="compare")
+@click.argument("missions", metavar="A [B]", nargs=-1)
+@options.make_overrides_option("--set-a", "overrides_a", help="Like --set, but only for A; repeatable.")
+@options.make_overrides_option("--set-b", "overrides_b", help="Like --set, but only for B; repeatable.")
+@click.option(
+    "--resume", type=options.FOLDER, metavar="FOLDER",
+    help="Execute the missing runs of the interrupted comparison in this folder.",
+)  # fmt: skip
+@options.add_sweep_options
+@click.pass_context
+def compare_command(
+    ctx: click.Context, missions: tuple[str, ...], seeds: range | None, overrides_a: dict[str, str],
+    overrides_b: dict[str, str], resume: Path | None, workers: int, cluster: str | None, save_images: bool,
+    overrides: dict[str, str], scene: Path | None, runs_folder: Path, as_json: bool,
+) -> int:  # fmt: skip
+    """Run the missions A and B once for every seed, and estimate the differences.
+
+    A and B are files or names of shipped missions. A single mission is used as A and as
+    B, and --set-a and --set-b state the difference. The results of both are stored in a/results.sqlite and
+    b/results.sqlite in a folder below --runs. Each difference has a 95 % confidence interval.
+    Ctrl-C ends the current runs; then the results of the complete pairs are printed.
+    """
+    options.check_resume(
+        ctx, has_missions_and_seeds=len(missions) in (1, 2) and seeds is not None,
+        required_arguments="one or two missions and --seeds, or --resume FOLDER",
+        resumed_settings_text="missions, seeds and settings from the comparison",
+    )  # fmt: skip
+    options.check_disjoint(overrides, "--set-a or --set-b", {**overrides_a, **overrides_b})
+    with keep_stdout_clean():
+        from executive.campaign.results_page import write_missing_reports, write_page
+        from executive.campaign.sweep import create_comparison, make_settings, open_comparison, read_results
+        from executive.campaign.sweep_summary import SweepResults, compute_differences, pair_runs
+        from executive.cell.json_values import to_json
+        from executive.cli.tables import print_report
+
+        if resume is not None:
+            databases = open_comparison(resume)
+        else:
+            assert seeds is not None
+            settings = [
+                make_settings(mission, seeds, {**overrides, **own_overrides}, {}, scene, save_images)
+                for mission, own_overrides in ((missions[0], overrides_a), (missions[-1], overrides_b))
+            ]
+            databases = create_comparison(settings, runs_folder)
+        sweeps: list[SweepResults] = []
+        for side, database in zip("AB", databases, strict=True):
+            with closing(database):
+                if not any(sweep.is_incomplete for sweep in sweeps):
+                    execute_missing_runs(database, workers, cluster, side)
+                sweeps.append(read_results(database, side))
+        pairs = pair_runs(sweeps[0].runs, sweeps[1].runs)
+        differences, changed_pairs = compute_differences(pairs), [pair for pair in pairs if pair.is_changed]
+        write_missing_reports(changed_pairs)
+        page = write_page(databases[0].path.parents[1], sweeps, differences, changed_pairs)
+        from executive.cli.tables import render_differences
+
+        print_report(render_differences(differences, changed_pairs, len(pairs)))
+        click.echo(f"page: {page}", err=True)
+    if as_json:
+        print_json(to_json({
+            "settings": [sweep.settings for sweep in sweeps],
+            "results": [str(database.path) for database in databases], "page": str(page),
+            "pair_count": len(pairs), "differences": differences, "changed_pairs": changed_pairs,
+            "summaries": [summary for sweep in sweeps for summary in sweep.summaries],
+        }))  # fmt: skip
+    return ExitCode.HALTED if any(sweep.is_incomplete for sweep in sweeps) else ExitCode.SUCCESS
+
+
+def parse_fault_numbers(text: str) -> tuple[int, ...]:
+    """Return the fault numbers in a text such as `12`, or `3+12` for two faults in one run."""
+    if re.fullmatch(r"\d+(\+\d+)*", text) is None:
+        raise click.BadParameter(f'"{text}" is not a fault; write its number, or 3+12 for two faults')
+    return tuple(dict.fromkeys(int(number) for number in text.split("+")))
+
+
+@click.command(name="faults")
+@options.mission_argument
+@options.oracle_option
+@click.option("--pairs", type=options.COUNT, help="Inject this number of random pairs of faults.")
+@click.option(
+    "--fault", "fault_numbers", type=parse_fault_numbers, metavar="N[+M]",
+    help="Inject only the fault N of --list, or N and M together, and record the run.",
+)  # fmt: skip
+@click.option("--list", "list_only", is_flag=True, help="Print the faults without injecting them.")
+@options.workers_option
+@options.seed_option
+@options.overrides_option
+@options.runs_option
+@options.json_option
+def faults_command(
+    mission: str, oracle: bool, pairs: int | None, fault_numbers: tuple[int, ...] | None,
+    list_only: bool, workers: int, seed: int, overrides: dict[str, str], runs_folder: Path, as_json: bool,
+) -> int:  # fmt: skip
+    """Inject each possible fault into a run of a mission.
+
+    MISSION is a file or the name of a shipped mission. Its tree determines the faults: every reason of every
+    node, bugs in every skill, and faults of detectors, objects and the tool. A node failure that a
+    cell fault causes is not injected again, so that fewer faults are injected than --list prints.
+    Exit code 1 if a run does not handle its fault: the run loses an object within reach, misplaces an object,
+    does not end correctly, or has a ledger that differs from the world.
+    """
+    has_conflict = sum((pairs is not None, fault_numbers is not None, list_only)) > 1
+    options.check_usage((has_conflict, "--pairs, --fault and --list exclude each other; give one of them"))
+    with keep_stdout_clean():
+        from executive.campaign import faults as fault_campaign
+        from executive.campaign.jobs import JobOptions, load_mission_under_test
+        from executive.cli.tables import print_halt, show_progress
+
+        mission_under_test = load_mission_under_test(mission, overrides, oracle, seed)
+        with show_progress("faults", quiet=as_json or list_only or fault_numbers is not None) as progress:
+            campaign = fault_campaign.Campaign(mission_under_test, JobOptions(workers, progress, print_halt))
+            output: Any
+            exit_code = 0
+            if list_only:
+                output = [
+                    {"fault": number, "description": str(fault)}
+                    for number, fault in enumerate(campaign.faults, start=1)
+                ]
+                text = "\n".join(f"{entry['fault']:4} {entry['description']}" for entry in output)
+            elif fault_numbers is not None:
+                faults = campaign.select_faults(fault_numbers)
+                nominal_run = campaign.nominal_run
+                trial = fault_campaign.run_trial(mission_under_test, faults, nominal_run, runs_folder)
+                output = fault_campaign.trial_to_json(trial)
+                text = "\n".join(fault_campaign.list_trial_lines(trial))
+                exit_code = int(bool(trial.problems))
+            else:
+                campaign.run_fault_pairs(pairs) if pairs else campaign.run_single_faults()
+                output = fault_campaign.results_to_json(campaign)
+                text = "\n".join(fault_campaign.list_result_lines(campaign))
+                has_problems = any(trial.problems for trial in campaign.trials)
+                exit_code = int(has_problems) if campaign.is_complete else ExitCode.HALTED
+    print_json(output) if as_json else click.echo(text)
+    return exit_code

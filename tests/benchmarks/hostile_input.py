@@ -231,7 +231,7 @@ class CommandResult:
 def measure(texts: int = 5000, data_sets: int = 300, models: int = 300, seed: int = 0) -> Figures:
     """Run commands with hostile missions, cells, libraries, data sets, models and paths."""
     for name in COMMANDS:
-        import_module(f"executive.cli.{name}")
+        import_module(f"executive.cli.{COMMANDS[name]}")
     load_skills()
     groups: list[tuple[str, int, Writer]] = [
         ("texts", texts, write_texts),

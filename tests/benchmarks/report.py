@@ -20,9 +20,9 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from executive.campaign.evaluation import load_cells
 from executive.campaign.jobs import MissionUnderTest, load_mission_under_test
 from executive.cell.json_values import to_json
-from executive.cli.cells import load_cells
 from executive.cli.options import (
     json_option,
     mission_argument,

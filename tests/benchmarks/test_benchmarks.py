@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from events import at, item_changed
 
+from executive.campaign.evaluation import find_cell
 from executive.campaign.jobs import MissionUnderTest, load_mission_under_test
-from executive.cli.cells import find_cell
 from executive.mission.parse.cell_file import load_cell
 from executive.record.result import Audit, ItemCounts, Result
 from tests.benchmarks import (

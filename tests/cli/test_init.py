@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from executive.cli.init.project import (
+from executive.cli.init import (
     FOLDERS,
     PACKAGE,
     TEMPLATE,

@@ -1,16 +1,99 @@
-"""`executive evaluate`: measure the accuracy of a detector."""
+"""Commands of detectors: `dataset`, `train` and `evaluate`."""
 
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from executive.cli import options
+from executive.cli.options import COUNT, FILE, FOLDER, seed_option, workers_option
 from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import InputError
+
+
+@click.command(name="dataset")
+@click.argument("cells", metavar="CELL...", nargs=-1, required=True)
+@click.option("--out", type=FOLDER, required=True, help="Folder of the dataset.")
+@click.option("--images", type=COUNT, default=1000, help="Number of images.")
+@seed_option
+@click.option(
+    "--format", "dataset_format", type=click.Choice(["coco", "yolo"]), default="coco",
+    help="Format of the dataset: COCO or YOLO, as exported by Roboflow.",
+)  # fmt: skip
+@workers_option
+@click.option("--valid", type=click.FloatRange(0, 1), default=0.1, help="Fraction of images for validation.")
+def dataset_command(
+    cells: tuple[str, ...], out: Path, images: int, seed: int, dataset_format: str, workers: int, valid: float
+) -> None:
+    """Render labelled images for the training of a detector.
+
+    The images show random scenes of each CELL (a cell file or the name of a shipped cell) in turn.
+    """
+    with keep_stdout_clean():
+        from executive.campaign.evaluation import load_cells
+        from executive.cli.tables import show_progress
+        from executive.training.rendering import generate_dataset
+
+        configs = load_cells(cells)
+        with show_progress("rendering") as progress:
+            generate_dataset(
+                configs, out, image_count=images, seed=seed, layout=dataset_format, worker_count=workers,
+                valid_fraction=valid, progress=progress,
+            )  # fmt: skip
+        click.echo(f"{out}: {images} images", err=True)
+
+
+@click.command(name="train")
+@click.option(
+    "--dataset", type=FOLDER, required=True,
+    help="COCO or YOLO dataset, from `executive dataset` or an export of an annotation tool.",
+)  # fmt: skip
+@click.option("--out", type=FOLDER, required=True, help="Folder for model, checkpoints and metrics.")
+@click.option(
+    "--from", "model", type=FILE, metavar="MODEL",
+    help="Model file (.onnx or .pth) to fine-tune; by default, training starts from random weights.",
+)  # fmt: skip
+@click.option(
+    "--rate", type=click.FloatRange(min=0, min_open=True),
+    help="Learning rate; by default 1e-4 if --from is a model for the same classes, else 3e-4.",
+)  # fmt: skip
+@click.option("--epochs", type=COUNT, default=20, help="Number of passes over the dataset.")
+@seed_option
+def train_command(
+    dataset: Path, out: Path, model: Path | None, rate: float | None, epochs: int, seed: int
+) -> None:
+    """Train the small RF-DETR detector.
+
+    Needs the extra `train`: uv sync --extra train (a download of about 3 GB on Linux).
+    """
+    with keep_stdout_clean():
+        from executive.cli.tables import show_progress
+        from executive.training.train import load_dataset, train
+
+        splits = load_dataset(dataset)
+        for images in splits.values():
+            click.echo(images.summary, err=True)
+        with show_progress("training") as progress:
+            train(
+                splits, out, start_model=model, learning_rate=rate, epochs=epochs, seed=seed,
+                report_epoch=partial(_print_epoch, epochs), report_batch=progress,
+            )  # fmt: skip
+        click.echo(
+            "add these lines to the cell file, with paths relative to the folder of the cell file:\n\n"
+            "detectors:\n  trained:\n    kind: rfdetr\n"
+            f"    model_path: {out / 'model.onnx'}\n    labels: {out / 'labels.txt'}",
+            err=True,
+        )
+
+
+def _print_epoch(epoch_count: int, epoch: int, metrics: dict[str, float]) -> None:
+    values = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
+    click.echo(f"epoch {epoch} of {epoch_count}: {values}", err=True)
+
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 """File name suffixes of the formats in which the worst mistakes can be saved."""
@@ -61,7 +144,7 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 )  # fmt: skip
 @click.option("--sheet", type=options.FILE, metavar="FILE.png", help="Image file for the worst mistakes.")
 @options.json_option
-def command(
+def evaluate_command(
     cells: tuple[str, ...], detector_name: str | None, dataset: Path | None, weights: Path | None,
     labels: Path | None, images: int, seed: int, threshold: float | None, varied: bool, view: str,
     scene: Path | None, overrides: dict[str, str], out: Path | None, workers: int, force: bool,
@@ -95,8 +178,8 @@ def command(
     is_stored = bool(cells) and has_run_conditions and (out is not None or not overrides)
     with keep_stdout_clean():
         from executive.campaign import evaluation
-        from executive.cli.cells import find_cell, load_cells
-        from executive.cli.progress import print_report, show_progress
+        from executive.campaign.evaluation import find_cell, load_cells
+        from executive.cli.tables import print_report, show_progress
         from executive.training.samples import LabelledDataset
         from executive.view.detector_results import list_metrics
 

@@ -1,14 +1,16 @@
-"""Creation of a new project from the folder `template`."""
+"""`executive init`: create a project with a mission, a cell and a skill."""
 
 from __future__ import annotations
 
 import keyword
 import os
 import re
+import shlex
+import sys
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 
-from jinja2 import Environment, StrictUndefined
+import click
 
 from executive.errors import InputError, explain_os_errors
 
@@ -34,6 +36,9 @@ def write_project(folder: Path, package: str) -> list[str]:
     Raises:
         InputError: The folder is not empty, is a file, or cannot be written.
     """
+    # This import takes 0.06 s, which `executive --help` must not take.
+    from jinja2 import Environment, StrictUndefined
+
     _require_empty(folder)
     # The files are code and YAML, in which HTML escapes would be wrong.
     templates = Environment(autoescape=False, undefined=StrictUndefined, keep_trailing_newline=True)
@@ -105,3 +110,22 @@ def _find_conflict(name: str) -> str:
     if spec is not None and spec.origin is not None:
         return f"a module of this name is already installed: {spec.origin}"
     return ""
+
+
+@click.command(name="init")
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--name", help="Name of the Python package; by default derived from the name of DIR.")
+def init_command(folder: Path, name: str | None) -> None:
+    """Create a project with a mission, a cell and a skill.
+
+    The mission can be run at once, and the skill has tests. The folder DIR must be empty or must not exist.
+    The project need not be installed: commands that are run in DIR find its skills.
+    """
+    package = make_package_name(folder) if name is None else check_package_name(name, f'--name "{name}"')
+    files = write_project(folder, package)
+    click.echo(f"{folder}: {', '.join(files)}")
+    # `uv run executive init` activates the virtual environment only for this command.
+    click.echo(f"Type, after `. {shlex.quote(str(Path(sys.prefix) / 'bin' / 'activate'))}`:")
+    change_folder = "" if folder.resolve() == Path.cwd() else f"cd {shlex.quote(str(folder))} && "
+    click.echo(f"  {change_folder}executive run {MISSION_FILE}")
+    click.echo("  pytest")
