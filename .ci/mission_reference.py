@@ -178,7 +178,7 @@ def _shipped_missions() -> Iterator[str]:
 
 def _detectors() -> Iterator[str]:
     for name, entry in find_detector_kinds().items():
-        yield f"### Kind `{name}`\n\n{inspect.getdoc(inspect.getmodule(entry.load()))}"
+        yield f"### Kind `{name}`\n\n{(inspect.getdoc(entry.load()) or '').splitlines()[0]}"
         if options := DETECTOR_OPTIONS[name]:
             yield from _model(options)
 

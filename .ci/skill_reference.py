@@ -49,22 +49,22 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
     "Detectors": [
         ("detector = cell.detectors[name]", "cell/protocols.py", "Detector"),
         ("request = detector.request(frame, view)", "cell/protocols.py", "Request"),
-        ("answer = request.result()", "cell/detection.py", "Answer"),
-        ("answer.error_rates", "cell/detection.py", "ErrorRates"),
-        ("detection = answer.confident[0]", "cell/detection.py", "Detection"),
-        ("detections = Detections(...)", "cell/detection.py", "Detections"),
+        ("answer = request.result()", "cell/frame.py", "Answer"),
+        ("answer.error_rates", "cell/frame.py", "ErrorRates"),
+        ("detection = answer.confident[0]", "cell/frame.py", "Detection"),
+        ("detections = Detections(...)", "cell/frame.py", "Detections"),
     ],
     "Localizer": [
         ("cell.localizer", "cell/protocols.py", "Localizer"),
-        ("observation = cell.localizer.localize(detections)[0]", "cell/detection.py", "Observation"),
+        ("observation = cell.localizer.localize(detections)[0]", "cell/frame.py", "Observation"),
     ],
     "Ledger": [
-        ("cell.ledger", "cell/ledger.py", "Ledger"),
+        ("cell.ledger", "cell/protocols.py", "Ledger"),
         ("target = cell.ledger.find_targets()[0]", "cell/objects.py", "Target"),
     ],
     "Operator": [("cell.operator", "cell/protocols.py", "Operator")],
     "Bins and classes": [
-        ("bin = cell.bins[name]", "cell/bins.py", "Bin"),
+        ("bin = cell.bins[name]", "cell/objects.py", "Bin"),
         ("kind = cell.classes[label]", "cell/objects.py", "ObjectClass"),
     ],
     "The skill itself": [
@@ -79,12 +79,12 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("executive.perception.evidence", "perception/evidence.py", ""),
     ],
     "Test kit: fake cell": [
-        ("fake = FakeCell()", "cells/fake/cell.py", "FakeCell"),
-        ("fake.world", "cells/fake/cell.py", "FakeWorld"),
-        ("fake.arm", "cells/fake/cell.py", "FakeArm"),
-        ("fake.tool", "cells/fake/cell.py", "FakeTool"),
-        ("fake.camera", "cells/fake/cell.py", "FakeCamera"),
-        ("fake.detector", "cells/fake/cell.py", "FakeDetector"),
+        ("fake = FakeCell()", "cells/fake.py", "FakeCell"),
+        ("fake.world", "cells/fake.py", "FakeWorld"),
+        ("fake.arm", "cells/fake.py", "FakeArm"),
+        ("fake.tool", "cells/fake.py", "FakeTool"),
+        ("fake.camera", "cells/fake.py", "FakeCamera"),
+        ("fake.detector", "cells/fake.py", "FakeDetector"),
     ],
     "Test kit: run a skill or a mission": [
         ("executive.testing.run_skill", "testing/run_skill.py", ""),
@@ -92,7 +92,6 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("executive.testing.run_mission", "testing/run_mission.py", ""),
         ("result = run_mission(...)", "testing/run_mission.py", "MissionResult"),
         ("class MissionResult(RunEnded)", "events.py", "RunEnded"),
-        ("executive.testing.run_mission", "testing/substitutes.py", ""),
     ],
     "Test kit: faults": [
         ("Times and effects", "testing/faults.py", ""),

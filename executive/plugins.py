@@ -1,4 +1,7 @@
-"""Installed skills, cells, detectors and control nodes, from entry points, and software versions."""
+"""Installed skills, cells, detectors and control nodes, from entry points, and software versions.
+
+The entry points of the project in the working directory are found even if the project is not installed.
+"""
 
 from __future__ import annotations
 

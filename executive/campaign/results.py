@@ -1,4 +1,7 @@
-"""Results of many runs: rows per run, item and skill, and the database that stores them."""
+"""Results of many runs: rows per run, item and skill, and the database that stores them.
+
+`schema.sql` describes the fields.
+"""
 
 from __future__ import annotations
 

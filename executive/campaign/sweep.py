@@ -1,4 +1,7 @@
-"""Sweep: runs of one mission with many seeds and variants, in worker processes, and its folder."""
+"""Sweep: runs of one mission with many seeds and variants, in worker processes, and its folder.
+
+A folder is only created if the inputs are valid, and only opened if they have not changed since.
+"""
 
 from __future__ import annotations
 

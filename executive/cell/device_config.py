@@ -1,6 +1,8 @@
 """Sections of a cell file about devices: arm, tool, motion, cameras with calibration, noise and depth.
 
 Each field is a key of `missions/cells/*.yaml`, in SI units. Values of keys that end in `_deg` are in degrees.
+
+The loader writes every matrix of a calibration as the list of its entries, row by row.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""Protocols of the parts of a work cell that skills use: clock, tool, camera, detector, ledger, operator."""
+"""Protocols of the parts of a work cell that skills use: clock, tool, camera, detector, ledger, operator.
+
+Through these protocols, a skill runs unchanged in simulation, on the fake cell of the test kit, and on
+hardware. No call blocks: a skill sends a request, yields, and reads the result in a later control step.
+"""
 
 from __future__ import annotations
 

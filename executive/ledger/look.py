@@ -1,4 +1,8 @@
-"""Update of all items with one look: association of its observations with items, and its event."""
+"""Update of all items with one look: association of its observations with items, and its event.
+
+`associate` matches observations to nearby items. `find_moved_item` matches a new item to a known item that
+may have been moved. `find_duplicate` finds a second item at the position of an item.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,13 @@
-"""Joint configurations at goals and on vertical lines, and straight motions of the tool between them."""
+"""Joint configurations at goals and on vertical lines, and straight motions of the tool between them.
+
+The joint path `q(s)` of a straight motion is a polynomial through inverse-kinematics solutions; its parameter
+`s` is the distance that the tool has moved. `q_s`, `q_ss` and `q_sss` are the derivatives of `q` with respect
+to `s`. With speed `v`, acceleration `a` and jerk `j` of the tool, the chain rule gives those of the joints:
+
+    q' = q_s v,  q'' = q_s a + q_ss v²,  q''' = q_s j + 3 q_ss v a + q_sss v³.
+
+The limits of `v`, `a` and `j` keep every joint within its limits on the whole line.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,11 @@
 """Trajectory optimization: the fastest motion between two states that avoids all obstacles.
 
 The load limits the acceleration: the seal of the suction cup must hold with a safety factor.
+
+Sequential quadratic programming: each step linearizes the distances of the iterate (the current motion) from
+the obstacles, and finds the fastest motion near the iterate. The initial motion approximates a slow motion
+without collision that stops at via points above the obstacles, and determines on which side the result passes
+each obstacle.
 """
 
 from __future__ import annotations

@@ -1,4 +1,14 @@
-"""Planned motion of the arm, and braking on the path of a motion."""
+"""Planned motion of the arm, and braking on the path of a motion.
+
+Ruckig computes the time-optimal, jerk-limited piece between two states. Each joint has its own velocity
+profile, and all profiles have the duration of the slowest joint. The path between the states is not
+prescribed, so that the caller must check the joint positions on the path.
+
+On braking: path time `s` is the time parameter of the planned motion `q(s)`. While the arm brakes, the rate
+`r = ds/dt` falls from 1 to 0 with limited jerk (ruckig's velocity interface). By the chain rule, the
+acceleration of the joints is `q_ss r² + q_s dr/dt`; `q_s` and `q_ss` are the derivatives of `q` with respect
+to `s`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Pinhole camera model, base class of the cameras of cells, and heights in depth images."""
+"""Pinhole camera model, base class of the cameras of cells, and heights in depth images.
+
+Camera frames follow OpenCV: z along the optical axis, x to the right, y down. Image coordinates are
+continuous: pixel i covers [i, i + 1), so that the centre of an image is (W / 2, H / 2).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Simulated cell with true detections, and access to the world of a fake or simulated cell."""
+"""Simulated cell with true detections, and access to the world of a fake or simulated cell.
+
+A simulated sort takes about one second of computing time. Each frame contains its true detections, so that a
+detector knows only the objects that are visible in its frame.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Execution of a whole mission in a test, and substitutes of its skills that fail or raise an error."""
+"""Execution of a whole mission in a test, and substitutes of its skills that fail or raise an error.
+
+Each of the functions that make a substitute returns a subclass of a skill, with the same ports, params and
+reasons, for `run_mission(substitutes={"*/Grasp": make_failing(Grasp, "missed", start_count=2)})`. A
+substitute counts its starts over all nodes and runs, so make a new substitute for each mission run.
+"""
 
 from __future__ import annotations
 

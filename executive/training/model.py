@@ -1,6 +1,9 @@
 """The small RF-DETR (Nano with three encoder layers and fifty queries): creation, fitting and export.
 
 The training images are augmented by symmetries of the square.
+
+An exported model computes in float32. Nodes `Cast` and `Mul` convert its weights to float32, because
+onnxruntime evaluates these nodes once at load time, but executes `DequantizeLinear` for every image.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ PERMITTED = {
     ("mission/model/grammar.py", f'"{USE_KEYWORD}"'),
     ("cells/sim/scene_file.py", '"any"'),  # any class of objects
     ("skill.py", '"any"'),  # any state of the tool
-    ("record/diagnosis/diagnosis.py", '"repeat"'),  # label before the command that repeats a run
+    ("record/diagnosis.py", '"repeat"'),  # label before the command that repeats a run
     # The table of former and foreign words states what to write instead.
     *(
         ("mission/findings.py", f'"{word}"')

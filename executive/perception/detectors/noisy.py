@@ -30,7 +30,7 @@ class NoisyOptions(DetectorOptions):
 
 
 class NoisyDetector:
-    """Adds errors to the answers of another detector; implements `executive.cell.protocols.Detector`.
+    """Detector that adds random errors to the answers of another detector.
 
     The errors in each frame are random and depend on the seed. The detector omits the fraction `miss_rate`
     of the detections, gives the fraction `confusion_rate` a wrong class with low confidence, shifts each box

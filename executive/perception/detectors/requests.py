@@ -1,6 +1,8 @@
 """Detectors that run in a thread, and the screening of their answers.
 
 Answers become available at reproducible times of the run.
+
+Every answer of every kind of detector is screened before a skill reads it.
 """
 
 from __future__ import annotations

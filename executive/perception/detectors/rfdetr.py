@@ -1,4 +1,9 @@
-"""Detectors that run an exported RF-DETR model, an ONNX file; one such model is shipped."""
+"""Detectors that run an exported RF-DETR model, an ONNX file; one such model is shipped.
+
+Conventions of an export by rfdetr: input `(1, 3, H, W)`, RGB in 0..1, normalized with ImageNet's mean and
+standard deviation; outputs `dets` `(1, Q, 4)`, centre x, y, width, height in 0..1, and `labels`
+`(1, Q, C + 1)`, logits with the background last. All values are of float32 or float16.
+"""
 
 from __future__ import annotations
 
@@ -241,7 +246,7 @@ class RfdetrOptions(DetectorOptions):
 
 
 class RfdetrDetector(ThreadedDetector):
-    """Detector that runs a model in a thread; implements `executive.cell.protocols.Detector`.
+    """Detector that runs an exported RF-DETR model, an ONNX file, in a thread.
 
     Args:
         model: The model.

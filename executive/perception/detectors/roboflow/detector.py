@@ -241,7 +241,7 @@ def shorten_to_line(text: str) -> str:
 
 
 class RoboflowDetector(ThreadedDetector):
-    """Client of a hosted or self-hosted inference server; implements `executive.cell.protocols.Detector`.
+    """Detector that sends images to a Roboflow inference server, hosted or self-hosted.
 
     Args:
         config: Section of the detector in the cell file.
