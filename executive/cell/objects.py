@@ -11,6 +11,8 @@ import numpy as np
 
 from executive.geometry import Array
 
+UNKNOWN_LABEL = "unknown"
+"""Label of an object without a class."""
 Item = str
 """Id of one physical object in the ledger, for instance `cube-2`."""
 

@@ -1,9 +1,8 @@
-"""What simulated and fake cell share: base class, log of the world, and true positions of objects."""
+"""What simulated and fake cell share: the base class, and the true positions of the objects at the end."""
 
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,19 +13,15 @@ import numpy as np
 from executive.cell.arm import Arm
 from executive.cell.config import CellConfig
 from executive.cell.layout import build_bins, build_object_classes
-from executive.cell.objects import Bin, Target
+from executive.cell.objects import UNKNOWN_LABEL, Bin, Target
 from executive.cell.protocols import STEP, Cell, Detector, Localizer, Routes, StepClock, Tool
 from executive.cell.workcell import AUDIT_KEYS, CellOptions, Visuals
-from executive.errors import Fault, InputError, describe_os_error, explain_os_errors
 from executive.events import Emit, TargetSelected
 from executive.geometry import Array
 from executive.ledger.item import ItemRecord, State
 from executive.ledger.tracker import Tracker
 from executive.perception.camera_model import MountedCamera
 from executive.perception.detectors.requests import screen_detectors
-
-UNKNOWN_LABEL = "unknown"
-"""Label of an object without a class."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,57 +108,6 @@ def _find_place(final_object: FinalObject, routes: Routes) -> str:
     if not final_object.bin:
         return "elsewhere" if final_object.bin is None else "left"
     return "right" if final_object.bin in routes.get(final_object.label, ()) else "wrong_bin"
-
-
-class LogFile:
-    """A file without a write buffer, so that a killed process loses no written data.
-
-    Args:
-        path: Path of the file; None: all data are discarded.
-        content_name: Name of the content, for the message of a fault.
-        length: Length to which an existing file is truncated [byte], or None to keep its content.
-
-    Raises:
-        InputError: The file cannot be opened.
-    """
-
-    def __init__(self, path: Path | None, content_name: str, length: int | None = None) -> None:
-        self._path, self._content_name = path, content_name
-        self._has_content = bool(length)
-        self._file: int | None = None
-        if path is None:
-            return
-        with explain_os_errors(InputError, f'cannot write "{path}"'):
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-            if length is not None:
-                os.ftruncate(self._file, length)
-
-    def write(self, data: bytes, offset: int) -> None:
-        """Write all data at an offset in the file [byte]; do nothing if the file is closed.
-
-        Raises:
-            InputError: The disk does not accept the first data.
-            Fault: The disk does not accept later data. Later calls do nothing, so that the run can still
-                bring the arm to rest.
-        """
-        try:
-            while data and self._file is not None:
-                byte_count = os.pwrite(self._file, data, offset)
-                data, offset = data[byte_count:], offset + byte_count
-        except OSError as error:
-            self.close()
-            error_class = Fault if self._has_content else InputError
-            raise error_class(
-                f'{self._content_name} "{self._path}" cannot be written: {describe_os_error(error)}; '
-                "the run stops, because without this file it could not be resumed after an interruption"
-            ) from error
-        self._has_content = True
-
-    def close(self) -> None:
-        """Close the file; do nothing if it is closed."""
-        if self._file is not None:
-            file, self._file = self._file, None
-            os.close(file)
 
 
 class SilentOperator:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig
 from executive.cell.frame import Box
+from executive.cell.objects import UNKNOWN_LABEL
 from executive.cells.sim import arrangements
 from executive.cells.sim.arrangements import SceneObject
 from executive.cells.sim.camera import (
@@ -41,7 +42,6 @@ from executive.cells.sim.models import (
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, build_world
 from executive.cells.sim.spawn import spawn_objects
 from executive.cells.sim.world import WOOD_TEXTURE
-from executive.cells.without_hardware import UNKNOWN_LABEL
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, intersect_plane, project
 from executive.processes import WorkerPool

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from executive.cells.without_hardware import LogFile
+from executive.cells.log_file import LogFile
 from executive.errors import InputError, explain_os_errors
 from executive.motion.trajectory import Trajectory
 

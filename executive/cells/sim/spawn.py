@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from executive.cell.config import CellConfig
+from executive.cell.objects import UNKNOWN_LABEL
 from executive.cell.workcell import KeyPath
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import (
@@ -18,7 +19,6 @@ from executive.cells.sim.scene_file import (
     draw_unknown_models,
 )
 from executive.cells.sim.world import World
-from executive.cells.without_hardware import UNKNOWN_LABEL
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
 

@@ -15,6 +15,7 @@ import yaml
 
 from executive.cell.config import CellConfig
 from executive.cell.frame import Frame
+from executive.cell.objects import UNKNOWN_LABEL
 from executive.cell.workcell import CellOptions
 from executive.cells.fake import SHIPPED_ROUTES
 from executive.cells.sim.camera import CELL_LIGHT
@@ -23,7 +24,7 @@ from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, apply_scene, load_scene
 from executive.cells.sim.spawn import build_initial_world
 from executive.cells.sim.world import World
-from executive.cells.without_hardware import UNKNOWN_LABEL, SilentOperator
+from executive.cells.without_hardware import SilentOperator
 from executive.errors import InputError
 from executive.events import discard_event
 from executive.geometry import Pose
