@@ -9,7 +9,7 @@ from made_up_runs import TREE, ran
 
 from executive.mission.outline import OutlineNode
 from executive.record.timeline import Activation, Timeline
-from executive.view.report_timeline import (
+from executive.view.report import (
     FAILED_ATTEMPTS,
     LOOK,
     NO_ITEM,
