@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import yaml
 from pydantic import ConfigDict, TypeAdapter, ValidationError
@@ -16,13 +15,11 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from executive.cell.config import CellConfig
 from executive.errors import InputError, explain_os_errors
 from executive.events import RunStarted
+from executive.mission.load import LoadedMission, load_mission
 from executive.mission.outline import OutlineNode
 from executive.mission.parse.cell_file import CellFile
 from executive.mission.source import Source
 from executive.skill import Skill
-
-if TYPE_CHECKING:
-    from executive.mission.load import LoadedMission
 
 
 @contextlib.contextmanager
@@ -194,8 +191,6 @@ def read_mission_of_run(
         MissionError: The mission has errors, for instance because installed skills have changed.
         InputError: A file in the directory cannot be read.
     """
-    from executive.mission.load import load_mission
-
     # The recorded cell file already contains the overrides of the cell.
     overrides = {key: text for key, text in start.overrides.items() if not key.startswith("cell.")}
     cell_path = Path(start.base) / "cell.yaml"
