@@ -191,13 +191,11 @@ def _to_json(decision: TimedEvent | None) -> dict[str, JsonValue] | None:
 
 
 def _describe_decision(decision: TimedEvent | None) -> str:
-    """Return kind, time and fields of a decision as text."""
     if decision is None:
         return "no further decision"
-    fields = {key: value for key, value in vars(decision.event).items() if value}
-    values = ", ".join(f"{key} {fields[key]}" for key in fields if key not in ("outputs", "skill"))
-    kind = type(decision.event).__name__
-    text = f"at {decision.clock:.3f} s (step {decision.tick}) {kind}: {values}"
+    fields = vars(decision.event).items()
+    values = ", ".join(f"{key} {value}" for key, value in fields if value and key not in ("outputs", "skill"))
+    text = f"at {decision.clock:.3f} s (step {decision.tick}) {type(decision.event).__name__}: {values}"
     return shorten_quotations(escape_control_characters(text))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
-from rich.table import Table
+from rich.table import Column, Table
 
 from executive.training.metrics import NO_OBJECT, Evaluation
 
@@ -76,8 +76,5 @@ def _make_error_table(evaluation: Evaluation) -> Table:
 
 def _make_table(row_heading: str, *headings: str) -> Table:
     """Return an empty table with a left-aligned column for the names of rows, and right-aligned columns."""
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1))
-    table.add_column(row_heading)
-    for heading in headings:
-        table.add_column(heading, justify="right")
-    return table
+    columns = (Column(heading, justify="right") for heading in headings)
+    return Table(row_heading, *columns, box=SIMPLE_HEAD, padding=(0, 1))

@@ -49,6 +49,10 @@ REQUIRED_PACKAGES = ("aiohttp", "viser")
 """Optional dependencies of the project that the live page needs."""
 
 
+BodyPoses = Mapping[str, Sequence[float]]
+"""Poses of all bodies by name: position [m] and quaternion (w, x, y, z), `(7,)`."""
+
+
 @dataclass(frozen=True)
 class PageChange:
     """Change of the page that no event of the run describes; None for unchanged values.
@@ -59,6 +63,8 @@ class PageChange:
         is_paused: True if the run is paused.
         note: Message about the record of the run.
         result: Outcome of the run: `status`, `message`, `run` directory, and file of the `report` or "".
+        shapes: All shapes of the three-dimensional scene.
+        body_poses: New poses of all bodies of the scene.
     """
 
     clock: float | None = None
@@ -66,6 +72,8 @@ class PageChange:
     is_paused: bool | None = None
     note: str | None = None
     result: Mapping[str, str] | None = None
+    shapes: Sequence[Shape] | None = None
+    body_poses: BodyPoses | None = None
 
 
 @dataclass(frozen=True)
@@ -76,19 +84,7 @@ class CameraImage:
     search_event: FrameSearched
 
 
-BodyPoses = Mapping[str, Sequence[float]]
-"""Poses of all bodies by name: position [m] and quaternion (w, x, y, z), `(7,)`."""
-
-
-@dataclass(frozen=True)
-class SceneChange:
-    """Change of the three-dimensional scene: either all shapes, or new poses of all bodies."""
-
-    shapes: Sequence[Shape] | None = None
-    body_poses: BodyPoses | None = None
-
-
-Message = TimedEvent | PageChange | CameraImage | SceneChange
+Message = TimedEvent | PageChange | CameraImage
 """Message from the run to the server of the page."""
 
 
@@ -108,13 +104,6 @@ class PageCommand:
     text: str = ""
     browser_count: int = 0
     is_cpu_rendering: bool = False
-
-
-def encode_poses(poses: Mapping[str, Pose]) -> BodyPoses:
-    """Return positions [m] and quaternions of bodies by name; reorder (x, y, z, w) to (w, x, y, z)."""
-    return {
-        name: (*X_WB.position.tolist(), *np.roll(X_WB.quaternion, 1).tolist()) for name, X_WB in poses.items()
-    }
 
 
 class LivePage:
@@ -176,8 +165,7 @@ class LivePage:
         # In the empty line of each node, the page writes how often the node succeeded, failed and was halted.
         empty_results = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
-        self._enqueue(SceneChange(shapes=shapes))
-        self._enqueue(PageChange(tree=make_svg(nodes, run.mission, empty_results)))
+        self._enqueue(PageChange(tree=make_svg(nodes, run.mission, empty_results), shapes=shapes))
         run.control.call_between_ticks(self._send_state)
         self._send_state()
 
@@ -232,10 +220,8 @@ class LivePage:
                 self._was_paused = not self._was_paused
                 self._enqueue(PageChange(is_paused=self._was_paused))
             if self._can_send_images:
-                self._enqueue(PageChange(clock=self._run.now))
-                if self._visuals is not None:
-                    body_poses = encode_poses(self._visuals.poses())
-                    self._enqueue(SceneChange(body_poses=body_poses))
+                poses = None if self._visuals is None else encode_poses(self._visuals.poses())
+                self._enqueue(PageChange(clock=self._run.now, body_poses=poses))
 
     @property
     def _can_send_images(self) -> bool:
@@ -298,3 +284,10 @@ class LivePage:
             control.add_request(command.text)
         elif control is not None:
             getattr(control, command.name)()
+
+
+def encode_poses(poses: Mapping[str, Pose]) -> BodyPoses:
+    """Return positions [m] and quaternions of bodies by name; reorder (x, y, z, w) to (w, x, y, z)."""
+    return {
+        name: (*X_WB.position.tolist(), *np.roll(X_WB.quaternion, 1).tolist()) for name, X_WB in poses.items()
+    }

@@ -34,13 +34,16 @@ from executive import events
 from executive.cell.workcell import Shape
 from executive.record.picture_recorder import encode_jpeg
 from executive.record.timeline import STATUS_TEXTS, Timeline
-from executive.view.live_page import LOOPBACK, CameraImage, Message, PageChange, PageCommand, SceneChange
+from executive.view.live_page import LOOPBACK, CameraImage, Message, PageChange, PageCommand
 
 if TYPE_CHECKING:
     from executive.view.live_scene import LiveScene
 
 OCCLUSION_DARKENING = 0.45
 """Fraction by which the brightness of pixels that the arm occludes is reduced: 0 not at all, 1 to black."""
+
+SCENE_KEYS = ("shapes", "body_poses")
+"""Fields of `PageChange` that belong to the scene, which `SceneProxy` serves."""
 
 JsonObject = dict[str, object]
 """Values of a JSON object, by key."""
@@ -68,8 +71,9 @@ class PageState:
             case CameraImage():
                 self._set_values(look=_encode_camera_image(message))
             case PageChange():
-                changes = asdict(message).items()
-                self._set_values(**{key: value for key, value in changes if value is not None})
+                changes = vars(message).items()
+                values = {key: value for key, value in changes if value is not None and key not in SCENE_KEYS}
+                self._set_values(**values)
 
     def take_changes(self) -> JsonObject:
         """Return the values that changed since the last call, by key."""
@@ -151,7 +155,7 @@ class SceneProxy:
         self._scene: LiveScene | None = None
         self._start_lock = asyncio.Lock()
 
-    def apply(self, change: SceneChange) -> None:
+    def apply(self, change: PageChange) -> None:
         """Apply a change; once the shapes are known, a request of a browser starts the scene server."""
         if change.shapes is not None:
             self._shapes.set_result(change.shapes)
@@ -399,10 +403,9 @@ async def _serve(
 
     def apply_batch(batch: list[Message]) -> None:
         for message in batch:
-            if isinstance(message, SceneChange):
+            page_state.apply(message)
+            if isinstance(message, PageChange):
                 scene_proxy.apply(message)
-            else:
-                page_state.apply(message)
 
     def read_batches() -> None:
         try:

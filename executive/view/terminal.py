@@ -29,7 +29,25 @@ from executive.record.result import Result
 from executive.record.timeline import STATUS_TEXTS, Timeline
 from executive.run.run import Run
 from executive.run.run_control import RunControl
-from executive.view.text import draw_line_prefixes, find_skill_names, select_active_nodes
+from executive.view.text import draw_line_prefixes, select_active_nodes
+
+REDRAWS_PER_SECOND = 10
+"""Frequency at which the view is drawn [1/s]."""
+POLL_PERIOD = 0.1
+"""Maximum time until the reading thread notices that it must end [s]."""
+PAUSE_KEYS = (b"p", b" ")
+"""Keys that pause or continue a run."""
+STEP_KEY = b"s"
+"""Key that runs one control step."""
+HELP = "p pause, s step, Ctrl-C stop"
+"""Text about the keys while the run is not paused."""
+HELP_PAUSED = "paused: p continue, s step, Ctrl-C stop"
+"""Text about the keys while the run is paused."""
+
+_STATUS_MARKS = {"RUNNING": ("▶", "bold yellow"), "SUCCESS": ("✓", "green"), "FAILURE": ("✗", "red")}
+"""Character and style of the mark of a node, by the status of the node; any other node has a dim dot."""
+_STATE_STYLES = {"placed": "green", "rejected": "red", "lost": "red", "held": "yellow", "dropped": "yellow"}
+"""Style of the text of an item state; the text of any other state has no style."""
 
 
 def format_repeat_command(
@@ -117,14 +135,11 @@ class LineView:
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._names_by_path: dict[str, str] = {}
-        self._skill_names_by_path: dict[str, str] = {}
         self.timeline = Timeline(has_history=False)
 
     def open(self, run: Run) -> None:
         """Store the names of the nodes of a run."""
-        nodes = make_outline(run.root)
-        self._names_by_path = {node.path: node.name for node in nodes}
-        self._skill_names_by_path = find_skill_names(nodes)
+        self._names_by_path = {node.path: node.name for node in make_outline(run.root)}
 
     def __call__(self, timed: events.TimedEvent) -> None:
         """Write a line about an event if `_describe_event` returns a text."""
@@ -164,8 +179,9 @@ class LineView:
         return ""
 
     def _describe_skill(self, event: events.NodeStarted | events.NodeEnded) -> str:
-        """Return the name of the skill of an event, with the item of the event."""
-        return self._skill_names_by_path[event.node] + (f" [{event.item}]" if event.item else "")
+        # The name of a skill below a key is `recover: Grasp`.
+        name = self._names_by_path[event.node].rpartition(": ")[2]
+        return f"{name} [{event.item}]" if event.item else name
 
     def _describe_change(self, change: events.ItemChanged) -> str:
         """Return the text about a changed item; "" if only its position or its counts changed."""
@@ -178,23 +194,6 @@ class LineView:
 
 def _get_described_fields(change: events.ItemChanged) -> tuple[str, ...]:
     return change.label, change.state, change.bin, change.reason
-
-
-REDRAWS_PER_SECOND = 10
-"""Frequency at which the view is drawn [1/s]."""
-POLL_PERIOD = 0.1
-"""Maximum time until the reading thread notices that it must end [s]."""
-PAUSE_KEYS, STEP_KEY = (b"p", b" "), b"s"
-"""Keys that pause or continue a run, and key that runs one control step."""
-HELP = "p pause, s step, Ctrl-C stop"
-"""Text about the keys while the run is not paused."""
-HELP_PAUSED = "paused: p continue, s step, Ctrl-C stop"
-"""Text about the keys while the run is paused."""
-
-_STATUS_MARKS = {"RUNNING": ("▶", "bold yellow"), "SUCCESS": ("✓", "green"), "FAILURE": ("✗", "red")}
-"""Character and style of the mark of a node, by the status of the node; any other node has a dim dot."""
-_STATE_STYLES = {"placed": "green", "rejected": "red", "lost": "red", "held": "yellow", "dropped": "yellow"}
-"""Style of the text of an item state; the text of any other state has no style."""
 
 
 class TerminalView:
@@ -280,10 +279,7 @@ class TerminalView:
         return lines
 
     def _render_items(self) -> RenderableType:
-        """Return a table of the items of the run."""
-        table = Table(box=None, header_style="dim", padding=(0, 1))
-        for column in ("item", "class", "state", "bin"):
-            table.add_column(column)
+        table = Table("item", "class", "state", "bin", box=None, header_style="dim", padding=(0, 1))
         for item in self.timeline.items.list_items():
             state = Text(item.state, style=_STATE_STYLES.get(item.state, ""))
             table.add_row(Text(item.item), Text(item.label), state, Text(item.bin))
