@@ -47,7 +47,8 @@ class _Exporter:
     """Exporter of one mission."""
 
     def __init__(self, mission: Mission, skills: Mapping[str, type[Skill]]) -> None:
-        self._mission, self._skills = mission, skills
+        self._mission = mission
+        self._skills = skills
         self._models: dict[str, Element] = {}
         self._used_subtrees: list[Subtree] = []
         self._use_counts: Counter[str] = Counter()
@@ -94,7 +95,9 @@ class _Exporter:
         return self._add_element(parent, kind, node.skill, declarations, values)
 
     def _add_subtree_reference(self, parent: Element, node: nodes.SubtreeNode) -> Element:
-        subtree, ports, values = self._mission.subtrees[node.name], [], {}
+        subtree = self._mission.subtrees[node.name]
+        ports = []
+        values = {}
         if not self._use_counts[node.name]:
             self._used_subtrees.append(subtree)
         self._use_counts[node.name] += 1
@@ -194,9 +197,11 @@ def _format(value: nodes.KeyValue) -> str:
 
 def _make_port_model(port: _Declaration) -> Element:
     if isinstance(port, Key):
-        value_type, is_output = port.value_type, port.kind is KeyKind.VARIABLE
+        value_type = port.value_type
+        is_output = port.kind is KeyKind.VARIABLE
     else:
-        value_type, is_output = port.type, getattr(port, "direction", None) is Direction.OUT
+        value_type = port.type
+        is_output = getattr(port, "direction", None) is Direction.OUT
     model = Element("output_port" if is_output else "input_port", name=_escape(port.name))
     attributes = {"type": _TYPE_NAMES.get(value_type), "default": _format_constant(port.default)}
     model.attrib |= {name: text for name, text in attributes.items() if text}

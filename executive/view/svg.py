@@ -39,14 +39,20 @@ FRAME_PADDING = 9.0
 FRAME_HEADER = 20.0
 """Height of the part of a frame that contains the name of the subtree [pixel]."""
 
-TITLE_SIZE, LINE_SIZE, EDGE_LABEL_SIZE, SUBTREE_NAME_SIZE = 13.0, 11.0, 11.0, 12.0
-"""Font sizes of titles, lines, labels of edges and names of subtrees; `tree.svg` repeats them [pixel]."""
-
+TITLE_SIZE = 13.0
+LINE_SIZE = 11.0
+SUBTREE_NAME_SIZE = 12.0
+"""Font sizes of titles, of lines and labels of edges, and of names of subtrees; see `tree.svg` [pixel]."""
 _INVALID_IN_ID = re.compile(r"[^A-Za-z0-9_/]")
 """Pattern of the characters of a path that are escaped in the id of an SVG element."""
-_BOX_PADDING, _SYMBOL_WIDTH, _EDGE_LABEL_GAP = 11.0, 32.0, 4.0
-"""Padding of a box, width of a symbol with margins, and gap after the label of an edge [pixel]."""
-_TITLE_HEIGHT, _LINE_HEIGHT = 28.0, 14.0
+_BOX_PADDING = 11.0
+"""Distance between the texts and the sides of a box without a symbol [pixel]."""
+_SYMBOL_WIDTH = 32.0
+"""Width of a symbol with its margins [pixel]."""
+_EDGE_LABEL_GAP = 4.0
+"""Gap after the label of an edge [pixel]."""
+_TITLE_HEIGHT = 28.0
+_LINE_HEIGHT = 14.0
 """Heights of the title and of another line in the box of a node [pixel]."""
 _MAX_CORNER_RADIUS = 6.0
 """Maximum radius of the rounded corners of an edge [pixel]."""
@@ -66,10 +72,6 @@ class NodeResult:
 
     status: str = ""
     lines: tuple[str, ...] = ()
-
-
-NO_RESULTS: Mapping[str, NodeResult] = MappingProxyType({})
-"""Results of the nodes of a mission that did not run."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,9 @@ class _NodeDrawing:
         return make_group_id(self.node.path)
 
 
-def make_svg(nodes: Sequence[OutlineNode], name: str, results: Mapping[str, NodeResult] = NO_RESULTS) -> str:
+def make_svg(
+    nodes: Sequence[OutlineNode], name: str, results: Mapping[str, NodeResult] = MappingProxyType({})
+) -> str:
     """Return the drawing of a tree as an SVG document.
 
     `name` is the name of the mission, for the title; `results` contains results of nodes, by path.
@@ -156,7 +160,7 @@ def _compute_size(drawing: _NodeDrawing) -> NodeSize:
     height = _TITLE_HEIGHT + _LINE_HEIGHT * len(drawing.lines)
     label = drawing.node.parent_key
     name = drawing.node.joined_subtrees
-    label_width = estimate_text_width(label, EDGE_LABEL_SIZE) + _EDGE_LABEL_GAP if label else 0.0
+    label_width = estimate_text_width(label, LINE_SIZE) + _EDGE_LABEL_GAP if label else 0.0
     name_width = estimate_text_width(name, SUBTREE_NAME_SIZE, bold=True) + FRAME_PADDING if name else 0.0
     return NodeSize(drawing.indent + max(widths) + _BOX_PADDING, height, label_width, name_width)
 
@@ -168,7 +172,9 @@ def _make_edge(layout: Layout, parent: int | None, child: int, depth: int) -> st
     """
     if parent is None:
         return ""
-    start, end, edge_x = layout.boxes[parent], layout.boxes[child], layout.edge_xs[depth]
+    start = layout.boxes[parent]
+    end = layout.boxes[child]
+    edge_x = layout.edge_xs[depth]
     path = f"M{start.right_x:.0f} {start.middle_y:.0f}"
     height = end.middle_y - start.middle_y
     if height >= 1:
@@ -251,9 +257,9 @@ def compute_layout(depths: Sequence[int], children: ChildIndices, sizes: Sequenc
     frames = {}
     for index, box in enumerate(boxes):
         if sizes[index].subtree_name_width:
-            x, y = box.x - FRAME_PADDING, band_tops[index] + NODE_GAP / 2
+            y = band_tops[index] + NODE_GAP / 2
             width = right_xs[index] - box.x + FRAME_PADDING
-            frames[index] = Rectangle(x, y, width, band_heights[index] - NODE_GAP)
+            frames[index] = Rectangle(box.x - FRAME_PADDING, y, width, band_heights[index] - NODE_GAP)
     height = band_tops[0] + band_heights[0] + MARGIN - NODE_GAP / 2
     return Layout(boxes, edge_xs, frames, max(right_xs) + MARGIN, height)
 
@@ -278,9 +284,11 @@ def _compute_bands(children: ChildIndices, sizes: Sequence[NodeSize]) -> tuple[l
 
     Children follow their parents in the lists, so the bands are computed from the last node to the first.
     """
-    band_heights, node_offsets = [0.0] * len(sizes), [0.0] * len(sizes)
+    band_heights = [0.0] * len(sizes)
+    node_offsets = [0.0] * len(sizes)
     for index in reversed(range(len(sizes))):
-        size, node_children = sizes[index], children[index]
+        size = sizes[index]
+        node_children = children[index]
         top_padding, bottom_padding = (FRAME_HEADER, FRAME_PADDING) if size.subtree_name_width else (0.0, 0.0)
         half_height = (size.height + NODE_GAP) / 2
         first_child_offset = node_offsets[node_children[0]] if node_children else 0.0
@@ -309,7 +317,8 @@ def _find_branch_ends(
     """Return the x of the right end of each node with its descendants and their frames."""
     right_xs = [0.0] * len(sizes)
     for index in reversed(range(len(sizes))):
-        box, name_width = boxes[index], sizes[index].subtree_name_width
+        box = boxes[index]
+        name_width = sizes[index].subtree_name_width
         right_x = max([box.right_x, *(right_xs[child] for child in children[index])])
         right_xs[index] = max(right_x + FRAME_PADDING, box.x + name_width) if name_width else right_x
     return right_xs
