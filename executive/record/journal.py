@@ -128,7 +128,6 @@ class Journal:
     def __init__(self, path: Path, *, resume: bool = False) -> None:
         self._path = path
         self._has_failed = False
-        self._is_synced = True
         with explain_os_errors(InputError, f'cannot open the journal "{path}"'):
             fd = os.open(path, os.O_RDWR | os.O_APPEND | (0 if resume else os.O_CREAT), 0o644)
             try:
@@ -182,7 +181,7 @@ class Journal:
         advice = "check what the tool holds and what is in the bins"
         try:
             with explain_os_errors(Fault, f'the journal "{self._path}" may lack its last lines', advice):
-                if not self._is_synced and not self._has_failed:
+                if not self._has_failed:
                     self._sync(fd)
         finally:
             # `_sync` has already raised an exception if the disk has an error.
@@ -196,12 +195,10 @@ class Journal:
             # If the disk is nearly full, the system may write only a part of the line.
             unwritten = unwritten[os.write(fd, unwritten) :]
         self._file_size += len(line)
-        self._is_synced = False
 
     def _sync(self, fd: int) -> None:
         """Sync the file to the disk, and raise an OSError if another program changed the file."""
         os.fsync(fd)
-        self._is_synced = True
         status = os.fstat(fd)
         # Writing to a deleted file causes no error, but its content is lost when the file is closed.
         if not self._path.exists():

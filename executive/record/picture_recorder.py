@@ -173,8 +173,14 @@ def find_picture(folder: Path, item: str, reason: str) -> Path | None:
     `item` is "" for a failure without an item; `reason` is "" for the last selection of the item.
     """
     name_after_tick = "_".join(filter(None, (item, reason)))
-    pictures = [file for file in folder.glob("*.jpg") if file.stem.partition("_")[2] == name_after_tick]
-    return max(pictures, key=lambda file: int(file.stem.partition("_")[0]), default=None)
+    pictures = [file for file in folder.glob("*.jpg") if split_picture_name(file)[1] == name_after_tick]
+    return max(pictures, key=split_picture_name, default=None)
+
+
+def split_picture_name(file: Path) -> tuple[int, str]:
+    """Return the control step and the rest `<item>_<reason>` of the name of a picture; 0 without a step."""
+    tick, _, subject = file.stem.partition("_")
+    return int(tick) if tick.isdecimal() else 0, subject
 
 
 def draw_picture(picture: PictureContent) -> NDArray[np.uint8]:

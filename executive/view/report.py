@@ -11,7 +11,7 @@ import shlex
 from bisect import bisect_left
 from collections import defaultdict, deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from itertools import cycle, pairwise
 from operator import attrgetter
 from pathlib import Path
@@ -26,7 +26,7 @@ from executive.mission.text.file_search import get_shipped_folder
 from executive.perception.evidence import describe_unknown_labels
 from executive.record.diagnosis import list_labelled_sentences, make_resume_command
 from executive.record.journal import find_run_end, find_run_start, read_journal
-from executive.record.picture_recorder import PALETTE
+from executive.record.picture_recorder import PALETTE, split_picture_name
 from executive.record.result import is_resumable, list_requests, read_result
 from executive.record.run_directory import RunDirectory, convert_os_errors, read_tree, write_atomically
 from executive.record.timeline import Activation, Timeline, find_last_failure, format_counts, group_by_node
@@ -50,7 +50,7 @@ INTERRUPTED = "INTERRUPTED"
 """Status of a run whose journal has no end: the run was killed, or is still running."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Picture:
     """Picture of a decision or a failure in a run.
 
@@ -215,24 +215,20 @@ def collect_pictures(folder: Path, item_names: Collection[str]) -> list[Picture]
     pictures = sorted(links, key=attrgetter("tick", "file"))
     decisions = {picture.item: picture for picture in pictures if picture.item and not picture.reason}
     failures = [picture for picture in pictures if picture.reason]
+    shown_pictures = [*decisions.values(), *failures]
     free_size = MAX_EMBEDDED_SIZE
-    shown_pictures = []
-    for picture in (*decisions.values(), *failures):
+    for picture in shown_pictures:
         file = folder / Path(picture.file).name
         # Base64 encodes 3 bytes as 4 characters.
         if file.stat().st_size * 4 / 3 <= free_size:
-            source = "data:image/jpeg;base64," + base64.b64encode(file.read_bytes()).decode()
-            free_size -= len(source)
-            picture = replace(picture, source=source)
-        shown_pictures.append(picture)
+            picture.source = "data:image/jpeg;base64," + base64.b64encode(file.read_bytes()).decode()
+            free_size -= len(picture.source)
     return shown_pictures
 
 
 def _link_picture(file: Path, item_names: Collection[str]) -> Picture:
-    """Return a link to a picture, with the information in its file name `<tick>_<item>_<reason>`."""
     path = f"{file.parent.name}/{file.name}"
-    tick_text, _, subject = file.stem.partition("_")
-    tick = int(tick_text) if tick_text.isdecimal() else 0
+    tick, subject = split_picture_name(file)
     # The name of an item may be the beginning of the name of another item, so long names are tried first.
     for item in sorted(item_names, key=len, reverse=True):
         if subject == item or subject.startswith(f"{item}_"):

@@ -159,18 +159,14 @@ def fold_subtrees(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
             # Two uses of a subtree may have different params, and therefore different titles and details.
             is_equal = content_by_subtree[repeated_subtree] == content
             detail = "as above" if is_equal else "as above, other params"
-            folded_nodes.append(_make_use_node(node, repeated_subtree, detail))
+            outer_subtrees = node.subtrees[: node.subtrees.index(repeated_subtree)]
+            use_node = OutlineNode(
+                node.path, node.name, node.depth, detail, USE_KEYWORD, repeated_subtree, node.parent_key,
+                node.trigger, outer_subtrees, symbol="…",
+            )  # fmt: skip
+            folded_nodes.append(use_node)
             index = end
     return folded_nodes
-
-
-def _make_use_node(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
-    """Return a node that stands for a whole subtree; it replaces `node`, the first node of the subtree."""
-    outer_subtrees = node.subtrees[: node.subtrees.index(subtree)]
-    return OutlineNode(
-        node.path, node.name, node.depth, detail, USE_KEYWORD, subtree, node.parent_key, node.trigger,
-        outer_subtrees, symbol="…",
-    )  # fmt: skip
 
 
 def select_active_nodes(nodes: Sequence[OutlineNode], running_paths: Collection[str]) -> list[OutlineNode]:
