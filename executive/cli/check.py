@@ -15,8 +15,8 @@ from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import ExitCode
 
 if TYPE_CHECKING:
+    from executive.mission.analysis import UnhandledFailure
     from executive.mission.findings import Finding
-    from executive.mission.flow_analysis import UnhandledFailure
 
 
 @click.command(name="check")

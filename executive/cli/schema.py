@@ -21,8 +21,7 @@ def command(cell: bool, library: bool, journal: bool) -> None:
     if cell + library + journal > 1:
         raise click.UsageError("--cell, --library and --journal exclude each other; give one of them")
     with keep_stdout_clean():
-        from executive.mission.schema.file_schemas import make_library_schema, make_mission_schema
-        from executive.mission.schema.types import make_cell_schema
+        from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
         from executive.plugins import load_skills
         from executive.record.journal_format import make_journal_schema
         from executive.tree.node_registry import load_control_nodes

@@ -11,7 +11,7 @@ import pytest
 from executive.cell.config import TableConfig
 from executive.cell.detection import Answer, ErrorRates, assume_rates
 from executive.cell.frame import Frame
-from executive.mission.parse.cell_file import load_cell
+from executive.mission.cell_file import load_cell
 from executive.perception.envelope import (
     FrameRange,
     Measurement,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Collection, Iterator, Sequence
 
-from executive.mission.model.grammar import USE_KEYWORD
+from executive.mission.grammar import USE_KEYWORD
 from executive.mission.outline import Connection, OutlineNode, list_child_indices
 
 MAX_LINE_LENGTH = 100
