@@ -16,10 +16,10 @@ from executive.cell.device_config import Section
 from executive.cells.sim.scene_file import SceneConfig
 from executive.cli.main import main as command_line
 from executive.cli.skills import Declaration, collect_declarations
+from executive.mission import grammar
+from executive.mission.file_search import list_shipped_missions
 from executive.mission.findings import MEANING_BY_CODE
-from executive.mission.model import grammar
-from executive.mission.schema.types import Schema, make_type_schema
-from executive.mission.text.file_search import list_shipped_missions
+from executive.mission.schema import Schema, make_type_schema
 from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.perception.detectors.noisy import NoisyOptions
 from executive.perception.detectors.rfdetr import RfdetrOptions

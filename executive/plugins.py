@@ -25,7 +25,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from py_trees.behaviour import Behaviour
 
-from executive.behaviours.behaviour_skill import make_behaviour_skill
+from executive.behaviours import make_behaviour_skill
 from executive.cell.workcell import CellKind
 from executive.errors import InputError, explain_os_errors
 from executive.skill import Skill

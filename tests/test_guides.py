@@ -20,15 +20,15 @@ from executive.cells.sim.scene_file import (
 )
 from executive.cli.main import main
 from executive.events import Event
+from executive.mission.cell_file import load_cell
+from executive.mission.file_search import list_shipped_missions
 from executive.mission.load import LoadedMission, load_mission
-from executive.mission.parse.cell_file import load_cell
-from executive.mission.schema.file_schemas import make_mission_schema
-from executive.mission.source import Source
-from executive.mission.text.file_search import list_shipped_missions
-from executive.mission.text.yaml_text import parse_yaml
+from executive.mission.schema import make_mission_schema
+from executive.mission.yaml_text import parse_yaml
 from executive.plugins import load_cell_kind, load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.tree.node_registry import load_control_nodes
+from executive.tree.specification import Source
 
 LONGEST = 300.0
 """Time on the run's clock within which every mission shown is done on the fake cell [s]."""

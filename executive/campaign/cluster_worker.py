@@ -30,7 +30,7 @@ import executive
 from executive.campaign.jobs import SweepJob, make_fault_record, run_job
 from executive.campaign.results import RunRecord
 from executive.errors import InputError
-from executive.mission.text.file_search import find_mission, get_shipped_folder
+from executive.mission.file_search import find_mission, get_shipped_folder
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.envelope import MEASUREMENT_SUFFIX
 from executive.plugins import (

@@ -9,7 +9,7 @@ from executive.campaign.jobs import MissionUnderTest
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import detect_and_record_drop
-from executive.mission.model.nodes import SkillNode
+from executive.mission.nodes import SkillNode
 from executive.record.timeline import Activation
 from executive.skill import EMPTY, HOLDING, Skill
 from executive.testing import faults as effects

@@ -17,9 +17,9 @@ from executive.campaign.jobs import JobOptions, MissionUnderTest, run_jobs
 from executive.errors import InputError
 from executive.events import RunEnded
 from executive.ledger.outcomes import is_balanced
-from executive.mission.flow_analysis import UnhandledFailure
-from executive.mission.model.instance import get_mission_node, make_inspection_instance
-from executive.mission.model.nodes import InnerNode, SubtreeNode
+from executive.mission.analysis import UnhandledFailure
+from executive.mission.instance import get_mission_node, make_inspection_instance
+from executive.mission.nodes import InnerNode, SubtreeNode
 from executive.record.journal import Recorder
 from executive.record.recorded_run import execute_recorded, make_run_directory
 from executive.record.result import is_confirmed_by_audit

@@ -19,8 +19,8 @@ from executive.errors import ExitCode
 
 if TYPE_CHECKING:
     from executive.cell.protocols import Cell
+    from executive.mission.analysis import UnhandledFailure
     from executive.mission.findings import Finding
-    from executive.mission.flow_analysis import UnhandledFailure
 
 
 @click.command(name="check")
@@ -157,8 +157,7 @@ def schema_command(cell: bool, library: bool, journal: bool) -> None:
     if cell + library + journal > 1:
         raise click.UsageError("--cell, --library and --journal exclude each other; give one of them")
     with keep_stdout_clean():
-        from executive.mission.schema.file_schemas import make_library_schema, make_mission_schema
-        from executive.mission.schema.types import make_cell_schema
+        from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
         from executive.plugins import load_skills
         from executive.record.journal import make_journal_schema
         from executive.tree.node_registry import load_control_nodes

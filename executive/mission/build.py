@@ -9,12 +9,11 @@ from fnmatch import fnmatchcase
 from executive.cell.protocols import Cell
 from executive.errors import InputError
 from executive.events import Emit
+from executive.mission.grammar import SEQUENCE_KEYWORD
+from executive.mission.instance import make_instance
 from executive.mission.load import LoadedMission
-from executive.mission.model.conversion import convert_setting
-from executive.mission.model.grammar import SEQUENCE_KEYWORD
-from executive.mission.model.instance import make_instance
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
-from executive.mission.model.wiring import find_literals, find_wires
+from executive.mission.nodes import InnerNode, Node, SkillNode, SubtreeNode
+from executive.mission.ports import convert_setting, find_literals, find_wires
 from executive.skill import Direction, Param, Port, Skill
 from executive.tree.node_registry import ControlNodes, load_control_nodes
 from executive.tree.skill_leaf import SkillLeaf, Wiring

@@ -11,14 +11,23 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
-from executive.mission.model.mission import Mission, Quota, Subtree
-from executive.mission.model.nodes import InnerNode, InvalidNode, Node, SkillNode, SubtreeNode, map_parts
-from executive.mission.model.values import InvalidValue, Literal, LocatedName, Reference, Value
-from executive.mission.model.wiring import find_control_node_outputs, find_written_variables
-from executive.mission.source import Span
+from executive.mission.mission_file import Mission, Quota, Subtree
+from executive.mission.nodes import (
+    InnerNode,
+    InvalidNode,
+    KeyedValues,
+    KeyValue,
+    Node,
+    NodeSection,
+    SkillNode,
+    SubtreeNode,
+    map_parts,
+)
+from executive.mission.ports import find_control_node_outputs, find_written_variables
 from executive.plugins import Skills
 from executive.skill import Direction
 from executive.tree.keys import KeyKind
+from executive.tree.specification import InvalidValue, Literal, LocatedName, Reference, Span, Value
 
 _MAX_DEPTH = 40
 """Maximum depth of an expanded tree."""
@@ -294,3 +303,67 @@ class _Expander:
 
 def _prefix_variable(value: Value) -> Value:
     return replace(value, name=_CALLER_PREFIX + value.name) if isinstance(value, Reference) else value
+
+
+def assign_paths(root: Node) -> Node:
+    """Return the tree with the paths of all nodes."""
+    return _assign_path(root, "", "tree")
+
+
+def _assign_path(node: Node, parent_path: str, key_path: str, name: str = "") -> Node:
+    """Return the node with its path and the paths of its descendants.
+
+    `key_path` is the part of the path for the key of the parent that contains the node, or "". `name` is the
+    last part of the path; the default is `node.path_name`, and for a list no name.
+    """
+    path = _join(parent_path, key_path, name or ("" if node.is_list else node.path_name))
+    match node:
+        case InnerNode():
+            return replace(node, path=path, values=_assign_value_paths(node, path))
+        case SubtreeNode(body=Node() as body):
+            return replace(node, path=path, body=_assign_path(body, path, "do" if node.label else ""))
+        case InvalidNode():
+            return replace(node, path=path, parts=_assign_list_paths(node.parts, path))
+    return replace(node, path=path)
+
+
+def _assign_value_paths(owner: KeyedValues, path: str, section_path: str = "") -> dict[str, KeyValue]:
+    """Return the values by key, with paths for the nodes in the values; `path` is that of the control node.
+
+    If `owner` is a section, `section_path` is its path in the control node: `backoff`, or `cases/2`.
+    """
+    values: dict[str, KeyValue] = {}
+    for key, value in owner.iterate_keys():
+        # In the path of a child below `do` of a section, the key `do` is omitted.
+        key_path = section_path if section_path and key.name == "do" else _join(section_path, key.name)
+        if isinstance(value, Node):
+            value = _assign_path(value, path, key_path if key.in_path or value.is_list else "")
+        elif isinstance(value, NodeSection):
+            value = replace(value, values=_assign_value_paths(value, path, key_path))
+        elif isinstance(value, tuple) and key.kind is KeyKind.NODES:
+            value = _assign_list_paths(tuple(item for item in value if isinstance(item, Node)), path)
+        elif isinstance(value, tuple):
+            value = tuple(
+                replace(item, values=_assign_value_paths(item, path, f"{key_path}/{index}"))
+                if isinstance(item, NodeSection)
+                else item
+                for index, item in enumerate(value, 1)
+            )
+        values[key.name] = value
+    return values
+
+
+def _assign_list_paths(nodes: tuple[Node, ...], parent_path: str) -> tuple[Node, ...]:
+    counts = Counter(node.path_name for node in nodes)
+
+    def get_unique_name(index: int, node: Node) -> str:
+        name = node.path_name
+        has_own_name = bool(node.label) or isinstance(node, SkillNode | SubtreeNode)
+        return name if has_own_name and counts[name] == 1 else f"{index}:{name}"
+
+    names = [get_unique_name(index, node) for index, node in enumerate(nodes, 1)]
+    return tuple(_assign_path(node, parent_path, "", name) for node, name in zip(nodes, names, strict=True))
+
+
+def _join(*names: str) -> str:
+    return "/".join(name for name in names if name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import cast
 
@@ -13,23 +14,142 @@ from executive.cell.config import CellConfig
 from executive.cell.objects import Quotas
 from executive.cell.workcell import CellKind
 from executive.errors import InputError
-from executive.mission.check.checks import run_checks
-from executive.mission.check.context import CheckContext
-from executive.mission.check.routes import check_slots, check_weights
-from executive.mission.expand import expand
+from executive.mission import check_flow, check_nodes, check_skills, check_variables
+from executive.mission.analysis import CheckContext, UnhandledFailure, find_unhandled_failures
+from executive.mission.cell_file import CellFile, read_cell
+from executive.mission.expand import assign_paths, expand
+from executive.mission.file_search import find_file_below, find_mission, get_shipped_folder, read_source
 from executive.mission.findings import Finding, MissionError, make_warning, sort_findings
-from executive.mission.flow_analysis import UnhandledFailure, find_unhandled_failures
-from executive.mission.model.mission import Mission
-from executive.mission.model.node_paths import assign_paths
-from executive.mission.model.nodes import InvalidNode, Node
-from executive.mission.model.values import Literal
-from executive.mission.parse.cell_file import CellFile
-from executive.mission.parse.read_mission import read_mission
-from executive.mission.text.file_search import find_mission, get_shipped_folder
+from executive.mission.mission_file import Mission, Subtree, parse_library, parse_mission
+from executive.mission.node_parser import NodeParser
+from executive.mission.nodes import InvalidNode, Node
+from executive.mission.yaml_text import parse_yaml
 from executive.perception.camera_model import find_calibration_doubts
 from executive.perception.envelope import find_unmeasured_detectors
+from executive.plugins import Skills
 from executive.skill import Skill
-from executive.tree.node_registry import load_control_nodes
+from executive.tree.node_registry import ControlNodes, load_control_nodes
+from executive.tree.specification import Literal, LocatedName, Source
+
+Check = Callable[[CheckContext], Iterator[Finding]]
+"""Function that yields the findings of one check."""
+
+CHECKS: tuple[Check, ...] = (
+    check_skills.find_unknown_skills,
+    check_skills.check_settings,
+    check_nodes.check_constants,
+    check_nodes.check_labels,
+    check_skills.check_names,
+    check_skills.check_quotas,
+    check_skills.find_undetectable_classes,
+    check_skills.find_unweighed_classes,
+    check_nodes.check_failure_names,
+    check_variables.find_unwritten_inputs,
+    check_variables.find_unwritten_library_inputs,
+    check_variables.find_overwritten_loop_variables,
+    check_variables.find_unread_variables,
+    check_variables.find_unwritten_returns,
+    check_variables.check_port_types,
+    check_flow.check_tool_states,
+    check_flow.check_tool_at_end,
+    check_flow.find_unreachable,
+    check_nodes.run_node_checks,
+    check_flow.find_shared_resources,
+    check_flow.find_shared_variables,
+    check_flow.find_read_races,
+)
+"""All checks; a check ignores the errors that another check reports, and their consequences."""
+
+MAX_FINDINGS_PER_CHECK = 1000
+"""Maximum number of findings of one check; a short mission can cause hundreds of thousands of findings."""
+
+
+def run_checks(context: CheckContext) -> list[Finding]:
+    """Return the findings of all checks."""
+    return [finding for check in CHECKS for finding in islice(check(context), MAX_FINDINGS_PER_CHECK)]
+
+
+@dataclass(frozen=True)
+class MissionFiles:
+    """The files of a mission.
+
+    Attributes:
+        source: Text of the mission file.
+        mission: Content of the mission file and the subtrees of its libraries.
+        libraries: Text of each library file by its path as written in the mission.
+        behaviours: Behaviours of py_trees that the files name, as skills, by the names of their classes.
+        cell: Content of the cell file, or None if the file cannot be read.
+        findings: Errors of the parsers.
+    """
+
+    source: Source
+    mission: Mission
+    libraries: Mapping[str, str]
+    behaviours: Skills
+    cell: CellFile | None
+    findings: tuple[Finding, ...]
+
+
+def read_mission(
+    path: Path,
+    overrides: Mapping[str, str],
+    skills: Skills,
+    node_classes: ControlNodes,
+    recorded_cell: CellFile | None = None,
+) -> MissionFiles:
+    """Return the content of a mission file, its libraries, and its cell file or the recorded cell.
+
+    Raises:
+        MissionError: The mission file is not valid YAML.
+        InputError: The mission file does not exist.
+    """
+    source = read_source(path)
+    root, findings = parse_yaml(source)
+    if root is None:
+        raise MissionError(sort_findings(findings, source.path))
+    parser = NodeParser(findings, skills, node_classes)
+    mission = parse_mission(root, overrides, parser)
+    subtrees = dict(mission.subtrees)
+    texts = {file.name: _add_library(file, path.parent, parser, subtrees) for file in mission.libraries}
+    libraries = {name: text for name, text in texts.items() if text is not None}
+    mission = replace(mission, subtrees=subtrees, is_complete=len(libraries) == len(texts))
+    cell = recorded_cell
+    if cell is None and mission.cell.name:
+        try:
+            cell = read_cell(find_file_below(path.parent, mission.cell.name), overrides)
+            findings += cell.findings
+        except InputError as error:
+            parser.add_error(mission.cell.span, "no-cell", str(error))
+    return MissionFiles(source, mission, libraries, parser.behaviours, cell, tuple(findings))
+
+
+def _add_library(
+    reference: LocatedName, folder: Path, parser: NodeParser, subtrees: dict[str, Subtree]
+) -> str | None:
+    """Add the subtrees of a library to `subtrees`; return the text of the library, or None after an error."""
+    try:
+        source = read_source(find_file_below(folder, reference.name))
+    except InputError as error:
+        parser.add_error(reference.span, "no-library", str(error))
+        return None
+    root, yaml_findings = parse_yaml(source)
+    parser.findings += yaml_findings
+    if root is None:
+        return None
+    for name, subtree in parse_library(root, parser).items():
+        first_subtree = subtrees.setdefault(name, subtree)
+        if first_subtree is subtree:
+            continue
+        # The position is in the mission file: the subtree of this name, or the path of the library.
+        if first_subtree.library:
+            span, other_span = reference.span, first_subtree.span
+            hint = "Delete one of the libraries from the list."
+        else:
+            span, other_span, hint = first_subtree.span, subtree.span, "Rename one of them."
+        message = f'there are two subtrees "{name}"; the other is in {other_span.describe_place(span.source)}'
+        parser.add_error(span, "duplicate-tree", message, hint)
+    return source.text
+
 
 CellKindFinder = Callable[[str], CellKind]
 """Function that returns the kind of cell with a name; raises InputError if the kind is not installed."""
@@ -125,8 +245,8 @@ def load_mission(
             classes_by_detector = dict(cell_kind.labels(config, folder))
             # Kinds of other packages may have no `compute_mass`; it would fail for an invalid model.
             compute_mass = None if cell_findings else getattr(cell_kind, "compute_mass", None)
-            findings += check_weights(cell, config, mission, compute_mass)
-            findings += check_slots(cell, config, mission)
+            findings += check_skills.check_weights(cell, config, mission, compute_mass)
+            findings += check_skills.check_slots(cell, config, mission)
     expansion = expand(mission, skills, _make_predefined_lists(mission, config) if config else {})
     mission = replace(mission, quotas=expansion.quotas)
     tree = assign_paths(expansion.tree or InvalidNode(files.source.make_span(), label=""))

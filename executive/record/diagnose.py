@@ -9,17 +9,17 @@ from pathlib import Path, PurePath
 
 from executive.errors import RecordLost
 from executive.events import RunEnded
+from executive.mission.instance import get_mission_node, make_inspection_instance
 from executive.mission.load import LoadedMission
-from executive.mission.model.instance import get_mission_node, make_inspection_instance
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
+from executive.mission.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.record.diagnosis import Diagnosis, FailureNode, LostItem
 from executive.record.picture_recorder import find_picture
 from executive.record.result import is_resumable
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline import ItemHistory, Look, Sighting, Timeline, get_skill_name
-from executive.tree.failure import Reason
 from executive.tree.inspection import Advice, PropagatedFailure
 from executive.tree.node_registry import load_control_nodes
+from executive.tree.specification import Reason
 
 CAMERA_ADVICE = "mount camera and bins as the cell file says, or measure the pose again"
 """Advice about a displaced camera, which no change of the mission corrects."""

@@ -15,11 +15,11 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from executive.cell.config import CellConfig
 from executive.errors import InputError, explain_os_errors
 from executive.events import RunStarted
+from executive.mission.cell_file import CellFile
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.outline import OutlineNode
-from executive.mission.parse.cell_file import CellFile
-from executive.mission.source import Source
 from executive.skill import Skill
+from executive.tree.specification import Source
 
 
 @contextlib.contextmanager

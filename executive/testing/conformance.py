@@ -24,7 +24,7 @@ from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import CellOptions
 from executive.cells.fake import SHIPPED_ROUTES, FakeCell
 from executive.cells.without_hardware import SilentOperator
-from executive.mission.model.port_types import describe_type, find_element_type, is_assignable, is_union
+from executive.mission.ports import describe_type, find_element_type, is_assignable, is_union
 from executive.skill import ANY, EMPTY, HALT, HOLDING, Direction, Param, Port, Skill
 from executive.testing import faults
 from executive.testing.run_skill import SkillResult, run_skill

@@ -8,8 +8,8 @@ from functools import reduce
 from typing import TypeAlias
 
 from executive.skill import ANY, EMPTY, HOLDING, ToolState
-from executive.tree.failure import Reason
 from executive.tree.keys import Child
+from executive.tree.specification import Reason
 
 UNKNOWN_NAME = "*"
 """Placeholder for an unknown source or an unknown reason of a failure."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias
 
 from executive.skill import Skill
-from executive.tree.failure import Reason
 from executive.tree.flow import Flow, FlowState
 from executive.tree.keys import Child
+from executive.tree.specification import Reason
 
 MinTimeFunction: TypeAlias = Callable[[Child], float]
 """Type in signatures of `min_time`, which nodes of third parties may still define; nothing calls it."""

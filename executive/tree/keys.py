@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias, Union, cast, ge
 from py_trees.behaviour import Behaviour
 from pydantic import Field, TypeAdapter
 
-from executive.tree.failure import Reason
+from executive.tree.specification import Reason
 
 Child: TypeAlias = Behaviour
 """Child of a control node; in the checker and the diagnosis, a `ChildPlaceholder` that represents it."""

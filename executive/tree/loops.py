@@ -10,11 +10,12 @@ from py_trees.common import Status
 from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.skill import ANY, EMPTY, HOLDING
-from executive.tree.failure import Failure, Reason, format_reasons
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.inspection import Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, Elements, KeySection, VariableName, key
 from executive.tree.node import ControlNode
+from executive.tree.specification import Reason, format_reasons
+from executive.tree.tree_node import Failure
 
 NodeRun: TypeAlias = Generator[None, Status | None, Failure | None]
 """Generator that returns a failure, or None for success. A `yield` ends the tick. If a child is running, the

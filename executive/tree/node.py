@@ -15,11 +15,10 @@ from py_trees.common import Status
 
 from executive.errors import Fault
 from executive.events import BranchChosen, NodeEnded, NodeStarted
-from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.inspection import Advice, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeyKind, KeyOwner, KeySection
-from executive.tree.tree_node import NodeContext, TreeNode, halt
+from executive.tree.tree_node import Failure, NodeContext, TreeNode, halt
 
 
 class ControlNode(KeyOwner, TreeNode):

@@ -7,7 +7,6 @@ from typing import Literal
 
 from py_trees.common import Status
 
-from executive.tree.failure import Failure
 from executive.tree.flow import (
     Flow,
     FlowFunction,
@@ -20,6 +19,7 @@ from executive.tree.flow import (
 from executive.tree.inspection import Counterpart, PropagatedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
+from executive.tree.tree_node import Failure
 
 MAX_CHILDREN = 200
 """Maximum number of children; the checker compares all pairs of children."""

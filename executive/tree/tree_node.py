@@ -1,10 +1,10 @@
-"""Base class of all nodes of a tree, the context with which a node is built, the blackboard, and halting."""
+"""Base class of all nodes of a tree, failures, the context of a node, the blackboard, and halting."""
 
 from __future__ import annotations
 
 from collections import UserDict
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import cast
 
 from py_trees.behaviour import Behaviour
@@ -13,7 +13,38 @@ from py_trees.common import Status
 from executive.cell.protocols import Clock, Ledger
 from executive.errors import Fault
 from executive.events import Emit, Event, discard_event
-from executive.tree.failure import Failure
+from executive.tree.specification import Reason
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A failure with a declared reason, which nodes pass on to their parents.
+
+    Attributes:
+        reason: One of the declared reasons of the skill or of the control node.
+        message: One sentence with the measured values that explain the failure.
+        source: Name of the skill, or the keyword of the control node, that failed.
+        path: Path of the node that failed.
+        labels: Labels of the failed node and of the ancestors that passed the failure on.
+    """
+
+    reason: str
+    message: str
+    source: str
+    path: str
+    labels: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.source}.{self.reason}"
+
+    def matches(self, reasons: Iterable[Reason]) -> bool:
+        """Return True if one of `reasons` denotes this failure."""
+        sources = (self.source, *self.labels)
+        return any(reason.reason == self.reason and reason.source in sources for reason in reasons)
+
+    def with_label(self, label: str) -> Failure:
+        """Return the failure with one more label, of a node that passed the failure on; "" adds no label."""
+        return replace(self, labels=(*self.labels, label)) if label else self
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,14 @@ from pathlib import Path
 from typing import cast
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from executive.mission.model import nodes
-from executive.mission.model.instance import make_inspection_instance
-from executive.mission.model.mission import Mission, Subtree
-from executive.mission.model.values import Literal, LocatedName, Reference, Value
-from executive.mission.model.wiring import find_written_variables
+from executive.mission import nodes
+from executive.mission.instance import make_inspection_instance
+from executive.mission.mission_file import Mission, Subtree
+from executive.mission.ports import find_written_variables
 from executive.skill import Direction, Param, Port, Skill
-from executive.tree.failure import Reason
 from executive.tree.keys import Key, KeyKind
 from executive.tree.node_registry import load_control_nodes
+from executive.tree.specification import Literal, LocatedName, Reason, Reference, Value
 from executive.view.text import replace_invalid_xml_characters
 
 _NAMES_FILE = Path(__file__).with_name("btcpp_names.txt")

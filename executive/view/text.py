@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterator, Sequence
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from rich.cells import cell_len
 
-from executive.mission.model.grammar import USE_KEYWORD
+from executive.mission.grammar import USE_KEYWORD
 from executive.mission.outline import Connection, OutlineNode, list_child_indices
 
 MAX_LINE_LENGTH = 100

@@ -10,7 +10,7 @@ import pytest
 from foreign import Colour, Double, Painter, Primer, Untyped
 from py_trees.common import Status
 
-from executive.behaviours.arguments import find_mission_type, list_arguments, to_argument
+from executive.behaviours import find_mission_type, list_arguments, to_argument
 
 Statuses = Literal["SUCCESS", "FAILURE", "RUNNING", "INVALID"]
 

@@ -11,7 +11,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.blackboard import Blackboard
 from py_trees.decorators import Inverter
 
-from executive.behaviours.behaviour_skill import RunBlackboard, make_behaviour_skill
+from executive.behaviours import RunBlackboard, make_behaviour_skill
 from executive.cells.fake import FakeCell
 from executive.errors import Fault, InputError
 from executive.skill import Direction

@@ -13,7 +13,7 @@ from events import at, item_changed
 
 from executive.campaign.evaluation import find_cell
 from executive.campaign.jobs import MissionUnderTest, load_mission_under_test
-from executive.mission.parse.cell_file import load_cell
+from executive.mission.cell_file import load_cell
 from executive.record.result import Audit, ItemCounts, Result
 from tests.benchmarks import (
     damaged_records,

@@ -20,7 +20,7 @@ from executive.cell.workcell import AUDIT_KEYS
 from executive.cells.fake import FakeCell
 from executive.errors import InputError
 from executive.events import RunEnded
-from executive.mission.flow_analysis import UnhandledFailure
+from executive.mission.analysis import UnhandledFailure
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.testing.faults import ScheduledFault

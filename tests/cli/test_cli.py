@@ -18,8 +18,8 @@ import executive.campaign.sweep  # noqa: F401 - imported before `load_mission` i
 from executive.cell.json_values import to_json
 from executive.cli.main import main
 from executive.errors import Fault, InputError
+from executive.mission.analysis import UnhandledFailure
 from executive.mission.findings import Finding
-from executive.mission.flow_analysis import UnhandledFailure
 from executive.record.result import Audit, ItemCounts, Result
 from executive.record.timeline import PlanningTotals
 from executive.run.assembly import RunOptions

@@ -8,8 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.mission.schema.file_schemas import make_library_schema, make_mission_schema
-from executive.mission.schema.types import make_cell_schema
+from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
 from executive.plugins import load_skills
 from executive.tree.node_registry import load_control_nodes
 

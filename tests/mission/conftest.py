@@ -12,8 +12,8 @@ import pytest
 import executive.mission.load
 from executive.cell.config import CellConfig
 from executive.cells.sim.kind import SimCellChecks
+from executive.mission import cell_file
 from executive.mission.load import LoadedMission, load_mission
-from executive.mission.parse import cell_file, read_mission
 from executive.skill import In, Metres, Out, Skill, param, port
 from executive.tree.node_registry import load_control_nodes
 
@@ -78,7 +78,7 @@ def shared_cells() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cell_file, "read_source", functools.cache(cell_file.read_source))
-        for module in (cell_file, read_mission):
+        for module in (cell_file, executive.mission.load):
             patch.setattr(module, "parse_yaml", functools.cache(module.parse_yaml))
         patch.setattr(SimCellChecks, "check", staticmethod(check_once))
         patch.setattr(executive.mission.load, "load_control_nodes", functools.cache(load_control_nodes))

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from executive.errors import InputError
+from executive.mission.cell_file import find_overlaps, load_cell, read_cell
 from executive.mission.findings import MissionError
-from executive.mission.parse.cell_file import find_overlaps, load_cell, read_cell
 
 
 @pytest.fixture(autouse=True)

@@ -13,18 +13,16 @@ from py_trees.common import Status
 
 from executive.cell.protocols import Cell, Steps
 from executive.events import discard_event
+from executive.mission.analysis import CheckContext, find_unhandled_failures
 from executive.mission.build import TreeBuilder
-from executive.mission.check.checks import run_checks
-from executive.mission.check.context import CheckContext
-from executive.mission.expand import expand
-from executive.mission.flow_analysis import find_unhandled_failures
-from executive.mission.model.node_paths import assign_paths
-from executive.mission.parse.mission_file import parse_mission
-from executive.mission.parse.node_parser import NodeParser
-from executive.mission.source import Source
-from executive.mission.text.yaml_text import parse_yaml
+from executive.mission.expand import assign_paths, expand
+from executive.mission.load import run_checks
+from executive.mission.mission_file import parse_mission
+from executive.mission.node_parser import NodeParser
+from executive.mission.yaml_text import parse_yaml
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Skill, port
 from executive.tree.node_registry import load_control_nodes
+from executive.tree.specification import Source
 from executive.tree.tree_node import Blackboard, halt
 
 MOST_TICKS = 400

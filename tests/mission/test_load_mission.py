@@ -12,11 +12,11 @@ import pytest
 from executive.cell.config import CellConfig
 from executive.cells.fake import FakeCell
 from executive.errors import InputError
+from executive.mission import nodes
+from executive.mission.file_search import find_mission, get_shipped_folder
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
-from executive.mission.model import nodes
-from executive.mission.model.values import Reference
-from executive.mission.text.file_search import find_mission, get_shipped_folder
+from executive.tree.specification import Reference
 
 Load = Callable[..., LoadedMission]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from executive.mission.cell_file import load_cell
 from executive.mission.findings import MissionError
-from executive.mission.parse.cell_file import load_cell
 
 WASHER = "objects: {washer: {mesh: parts/washer.obj, height: 0.006, radius: 0.025, ring: 0.017}}\n"
 

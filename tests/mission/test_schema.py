@@ -11,14 +11,13 @@ import pytest
 from jsonschema import Draft7Validator
 from referencing import Registry
 
-from executive.mission.schema.file_schemas import make_library_schema, make_mission_schema
-from executive.mission.schema.types import make_cell_schema
-from executive.mission.source import Source
-from executive.mission.text.file_search import get_shipped_folder
-from executive.mission.text.yaml_text import parse_yaml
+from executive.mission.file_search import get_shipped_folder
+from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
+from executive.mission.yaml_text import parse_yaml
 from executive.plugins import load_skills
 from executive.skill import Skill
 from executive.tree.node_registry import load_control_nodes
+from executive.tree.specification import Source
 
 MISSIONS = get_shipped_folder()
 SCHEMAS: dict[str, tuple[Callable[[], dict[str, Any]], str]] = {

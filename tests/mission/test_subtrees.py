@@ -9,8 +9,8 @@ import pytest
 
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
-from executive.mission.model.nodes import SkillNode
-from executive.mission.model.wiring import find_control_node_outputs, find_wires
+from executive.mission.nodes import SkillNode
+from executive.mission.ports import find_control_node_outputs, find_wires
 from executive.skill import Direction, Skill
 
 Load = Callable[..., LoadedMission]

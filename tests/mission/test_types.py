@@ -9,7 +9,7 @@ import pytest
 
 from executive.cell.frame import Detection
 from executive.cell.objects import Target
-from executive.mission.model.port_types import find_element_type, is_assignable
+from executive.mission.ports import find_element_type, is_assignable
 
 
 class Special(Target):

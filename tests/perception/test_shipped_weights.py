@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.mission.parse.cell_file import load_cell
+from executive.mission.cell_file import load_cell
 from executive.perception.detectors.rfdetr import LABELS_PATH, MODEL_PATH, read_labels
 
 

@@ -10,7 +10,7 @@ from executive.cells.fake import SHIPPED_ROUTES
 from executive.cells.without_hardware import SilentOperator
 from executive.events import discard_event
 from executive.geometry import Pose
-from executive.mission.parse.cell_file import load_cell
+from executive.mission.cell_file import load_cell
 from executive.testing.oracle import make_oracle_kind
 
 

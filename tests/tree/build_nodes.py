@@ -12,15 +12,14 @@ from py_trees.behaviour import Behaviour
 
 from executive.events import Emit, discard_event
 from executive.tree.decorators import Invert, Succeed, Timeout
-from executive.tree.failure import Reason
 from executive.tree.keys import VariableName
 from executive.tree.loops import CounterLimits, ForEach, Repeat, While
 from executive.tree.parallel import Parallel
-from executive.tree.retry import Backoff, Retry
+from executive.tree.retry import Backoff, Catch, Retry, TryCatch
 from executive.tree.sequences import Fallback
 from executive.tree.sequences import Sequence as SequenceNode
+from executive.tree.specification import Reason
 from executive.tree.tree_node import Blackboard, NodeContext
-from executive.tree.try_catch import Catch, TryCatch
 
 Names = Iterable[tuple[str, str]]
 

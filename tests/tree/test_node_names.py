@@ -6,12 +6,12 @@ import inspect
 from pathlib import Path
 
 import executive
-from executive.mission.model.grammar import SEQUENCE_KEYWORD, USE_KEYWORD
+from executive.mission.grammar import SEQUENCE_KEYWORD, USE_KEYWORD
 from executive.tree.node_registry import load_control_nodes
 
 PERMITTED = {
-    ("mission/model/grammar.py", f'"{SEQUENCE_KEYWORD}"'),
-    ("mission/model/grammar.py", f'"{USE_KEYWORD}"'),
+    ("mission/grammar.py", f'"{SEQUENCE_KEYWORD}"'),
+    ("mission/grammar.py", f'"{USE_KEYWORD}"'),
     ("cells/sim/scene_file.py", '"any"'),  # any class of objects
     ("skill.py", '"any"'),  # any state of the tool
     ("record/diagnosis.py", '"repeat"'),  # label before the command that repeats a run

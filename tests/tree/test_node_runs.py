@@ -26,8 +26,8 @@ from scripted_leaf import Leaf
 
 from executive.events import BranchChosen, Event
 from executive.tree.loops import ForEach
+from executive.tree.retry import TryCatch
 from executive.tree.tree_node import Blackboard, halt
-from executive.tree.try_catch import TryCatch
 
 LOST, EMPTY = [("A", "lost")], [("A", "empty")]
 

@@ -14,7 +14,7 @@ from executive.cell.workcell import AUDIT_KEYS, CellOptions
 from executive.cells.fake import FakeCell
 from executive.cells.without_hardware import SilentOperator
 from executive.errors import InputError
-from executive.mission.parse.cell_file import load_cell
+from executive.mission.cell_file import load_cell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
 from skills.localize import Localize

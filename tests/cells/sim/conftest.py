@@ -10,7 +10,7 @@ from rig import Rig
 
 from executive.cell.config import CellConfig
 from executive.cells.sim.world import World
-from executive.mission.parse.cell_file import load_cell
+from executive.mission.cell_file import load_cell
 
 
 def shipped_cell(name: str) -> CellConfig:

@@ -16,7 +16,7 @@ from executive.cells.sim.cell import SimCell
 from executive.cells.without_hardware import SilentOperator
 from executive.events import discard_event
 from executive.geometry import Pose
-from executive.mission.parse.cell_file import load_cell
+from executive.mission.cell_file import load_cell
 from executive.testing.oracle import TrueFrame, make_oracle_kind
 
 Build = Callable[..., SimCell]

@@ -8,8 +8,8 @@ from xml.etree.ElementTree import Element, fromstring
 
 import pytest
 
-from executive.mission.parse.read_mission import read_mission
-from executive.mission.text.file_search import find_mission, get_shipped_folder
+from executive.mission.file_search import find_mission, get_shipped_folder
+from executive.mission.load import read_mission
 from executive.plugins import load_skills
 from executive.skill import In, Out, Skill, param, port
 from executive.tree.node_registry import load_control_nodes

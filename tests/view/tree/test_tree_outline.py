@@ -9,12 +9,11 @@ from py_trees.behaviour import Behaviour
 
 from executive.mission.outline import list_child_indices, make_outline
 from executive.skill import In, Metres, Out, Skill, param, port
-from executive.tree.failure import Reason
-from executive.tree.retry import Retry
+from executive.tree.retry import Catch, Retry, TryCatch
 from executive.tree.sequences import Sequence
 from executive.tree.skill_leaf import SkillLeaf, Wiring
+from executive.tree.specification import Reason
 from executive.tree.tree_node import NodeContext, make_inspection_context
-from executive.tree.try_catch import Catch, TryCatch
 from executive.view.text import draw_text, fold_subtrees
 
 CELL: Any = SimpleNamespace()

@@ -9,10 +9,9 @@ from dataclasses import replace
 from pydantic import JsonValue
 
 from executive.mission.findings import Finding, make_error, suggest_choice
-from executive.mission.model.grammar import AllowedKeys
-from executive.mission.model.values import InvalidValue, Literal, LocatedReason, Reference, Setting, Value
-from executive.mission.source import Span
-from executive.mission.text.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, iterate_scalars
+from executive.mission.grammar import AllowedKeys
+from executive.mission.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, iterate_scalars
+from executive.tree.specification import InvalidValue, Literal, LocatedReason, Reference, Setting, Span, Value
 
 NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 """Matches the names of params, arguments, variables and subtrees."""

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TypeVar, cast
 
-from executive.mission.model.values import LocatedName, LocatedReason, Setting, Value
-from executive.mission.source import Span
 from executive.tree.keys import Key, KeyOwner
 from executive.tree.node import ControlNode
+from executive.tree.specification import LocatedName, LocatedReason, Setting, Span, Value
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 import yaml
 from pydantic import JsonValue
 
-from executive.mission.descriptions import describe_value
-from executive.mission.findings import Finding, make_error
-from executive.mission.source import Source, Span
+from executive.mission.findings import Finding, describe_value, make_error
+from executive.tree.specification import Source, Span
 
 _MAX_DEPTH = 50
 """Maximum depth of the nesting of lists and mappings."""

@@ -10,7 +10,7 @@ import executive
 from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.mission.findings import suggest_choice
-from executive.mission.source import Source
+from executive.tree.specification import Source
 
 _MAX_FILE_SIZE = 1_000_000
 """Maximum size of a mission or cell file [byte]."""

@@ -10,11 +10,11 @@ from typing import get_args
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.mission.model.conversion import ValueProblem, convert_constant
-from executive.mission.model.nodes import InnerNode, KeyedValues, KeyValue, Node, NodeSection, list_nodes
-from executive.mission.model.values import Literal, LocatedName, LocatedReason, Reference
+from executive.mission.nodes import InnerNode, KeyedValues, KeyValue, Node, NodeSection, list_nodes
+from executive.mission.ports import ValueProblem, convert_constant
 from executive.tree.keys import Child, Key, KeyKind, VariableName
 from executive.tree.node import ControlNode
+from executive.tree.specification import Literal, LocatedName, LocatedReason, Reference
 from executive.tree.tree_node import NodeContext, make_inspection_context
 
 BuildChild = Callable[[Node], Child]

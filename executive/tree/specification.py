@@ -1,13 +1,79 @@
-"""Values, references to variables, and names in a mission file, each with its position."""
+"""Specification of the nodes of a mission: positions in the text, values, and names of failures."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 from pydantic import JsonValue
 
-from executive.mission.source import Span
-from executive.tree.failure import Reason
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A text and its name in messages.
+
+    Attributes:
+        path: Name that precedes each position in messages: path of a file, or `--set`.
+        text: The whole text.
+    """
+
+    path: str
+    text: str
+
+    def get_line(self, number: int) -> str:
+        """Return line `number`, counted from 1, or "" beyond the end."""
+        return self._lines[number - 1] if 1 <= number <= len(self._lines) else ""
+
+    @cached_property
+    def _lines(self) -> list[str]:
+        return self.text.splitlines()
+
+    def make_span(self, line: int = 0, col: int = 0, length: int = 0) -> Span:
+        """Return a span in this text; line 0 denotes the whole text."""
+        return Span(self, line, col, length)
+
+
+@dataclass(frozen=True)
+class Span:
+    """Position of a part of a source text.
+
+    Attributes:
+        source: The text.
+        line: First line, counted from 1; 0 denotes the whole text.
+        col: Column of the first character, counted from 1.
+        length: Number of characters; at most the first line is underlined.
+    """
+
+    source: Source
+    line: int
+    col: int
+    length: int
+
+    def describe_place(self, source: Source) -> str:
+        """Return `line 12` if the position is in `source`, otherwise `path:12`."""
+        return f"line {self.line}" if self.source is source else f"{self.source.path}:{self.line}"
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Reason of a failure with its source, written in a mission as `Grasp.missed`.
+
+    Attributes:
+        source: Name of a skill, keyword of a control node, or label of a node.
+        reason: Reason as the source declares it, for instance `missed`.
+    """
+
+    source: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.source}.{self.reason}"
+
+
+def format_reasons(reasons: Iterable[object]) -> str:
+    """Return a text with all reasons, and with limits of counters: `Grasp.missed, look.unsure, placed: 4`."""
+    return ", ".join(map(str, reasons))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,278 @@
+"""Input of the checks: data-flow analysis of the tree, mission, installed skills, and cell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+from executive.cell.config import CellConfig
+from executive.mission.findings import find_similar_word, suggest_choice
+from executive.mission.instance import get_mission_node, make_inspection_instance
+from executive.mission.mission_file import Mission
+from executive.mission.nodes import InnerNode, Node, SkillNode, SubtreeNode
+from executive.mission.ports import Wire, find_control_node_inputs, find_wires, find_written_variables
+from executive.plugins import Skills
+from executive.skill import HALT, HOLDING, Direction, Port, Skill
+from executive.tree.flow import INITIAL_STATE, UNKNOWN_STATE, Flow, FlowState, PossibleFailure, join_states
+from executive.tree.keys import Child
+from executive.tree.node import ControlNode
+from executive.tree.node_registry import ControlNodes
+from executive.tree.specification import Reference, Span
+
+
+class FlowAnalysis:
+    """Possible entry states and ends (success, failures, halt) of every node of a tree.
+
+    Args:
+        tree: Expanded tree with paths.
+        skills: Installed skills by name.
+        entry: State in which the tree starts.
+        is_first_tick: True to analyse only the first tick, so that a skill that takes time does not end.
+
+    Attributes:
+        nodes: Every node by its path.
+        entry_states: Join of the states in which a node may start, by path; without unreachable nodes.
+        flows: Possible ends of each node, for the entry state that was analysed last, by path.
+        body_end_states: Join of the states after success of the body of a `use`, by path of the `use`.
+        root_flow: Possible ends of the whole tree.
+    """
+
+    def __init__(
+        self, tree: Node, skills: Skills, entry: FlowState = INITIAL_STATE, *, is_first_tick: bool = False
+    ) -> None:
+        self.nodes = {node.path: node for node in tree.walk()}
+        self.entry_states: dict[str, FlowState] = {}
+        self.flows: dict[str, Flow] = {}
+        self.body_end_states: dict[str, FlowState | None] = {}
+        self._skills, self._is_first_tick = skills, is_first_tick
+        self._flows_by_entry: dict[tuple[str, FlowState], Flow] = {}
+        self._instances: dict[str, ControlNode] = {}
+        self.root_flow = self._analyse(tree, entry)
+
+    def find_skill_or_most_similar(self, name: str) -> type[Skill] | None:
+        """Return the skill `name`; if it is misspelled, the most similar skill; None if there is none."""
+        known_name = name if name in self._skills else find_similar_word(name, self._skills)
+        return self._skills[known_name] if known_name else None
+
+    def _analyse(self, node: Node, state: FlowState) -> Flow:
+        """Return the possible ends of a node that starts in a state, from the cache if possible."""
+        self.entry_states[node.path] = state.join(self.entry_states.get(node.path, state))
+        entry = node.path, state
+        if entry not in self._flows_by_entry:
+            flow = self._compute_flow(node, state).with_label(node.label)
+            self._flows_by_entry[entry] = self.flows[node.path] = flow
+        return self._flows_by_entry[entry]
+
+    def _compute_flow(self, node: Node, state: FlowState) -> Flow:
+        match node:
+            case InnerNode():
+                if node.path not in self._instances:
+                    self._instances[node.path] = make_inspection_instance(node)
+                return self._instances[node.path].compute_flow(self._analyse_child, state)
+            case SkillNode():
+                return self._compute_skill_flow(node, state)
+            case SubtreeNode(body=Node() as body):
+                return self._compute_subtree_flow(node, body, state)
+        for child in node.children:
+            self._analyse(child, UNKNOWN_STATE)
+        return Flow.make_unknown(node.path)
+
+    def _analyse_child(self, child: Child, state: FlowState) -> Flow:
+        return self._analyse(get_mission_node(child), state)
+
+    def _compute_skill_flow(self, node: SkillNode, state: FlowState) -> Flow:
+        skill = self.find_skill_or_most_similar(node.skill)
+        if skill is None:
+            return Flow.make_unknown(node.path, node.skill)
+        precondition, postcondition = skill.tool_state
+        state = state.apply_precondition(precondition, node.path)
+        outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
+        success_state = state.with_variables(outputs)
+        apply_success = success_state.apply_observation if skill.is_condition else success_state.apply_success
+        # A condition grasps no object: a tool that was empty before the condition failed is still empty.
+        may_be_holding = state.tool_states is None or state.find_tool_state(HOLDING) is not None
+        tool_states_after_failure = (
+            skill.tool_state_after_failure if may_be_holding or not skill.is_condition else {}
+        )
+        end_states = {
+            key: state.apply_failure(tool_states_after_failure.get(key), node.path)
+            for key in (*skill.reasons, HALT)
+        }
+        failures = {PossibleFailure(node.skill, key, node.path): end_states[key] for key in skill.reasons}
+        success = apply_success(postcondition, node.path)
+        if skill.is_instantaneous():
+            return Flow(success, failures, None)
+        halted = end_states[HALT]
+        return Flow(None, {}, halted) if self._is_first_tick else Flow(success, failures, halted)
+
+    def _compute_subtree_flow(self, node: SubtreeNode, body: Node, state: FlowState) -> Flow:
+        flow = self._analyse(body, state)
+        # In a loop, one use may start in several states.
+        self.body_end_states[node.path] = join_states((self.body_end_states.get(node.path), flow.success))
+        # `find_unwritten_returns` reports unwritten returned variables, so they count as written here.
+        return replace(flow, success=flow.success and flow.success.with_variables(node.written_variables))
+
+
+@dataclass(frozen=True)
+class UnhandledFailure:
+    """A failure that can end the mission, because no node handles it.
+
+    Attributes:
+        source: Name of the skill, or keyword of the control node, that fails.
+        reason: Reason of the failure.
+        node: Path of the node that fails, in the tree.
+        path: Path of the file that contains the node.
+        line: Line of the node in the file.
+    """
+
+    source: str
+    reason: str
+    node: str
+    path: str
+    line: int
+
+
+def find_unhandled_failures(analysis: FlowAnalysis) -> tuple[UnhandledFailure, ...]:
+    """Return the failures that can end the mission, in the order of the tree."""
+    order = {path: index for index, path in enumerate(analysis.nodes)}
+    failures = sorted(analysis.root_flow.failures, key=lambda end: (order[end.origin], end.reason))
+    spans = [analysis.nodes[failure.origin].span for failure in failures]
+    return tuple(
+        UnhandledFailure(failure.source, failure.reason, failure.origin, span.source.path, span.line)
+        for failure, span in zip(failures, spans, strict=True)
+    )
+
+
+class VariableRead(NamedTuple):
+    """A read of a variable by a node.
+
+    Attributes:
+        node: Node that reads the variable.
+        input_name: Name in messages: `Approach.target`, or the keyword of a control node.
+        variable: Name of the variable.
+        span: Position of the variable; position of the skill if the mission names no variable.
+        is_explicit: True if the mission names the variable.
+        is_required: True if the input has no default.
+    """
+
+    node: Node
+    input_name: str
+    variable: str
+    span: Span
+    is_explicit: bool
+    is_required: bool
+
+
+@dataclass(frozen=True)
+class CheckContext:
+    """A mission to check, with the installed skills and control nodes, and the cell.
+
+    Attributes:
+        mission: Content of the mission file, before expansion.
+        tree: Expanded tree with paths; an `InvalidNode` if the tree could not be expanded.
+        unused_subtrees: Expanded subtrees that the tree does not use.
+        skills: Installed skills by name.
+        node_classes: Installed control nodes by keyword.
+        cell: Content of the cell file, or None if the file has errors.
+        classes_by_detector: Classes that each detector of the cell can detect; None if unknown.
+    """
+
+    mission: Mission
+    tree: Node
+    unused_subtrees: tuple[Node, ...]
+    skills: Mapping[str, type[Skill]]
+    node_classes: ControlNodes
+    cell: CellConfig | None
+    classes_by_detector: Mapping[str, tuple[str, ...] | None]
+
+    @cached_property
+    def flow_analysis(self) -> FlowAnalysis:
+        """Possible states and failures of every node of the tree."""
+        return FlowAnalysis(self.tree, self.skills)
+
+    @cached_property
+    def written_variables(self) -> set[str]:
+        """Variables that a node of the tree may write."""
+        return find_written_variables(self.tree, self.skills)
+
+    def iterate_nodes(self) -> Iterator[Node]:
+        """Yield every node of the tree and of the unused subtrees."""
+        for root in (self.tree, *self.unused_subtrees):
+            yield from root.walk()
+
+    def iterate_control_nodes(self) -> Iterator[InnerNode]:
+        """Yield every control node of the tree and of the unused subtrees."""
+        return (node for node in self.iterate_nodes() if isinstance(node, InnerNode))
+
+    def find_installed_skills(self, nodes: Iterable[Node]) -> Iterator[tuple[SkillNode, type[Skill]]]:
+        """Yield every node in `nodes` that runs an installed skill, with the skill."""
+        for node in nodes:
+            if isinstance(node, SkillNode) and node.skill in self.skills:
+                yield node, self.skills[node.skill]
+
+    def iterate_reads(self, root: Node) -> Iterator[VariableRead]:
+        """Yield every read of a variable by `root` and the nodes below it."""
+        for node in root.walk():
+            for reference in find_control_node_inputs(node):
+                yield VariableRead(node, node.type_name, reference.name, reference.span, True, False)
+            for wire in self.find_wires(node, Direction.IN):
+                flags = wire.is_explicit, wire.port.is_required
+                yield VariableRead(node, str(wire), wire.variable, wire.span, *flags)
+
+    @cached_property
+    def names_in_cell_by_kind(self) -> Mapping[str, list[str]]:
+        """Names of the bins, detectors, poses and classes of the cell, by kind; empty if `cell` is None."""
+        if self.cell is None:
+            return {}
+        return {
+            "bin": list(self.cell.bins),
+            "detector": list(self.cell.detectors),
+            "pose": list(self.cell.arm.poses_deg),
+            "class": list(self.cell.objects),
+        }
+
+    @cached_property
+    def library_uses_by_path(self) -> Mapping[str, SubtreeNode]:
+        """By path of each node of a library: the `use` node of the mission file that includes the library."""
+        uses: dict[str, SubtreeNode] = {}
+        mission_source = self.tree.span.source
+        for use in self.tree.walk():
+            if isinstance(use, SubtreeNode) and use.span.source is mission_source:
+                uses |= {node.path: use for node in use.walk() if node.span.source is not mission_source}
+        return uses
+
+    def locate_skill(self, node: SkillNode) -> tuple[str, Span]:
+        """Return the name and the position of a skill in messages; for a skill in a library, of the `use`."""
+        use = self.library_uses_by_path.get(node.path)
+        return (f'{node.skill} in the subtree "{use.name}"', use.span) if use else (node.skill, node.span)
+
+    def make_unknown_param_hint(self, reference: Reference) -> str:
+        """Return the hint for a reference to a variable where only a param or an argument is allowed."""
+        params = self.mission.params
+        if reference.name in params:
+            return (
+                f"A library cannot use params: declare {reference.name} below args of the subtree, "
+                "and give its value with `with`."
+            )
+        names = [f"${name}" for name in params]
+        return suggest_choice(f"${reference.name}", names, "Params of the mission")
+
+    def make_variable_hint(self, value: object) -> str:
+        """Return the hint for a constant that is the name of a variable without `$`; "" for other values."""
+        is_variable = isinstance(value, str) and value in self.written_variables
+        return f"For the variable, write ${value}." if is_variable else ""
+
+    def find_wires(self, node: Node, direction: Direction) -> Iterator[Wire]:
+        """Yield the connections of the ports of a node; none if the node is no installed skill."""
+        if isinstance(node, SkillNode) and node.skill in self.skills:
+            for wire in find_wires(node, self.skills[node.skill], direction):
+                # `check_settings` reports a param with a variable that no node writes.
+                if isinstance(wire.port, Port) or wire.variable in self.written_variables:
+                    yield wire
+
+    def list_skills_with_output(self, name: str) -> str:
+        """Return the names of the skills that have an output `name`, separated by commas."""
+        outputs = {skill: self.skills[skill].ports.get(name) for skill in self.skills}
+        return ", ".join(skill for skill, port in outputs.items() if port and port.direction is Direction.OUT)

@@ -1,0 +1,360 @@
+"""Content of mission and library files as typed values, and their parsers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, cast, get_origin
+
+from pydantic import JsonValue
+
+from executive.mission import grammar
+from executive.mission.findings import suggest_choice
+from executive.mission.mapping_reader import NAME_PATTERN, MappingReader, is_empty, make_literal, read_value
+from executive.mission.node_parser import NodeParser
+from executive.mission.nodes import Node
+from executive.mission.ports import ValueProblem, convert_setting, convert_value
+from executive.mission.validate import CELL_PREFIX, make_override_source, parse_override
+from executive.mission.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence
+from executive.skill import Param, param
+from executive.tree.specification import InvalidValue, Literal, LocatedName, Span, Value
+
+
+@dataclass(frozen=True)
+class Argument:
+    """An argument of a subtree, and the position of its name; without default, the argument is mandatory."""
+
+    span: Span
+    default: Value | None
+
+
+@dataclass(frozen=True)
+class Subtree:
+    """A named tree under `trees`.
+
+    Attributes:
+        span: Position of the name.
+        doc: Purpose of the subtree, or "".
+        arguments: Arguments by name.
+        returns: Positions of the variables that are not local, by name; None: no variable is local.
+        body: Root node of the subtree.
+        library: Name of the library that defines the subtree; "" if the mission file defines it.
+    """
+
+    name: str
+    span: Span
+    doc: str
+    arguments: Mapping[str, Argument]
+    returns: Mapping[str, Span] | None
+    body: Node
+    library: str = ""
+
+
+@dataclass(frozen=True)
+class MissionParam:
+    """A constant of the mission.
+
+    Attributes:
+        span: Position of the name.
+        value: Value in this run: the value of `--set`, otherwise the default; or an invalid value.
+        declaration: Type, bounds and choices; the type is `Any` if it is unknown.
+    """
+
+    span: Span
+    value: Literal | InvalidValue
+    declaration: Param
+
+
+@dataclass(frozen=True)
+class Route:
+    """Class of objects, the span of the class in the text, and the bins that may receive the objects."""
+
+    label: str
+    label_span: Span
+    bins: tuple[LocatedName, ...]
+
+
+@dataclass(frozen=True)
+class Quota:
+    """Maximum number of objects of a class in a bin; of all classes if `label` is None."""
+
+    bin: LocatedName
+    label: LocatedName | None
+    limit: Value
+
+    def __str__(self) -> str:
+        return f"the quota of {self.bin.name}" + (f" for {self.label.name}" if self.label else "")
+
+
+@dataclass(frozen=True)
+class Mission:
+    """Content of a mission file.
+
+    Attributes:
+        name, description: Values of the keys `mission` and `description`.
+        cell: Path of the cell file, relative to the folder of the mission.
+        libraries: Paths of the library files, relative to the folder of the mission.
+        params: Constants by name, with the values of `--set`.
+        quotas: Maximum numbers of objects in the bins.
+        tree: Root node of the tree; None if the key is missing.
+        subtrees: Subtrees of the mission and of its libraries, by name.
+        is_complete: False if a library could not be read, so that `subtrees` may lack subtrees.
+    """
+
+    name: str
+    description: str
+    cell: LocatedName
+    libraries: tuple[LocatedName, ...] = ()
+    params: Mapping[str, MissionParam] = field(default_factory=dict)
+    routes: tuple[Route, ...] = ()
+    quotas: tuple[Quota, ...] = ()
+    tree: Node | None = None
+    subtrees: Mapping[str, Subtree] = field(default_factory=dict)
+    is_complete: bool = True
+
+
+PARAM_TYPES = {"text": str, "integer": int, "number": float, "boolean": bool, "list": list[Any]}
+"""Python types of params, by their names in a mission."""
+
+
+def parse_params(reader: MappingReader, overrides: Mapping[str, str]) -> dict[str, MissionParam]:
+    """Return the params of a mission file by name, with the values of the overrides."""
+    params: dict[str, MissionParam] = {}
+    for name, span, node in reader.iterate_entries("params"):
+        reader.check_name(name, span, "a param")
+        if isinstance(node, YamlMapping):
+            keys = grammar.PARAM_KEYS
+            param_reader = MappingReader(f'the param "{name}"', span, node, keys, reader.findings)
+            params[name] = _read_declaration(name, param_reader, name in overrides)
+        else:
+            value = make_literal(node)
+            params[name] = MissionParam(span, value, replace(param(), type=_infer_type(value.value)))
+    for name, text in overrides.items():
+        if name in params:
+            override, findings = parse_override(name, text, is_text=params[name].declaration.type is str)
+            reader.findings += findings
+            if override:
+                params[name] = _replace_value(name, params[name], make_literal(override), reader)
+        elif not name.startswith(CELL_PREFIX):
+            span = make_override_source(name, text).make_span(1, 1, max(1, len(name)))
+            hint = suggest_choice(name, params, "Params of the mission")
+            reader.add_error(span, "unknown-param", f'the mission has no param "{name}"', hint)
+    return params
+
+
+def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> MissionParam:
+    """Return the param that a mapping with keys such as `default` and `min` declares."""
+    default, items = reader.get("default"), reader.list_items("choices")
+    reader.read_text("doc")
+    declaration = param(
+        ge=_read_bound(reader, "min"),
+        le=_read_bound(reader, "max"),
+        choices=tuple(item.python_value for item in items) if reader.get("choices") else None,
+    )
+    default_type = _infer_type(None if default is None else default.python_value)
+    declaration = replace(declaration, type=_read_type(reader) or default_type)
+    without_value = MissionParam(reader.span, InvalidValue(reader.span), declaration)
+    problem = f"{name} cannot have any value"
+    if declaration.choices == ():
+        reader.add_error(reader.get_value_span("choices"), "empty-list", f"{problem}: choices is empty")
+    elif declaration.ge is not None and declaration.le is not None and declaration.ge > declaration.le:
+        problem = f"{problem}: min {declaration.ge:g} is greater than max {declaration.le:g}"
+        reader.add_error(reader.get_value_span("min"), "out-of-range", problem)
+    elif default is not None:
+        return _replace_value(name, without_value, make_literal(default), reader)
+    elif not is_overridden:
+        message = f'the param "{name}" has neither a default nor a value'
+        reader.add_error(reader.span, "missing-param", message, f"Set it with --set {name}=...")
+    return without_value
+
+
+def _read_type(reader: MappingReader) -> object:
+    """Return the type that the key `type` names, or None; add an error for an unknown name."""
+    name = reader.read_text("type")
+    if name and name not in PARAM_TYPES:
+        hint = suggest_choice(name, PARAM_TYPES, "Types")
+        reader.add_error(reader.get_value_span("type"), "wrong-value", f'there is no type "{name}"', hint)
+    return PARAM_TYPES.get(name)
+
+
+def _infer_type(value: object) -> object:
+    """Return the param type of a value, or `Any` if no param type fits."""
+    types = PARAM_TYPES.values()
+    return next((declared for declared in types if type(value) is (get_origin(declared) or declared)), Any)
+
+
+def _read_bound(reader: MappingReader, key: str) -> float | None:
+    """Return the number below `key`, or None; add an error for a value of another type."""
+    if (node := reader.get(key)) is None:
+        return None
+    try:
+        return cast("float", convert_value(node.python_value, float))
+    except ValueProblem as problem:
+        reader.add_error(node.span, "wrong-type", f"{key} of {reader.owner} {problem}")
+    return None
+
+
+def _replace_value(name: str, param: MissionParam, value: Literal, reader: MappingReader) -> MissionParam:
+    """Return the param with a value; if the value is not allowed, add an error and return the old param."""
+    try:
+        converted = cast("JsonValue", convert_setting(value.value, param.declaration))
+    except ValueProblem as problem:
+        reader.add_error(value.span, problem.code, f"{name} {problem}")
+        return param
+    return replace(param, value=replace(value, value=converted))
+
+
+_MISSION_NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
+"""Matches the names of missions; the names of run directories contain the name of the mission."""
+
+
+def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodeParser) -> Mission:
+    """Return the valid content of a mission file; add errors to the findings of `parser`."""
+    span = replace(root.span, length=1)
+    reader = MappingReader("the mission", span, root, grammar.MISSION_KEYS, parser.findings)
+    tree = reader.get("tree")
+    return Mission(
+        name=_read_name(reader),
+        description=reader.read_text("description"),
+        cell=_read_cell(reader),
+        libraries=_read_names(
+            reader, reader.list_items("library"), "library must be the path of a file or a list of paths"
+        ),
+        params=parse_params(reader, overrides),
+        routes=_read_routes(reader),
+        quotas=tuple(_read_quotas(reader)),
+        tree=None if tree is None else parser.read_node(tree, reader.get_key_span("tree")),
+        subtrees=_read_subtrees(reader, parser),
+    )
+
+
+def _read_name(reader: MappingReader) -> str:
+    name = reader.read_text("mission")
+    if isinstance(reader.get("mission"), YamlScalar) and not _MISSION_NAME_PATTERN.fullmatch(name):
+        message = f'"{name}" is no valid name of a mission'
+        hint = 'Use at most 64 letters, digits, "_" and "-", and begin with a letter.'
+        reader.add_error(reader.get_value_span("mission"), "bad-name", message, hint)
+    return name
+
+
+def _read_cell(reader: MappingReader) -> LocatedName:
+    cell = LocatedName(reader.read_text("cell"), reader.get_value_span("cell"))
+    if isinstance(reader.get("cell"), YamlScalar) and not cell.name:
+        reader.add_error(cell.span, "bad-name", "cell must be the path of a cell file")
+    return cell
+
+
+def _read_routes(reader: MappingReader) -> tuple[Route, ...]:
+    routes = []
+    for label, span, node in reader.iterate_entries("routes"):
+        items = node.items if isinstance(node, YamlSequence) else (node,)
+        if not items:
+            reader.add_error(node.span, "empty-list", "a route needs at least one bin")
+        bins = _read_names(reader, items, "a route must be a bin or a list of bins")
+        routes.append(Route(label, span, bins))
+    return tuple(routes)
+
+
+def _read_quotas(reader: MappingReader) -> Iterator[Quota]:
+    """Yield the quotas below `quotas`: a limit for each bin, or a mapping of classes to limits."""
+    for bin_name, span, node in reader.iterate_entries("quotas"):
+        bin = LocatedName(bin_name, span)
+        limits: list[tuple[LocatedName | None, YamlNode]] = [(None, node)]
+        if isinstance(node, YamlMapping):
+            limits = [(LocatedName(entry.key.text, entry.key.span), entry.value) for entry in node.entries]
+            if not limits:
+                reader.add_error(node.span, "empty-list", f"the quota of {bin_name} names no class")
+        for label, value in limits:
+            yield Quota(bin, label, read_value(value, reader.findings))
+
+
+def _read_names(reader: MappingReader, items: Iterable[YamlNode], rule: str) -> tuple[LocatedName, ...]:
+    """Return the texts in a list; for each item of another type, add an error that begins with `rule`."""
+    names = []
+    for item in items:
+        if isinstance(item, YamlScalar) and isinstance(item.value, str):
+            names.append(LocatedName(item.text, item.span))
+        else:
+            reader.add_error(item.span, "wrong-type", f"{rule}, not {item.description}")
+    return tuple(names)
+
+
+def parse_library(root: YamlNode, parser: NodeParser) -> dict[str, Subtree]:
+    """Return the valid subtrees of a library file by name; add errors to the findings of `parser`."""
+    span = replace(root.span, length=1)
+    reader = MappingReader("the library", span, root, grammar.LIBRARY_KEYS, parser.findings)
+    return _read_subtrees(reader, parser, reader.read_text("library") or "library")
+
+
+def _read_subtrees(reader: MappingReader, parser: NodeParser, library: str = "") -> dict[str, Subtree]:
+    """Return the subtrees below `trees`; `library` is the name of their library, "" for the mission file."""
+    subtrees: dict[str, Subtree] = {}
+    for name, span, node in reader.iterate_entries("trees"):
+        reader.check_name(name, span, "a subtree")
+        if isinstance(node, YamlMapping) and set(grammar.SUBTREE_KEYS) & set(node.keys):
+            has_body = node.get("do") is not None
+            if not has_body:
+                parser.add_error(span, "missing-key", f'the subtree "{name}" needs the key "do"')
+            subtree_parser = parser if has_body else parser.make_silent_parser()
+            subtrees[name] = _parse_subtree(name, span, node, subtree_parser, library)
+        else:
+            subtrees[name] = Subtree(name, span, "", {}, None, parser.read_node(node, span), library)
+    return subtrees
+
+
+def _parse_subtree(name: str, span: Span, node: YamlMapping, parser: NodeParser, library: str) -> Subtree:
+    """Return the subtree of a mapping with subtree keys; `span` is the position of the name."""
+    reader = MappingReader(f'the subtree "{name}"', span, node, grammar.SUBTREE_KEYS, parser.findings)
+    return Subtree(
+        name,
+        span,
+        doc=reader.read_text("doc"),
+        arguments=_read_arguments(reader),
+        returns=_read_returns(reader),
+        body=parser.read_node(reader.get("do"), reader.get_key_span("do")),
+        library=library,
+    )
+
+
+def _read_arguments(reader: MappingReader) -> dict[str, Argument]:
+    """Return the arguments below `args`, which is a list of names, or a mapping of names to defaults."""
+    arguments: dict[str, Argument] = {}
+    hint = "Write the name without $; in the subtree, $name is the value."
+    for argument_name, span, value in _iterate_arguments(reader):
+        reader.check_name(argument_name, span, "an argument", hint)
+        name = argument_name.removeprefix("$")
+        if name in arguments:
+            first_line = arguments[name].span.line
+            message = f'the argument "{name}" occurs twice; the first is in line {first_line}'
+            reader.add_error(span, "duplicate-key", message)
+        arguments[name] = Argument(span, None if is_empty(value) else read_value(value, reader.findings))
+    return arguments
+
+
+def _iterate_arguments(reader: MappingReader) -> Iterator[tuple[str, Span, YamlNode]]:
+    """Yield name, position of the name, and default of each argument; without a default, an empty scalar."""
+    if not isinstance(reader.get("args"), YamlSequence):
+        yield from reader.iterate_entries("args")
+        return
+    for item in reader.list_items("args"):
+        if isinstance(item, YamlScalar):
+            yield item.text, item.span, YamlScalar(item.span, None, "")
+        else:
+            message = "a list of arguments contains names only; for defaults, write a mapping"
+            reader.add_error(item.span, "wrong-type", message)
+
+
+def _read_returns(reader: MappingReader) -> dict[str, Span] | None:
+    """Return the names below `returns` with their positions, or None if the key is missing."""
+    if reader.get("returns") is None:
+        return None
+    spans: dict[str, Span] = {}
+    for item in reader.list_items("returns"):
+        name = item.text.removeprefix("$") if isinstance(item, YamlScalar) else ""
+        if NAME_PATTERN.fullmatch(name):
+            spans[name] = item.span
+        else:
+            message = "returns must be a list of names of variables, for example [targets]"
+            reader.add_error(item.span, "bad-name", message)
+    return spans

@@ -1,1 +1,0 @@
-"""Typed content of missions: grammar, nodes, values and connections."""

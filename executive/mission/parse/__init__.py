@@ -1,1 +1,0 @@
-"""Parsers from YAML nodes to the typed content of mission, library and cell files."""

@@ -1,0 +1,281 @@
+"""Types of params and ports, conversion of constants, and connections of ports to variables."""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+import types
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, NoReturn, Union, cast, get_args, get_origin, get_type_hints
+
+from pydantic import TypeAdapter, ValidationError
+
+from executive.behaviours import find_mission_type
+from executive.cell.objects import KnownItem, RefersTo
+from executive.mission.findings import describe_validation_error, describe_value, suggest_word
+from executive.mission.nodes import InnerNode, Node, SkillNode
+from executive.skill import Direction, Param, Port, Skill
+from executive.tree.keys import Key, KeyKind
+from executive.tree.specification import Literal, LocatedName, Reference, Span
+
+_DESCRIPTIONS = {
+    str: "a text",
+    int: "a whole number",
+    float: "a number",
+    bool: "true or false",
+    type(None): "nothing",
+}
+"""Description of the values of a type, for messages."""
+
+
+def is_assignable(source: object, target: object) -> bool:
+    """Return True if every value of the type `source` is also a value of the type `target`."""
+    if source is Any or target is Any or source == target or source is NoReturn:
+        return True
+    if is_union(source):
+        return all(is_assignable(part, target) for part in get_args(source))
+    if is_union(target):
+        return any(is_assignable(source, part) for part in get_args(target))
+    if source is int and target is float:
+        return True
+    if not issubclass(_get_class(source), _get_class(target)):
+        return False
+    arguments = zip(get_args(source), get_args(target), strict=False)
+    return all(is_assignable(*pair) for pair in arguments if ... not in pair)
+
+
+def find_element_type(declared_type: object) -> object:
+    """Return the type of the elements of a list or tuple type, or None for other types."""
+    if declared_type is Any:
+        return Any
+    if declared_type is str or not issubclass(_get_class(declared_type), Sequence):
+        return None
+    arguments = [argument for argument in get_args(declared_type) if argument is not ...]
+    return Union[tuple(arguments)] if arguments else Any  # noqa: UP007 - the number of types varies
+
+
+def find_fields(declared_type: object, refers_to: str) -> dict[str, tuple[object, str]]:
+    """Return type and kind of names of each field of the values of a type, by name.
+
+    The kind is "" for a field without names. An item has the fields of `KnownItem`.
+    """
+    value_type = KnownItem if refers_to == "item" and declared_type is str else declared_type
+    if not (isinstance(value_type, type) and is_dataclass(value_type)):
+        return {}
+    hints, annotations = get_type_hints(value_type), get_type_hints(value_type, include_extras=True)
+    return {
+        field.name: (hints[field.name], _find_kind(annotations[field.name])) for field in fields(value_type)
+    }
+
+
+def _find_kind(annotation: object) -> str:
+    markers = getattr(annotation, "__metadata__", ())
+    return next((marker.kind for marker in markers if isinstance(marker, RefersTo)), "")
+
+
+def describe_type(declared_type: object) -> str:
+    """Return a description of the values of a type, for a sentence: `a list of Target`."""
+    if declared_type in _DESCRIPTIONS:
+        return _DESCRIPTIONS[declared_type]
+    if is_union(declared_type):
+        return " or ".join(describe_type(part) for part in get_args(declared_type))
+    element_type = find_element_type(declared_type)
+    if element_type is not None and declared_type is not object:
+        if element_type is Any:
+            return "a list"
+        return f"a list of {describe_type(element_type).removeprefix('a ')}"
+    return getattr(declared_type, "__name__", str(declared_type))
+
+
+def is_union(declared_type: object) -> bool:
+    """Return True if a type is a union of types."""
+    return get_origin(declared_type) in (Union, types.UnionType)
+
+
+def _get_class(declared_type: object) -> type:
+    """Return the class of a type without type arguments; `object` for a type that is no class."""
+    origin = get_origin(declared_type) or declared_type
+    return origin if isinstance(origin, type) else object
+
+
+class ValueProblem(Exception):
+    """A value does not fit its declaration; the message is the end of a sentence: `must be a list`.
+
+    Attributes:
+        code: Code of the finding.
+    """
+
+    def __init__(self, message: str, code: str = "wrong-type") -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def is_plain_type(declared_type: object) -> bool:
+    """Return True if values of this type can be written in a mission file."""
+    return find_mission_type(declared_type) == declared_type
+
+
+def find_problem(value: object, declaration: Param | Port) -> ValueProblem | None:
+    """Return the error if a param or an input does not accept a constant, else None."""
+    try:
+        convert_setting(value, declaration)
+    except ValueProblem as problem:
+        return problem
+    return None
+
+
+def convert_setting(value: object, declaration: Param | Port) -> object:
+    """Return a constant converted to the type of a param or an input.
+
+    Raises:
+        ValueProblem: The value has another type, is out of bounds, or is none of the choices.
+    """
+    if isinstance(declaration, Port):
+        if value is None and is_assignable(type(None), declaration.type):
+            return None
+        # Items are created during a run, so a file cannot contain an item.
+        if not is_plain_type(declaration.type) or declaration.refers_to == "item":
+            example = f"for example ${declaration.name}"
+            raise ValueProblem(f"must be a variable, {example}, not {describe_value(value)}")
+        return convert_value(value, declaration.type)
+    converted = convert_value(value, declaration.type)
+    minimum, maximum, choices = declaration.ge, declaration.le, declaration.choices
+    unit = f" {declaration.unit}" if declaration.unit else ""
+    number = converted if isinstance(converted, int | float) else None
+    if number is not None and minimum is not None and number < minimum:
+        raise ValueProblem(f"must be at least {minimum:g}{unit}, not {describe_value(value)}", "out-of-range")
+    if number is not None and maximum is not None and number > maximum:
+        raise ValueProblem(f"must be at most {maximum:g}{unit}, not {describe_value(value)}", "out-of-range")
+    # For names of the cell, `choices` contains additional values, which `find_unknown_names` checks.
+    if choices is not None and not declaration.refers_to and converted not in choices:
+        allowed = " or ".join(f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in choices)
+        suggestion = suggest_word(value, map(str, choices))
+        raise ValueProblem(f"must be {allowed}, not {describe_value(value)}{suggestion}", "wrong-value")
+    return converted
+
+
+def convert_value(value: object, declared_type: object) -> object:
+    """Return a plain value converted to the declared type, for example a list to a tuple.
+
+    Raises:
+        ValueProblem: The value cannot be converted.
+    """
+    if not is_plain_type(declared_type):
+        raise ValueProblem(f"must be a variable, not {describe_value(value)}")
+    return _validate(_get_adapter(declared_type), value)
+
+
+def convert_constant(key: Key, value: object, max_value: int | None = None) -> object:
+    """Return a plain value converted to the type of a key; a number must not exceed `max_value`.
+
+    Raises:
+        ValueProblem: The value cannot be converted, or is out of bounds.
+    """
+    return _validate(key.make_validator(max_value), value)
+
+
+def _validate(adapter: TypeAdapter[object], value: object) -> object:
+    """Return the converted value, or raise ValueProblem."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueProblem(f"must be a finite number, not {value}")
+    try:
+        return adapter.validate_json(json.dumps(value), strict=True)
+    except ValidationError as error:
+        # A union has one error per type. The most useful error is a violated bound, such as `less_than`.
+        errors = sorted(error.errors(include_url=False), key=lambda details: "than" not in details["type"])
+        code = "out-of-range" if "than" in errors[0]["type"] else "wrong-type"
+        is_integer_allowed = {details["type"] for details in errors[1:]} == {"int_type"}
+        note = " (a whole number is allowed, too)" if is_integer_allowed else ""
+        raise ValueProblem(describe_validation_error(errors[0]) + note, code) from None
+
+
+@functools.lru_cache(maxsize=256)
+def _get_adapter(declared_type: object) -> TypeAdapter[object]:
+    return TypeAdapter(cast("type[object]", declared_type))
+
+
+@dataclass(frozen=True)
+class Wire:
+    """Connection of a port to a variable.
+
+    Attributes:
+        skill: Name of the skill.
+        port: Port of the skill, or param whose value a variable gives.
+        variable: Name of the variable.
+        span: Position of the variable, or of the skill if the mission does not name the variable.
+        is_explicit: True if the mission names the variable; otherwise, the variable has the port's name.
+        field: Field of the variable that an input reads; "" for the whole value.
+    """
+
+    skill: str
+    port: Port | Param
+    variable: str
+    span: Span
+    is_explicit: bool
+    field: str = ""
+
+    @property
+    def reference(self) -> Reference:
+        """The variable and the field that an input reads."""
+        return Reference(self.variable, self.span, self.field)
+
+    def __str__(self) -> str:
+        return f"{self.skill}.{self.port.name}"
+
+
+def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator[Wire]:
+    """Yield the connection of every port of a direction, except inputs with a constant.
+
+    A param with a name as its value counts as an input if the mission gives a variable. An input in `one_of`
+    of the skill is connected only if the mission sets it.
+    """
+    params = skill.params.values() if direction is Direction.IN else ()
+    ports = [port for port in skill.ports.values() if port.direction is direction]
+    declarations: list[Param | Port] = [*(param for param in params if param.accepts_variable), *ports]
+    for declaration in declarations:
+        setting = node.settings.get(declaration.name)
+        value = setting.value if setting else None
+        if isinstance(value, Reference):
+            yield Wire(node.skill, declaration, value.name, value.span, is_explicit=True, field=value.field)
+        # `check_settings` reports a constant for an output.
+        elif isinstance(declaration, Port) and (
+            (direction is Direction.OUT and isinstance(value, Literal))
+            or (value is None and declaration.name not in skill.one_of)
+        ):
+            variable = node.variables_by_port.get(declaration.name, declaration.name)
+            yield Wire(node.skill, declaration, variable, node.span, is_explicit=False)
+
+
+def find_literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
+    """Yield the name and the constant of every param and port that has a constant."""
+    for name, setting in node.settings.items():
+        if isinstance(setting.value, Literal):
+            yield name, setting.value
+
+
+def find_control_node_outputs(node: Node) -> Iterator[tuple[Key, LocatedName]]:
+    """Yield each key of a control node that names an output variable, and the variable."""
+    if isinstance(node, InnerNode):
+        for key, value in node.iterate_keys():
+            if isinstance(value, LocatedName):
+                yield key, value
+
+
+def find_control_node_inputs(node: Node) -> Iterator[Reference]:
+    """Yield the variables that a control node reads as lists of elements."""
+    if isinstance(node, InnerNode):
+        for key, value in node.iterate_keys():
+            if key.kind is KeyKind.ELEMENTS and isinstance(value, Reference):
+                yield value
+
+
+def find_written_variables(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
+    """Return the variables that the nodes of a tree may write."""
+    variables = set()
+    for node in root.walk():
+        variables |= {variable.name for _, variable in find_control_node_outputs(node)}
+        if isinstance(node, SkillNode) and node.skill in skills:
+            variables |= {wire.variable for wire in find_wires(node, skills[node.skill], Direction.OUT)}
+    return variables

@@ -1,1 +1,0 @@
-"""JSON Schema of mission, library and cell files."""
