@@ -107,7 +107,12 @@ class RunDirectory:
                     write_atomically(path, text)
             for name, text in texts.items():
                 write_atomically(self.path / name, text)
-        _update_latest_link(self.path.parents[1], self.path)
+        runs = self.path.parents[1]
+        temporary_link = runs / f".latest-{os.getpid()}"
+        # An error is ignored: a run needs no link, and some file systems do not support links.
+        with contextlib.suppress(OSError):
+            temporary_link.symlink_to(self.path.relative_to(runs), target_is_directory=True)
+            temporary_link.replace(runs / LATEST_LINK)
 
 
 def make_dated_folder(runs: Path, name: str, start_time: datetime) -> Path:
@@ -161,15 +166,6 @@ def make_unique_folder(day: Path, name: str) -> Path:
             return path
         except FileExistsError:
             number += 1
-
-
-def _update_latest_link(runs: Path, path: Path) -> None:
-    """Replace the link `runs/latest` atomically by a link to `path`."""
-    temporary_link = runs / f".latest-{os.getpid()}"
-    # An error is ignored: a run needs no link, and some file systems do not support links.
-    with contextlib.suppress(OSError):
-        temporary_link.symlink_to(path.relative_to(runs), target_is_directory=True)
-        temporary_link.replace(runs / LATEST_LINK)
 
 
 _NODES_ADAPTER = TypeAdapter(list[OutlineNode], config=ConfigDict(ser_json_inf_nan="strings"))

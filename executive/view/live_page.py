@@ -48,7 +48,6 @@ MAX_QUEUED_MESSAGES = 32
 REQUIRED_PACKAGES = ("aiohttp", "viser")
 """Optional dependencies of the project that the live page needs."""
 
-
 BodyPoses = Mapping[str, Sequence[float]]
 """Poses of all bodies by name: position [m] and quaternion (w, x, y, z), `(7,)`."""
 
@@ -200,7 +199,10 @@ class LivePage:
         self._queue.put(None)
         try:
             if self._server.wait(SHUTDOWN_TIMEOUT) != 0:
-                self.problem = self.problem or f"the page ended before the run: {self._read_last_error()}"
+                self._error_file.seek(0)
+                lines = self._error_file.read().decode(errors="replace").strip().splitlines()
+                cause = lines[-1] if lines else f"exit status {self._server.returncode}"
+                self.problem = self.problem or f"the page ended before the run: {cause}"
         except subprocess.TimeoutExpired:
             self._server.kill()
             self._server.wait()
@@ -256,12 +258,6 @@ class LivePage:
                 if not is_last_batch:
                     time.sleep(BATCH_PERIOD)
         self._has_server_ended = True
-
-    def _read_last_error(self) -> str:
-        """Return the last line that the server wrote to stderr, or the exit status of the server."""
-        self._error_file.seek(0)
-        lines = self._error_file.read().decode(errors="replace").strip().splitlines()
-        return lines[-1] if lines else f"exit status {self._server.returncode}"
 
     def _read_commands(self) -> None:
         """Run the commands that the server writes to stdout, until the server ends."""

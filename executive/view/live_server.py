@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 OCCLUSION_DARKENING = 0.45
 """Fraction by which the brightness of pixels that the arm occludes is reduced: 0 not at all, 1 to black."""
 
+ENDED_STATUSES = ("SUCCESS", "FAILURE", "INVALID")
+"""Statuses of ended nodes; the page shows how often each node ended with each of them."""
 SCENE_KEYS = ("shapes", "body_poses")
 """Fields of `PageChange` that belong to the scene, which `SceneProxy` serves."""
 
@@ -84,7 +86,11 @@ class PageState:
     def _apply_event(self, event: events.Event) -> None:
         match event:
             case events.NodeStarted(node) | events.NodeEnded(node):
-                self._set_entry("nodes", node, self._describe_node(node))
+                activation = self._timeline.activation_by_path[node]
+                end_counts = self._timeline.end_counts.get(node, Counter())
+                counts = {STATUS_TEXTS[status]: end_counts[status] for status in ENDED_STATUSES}
+                entry = {"status": activation.status.lower(), "failure": activation.failure}
+                self._set_entry("nodes", node, {**counts, **entry, "item": activation.item})
             case events.ItemChanged():
                 self._set_entry("items", event.item, vars(event))
             case events.TargetSelected():
@@ -97,15 +103,6 @@ class PageState:
                 self._set_values(choices=None)
             case events.RunEnded():
                 self._set_values(choices=None, has_ended=True)
-
-    def _describe_node(self, path: str) -> JsonObject:
-        """Return the status, last failure and item of a node, and the number of times it ended by status."""
-        activation = self._timeline.activation_by_path[path]
-        end_counts = self._timeline.end_counts.get(path, Counter())
-        return {
-            **{text: end_counts[status] for status, text in STATUS_TEXTS.items() if status != "RUNNING"},
-            "status": activation.status.lower(), "failure": activation.failure, "item": activation.item,
-        }  # fmt: skip
 
     def _set_values(self, **values: object) -> None:
         self.values |= values

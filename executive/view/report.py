@@ -155,6 +155,8 @@ def render_report(data: ReportData) -> str:
     # A reason that repeats the status, such as "fault", is omitted.
     reason = "" if outcome is None or outcome.reason.upper() == data.status else outcome.reason
     warning = "" if result is None else result.disagreement
+    activities = data.activity_times.activities
+    skill_colours = cycle(colour for colour in PALETTE if colour not in ACTIVITY_COLOURS.values())
     return render_template(
         "report.html",
         data=data,
@@ -166,7 +168,7 @@ def render_report(data: ReportData) -> str:
         list_labelled_sentences=list_labelled_sentences,
         titles={node.path: node.title for node in data.nodes},
         describe_place_on_table=describe_place_on_table,
-        colours=_choose_colours(data.activity_times.activities),
+        colours={name: ACTIVITY_COLOURS.get(name) or next(skill_colours) for name in activities},
         total_times={item: sum(row.values()) for item, row in data.activity_times.times_by_item.items()},
         tree=Markup(make_svg(data.nodes, data.start.mission, _make_node_results(data))),
         timeline=Markup(draw_lanes(data.timeline, data.nodes)),
@@ -189,11 +191,6 @@ def _describe_end(data: ReportData) -> str:
     unplaced_counts = {"rejected": items.rejected, "skipped": items.skipped, "lost": items.lost}
     unplaced_text = "".join(f", {count} {state}" for state, count in unplaced_counts.items() if count)
     return f"{items.placed} of {items.seen} objects are in their bins{unplaced_text}."
-
-
-def _choose_colours(activities: Sequence[str]) -> dict[str, str]:
-    skill_colours = cycle(colour for colour in PALETTE if colour not in ACTIVITY_COLOURS.values())
-    return {activity: ACTIVITY_COLOURS.get(activity) or next(skill_colours) for activity in activities}
 
 
 def _make_node_results(data: ReportData) -> dict[str, NodeResult]:
@@ -349,22 +346,6 @@ _STATUSES_BY_SEVERITY = ("FAILURE", "RUNNING", "INVALID", "SUCCESS")
 """Statuses of activations, the most severe first."""
 
 
-@dataclass(frozen=True)
-class Bar:
-    """Bar of a lane, for one or more activations.
-
-    Attributes:
-        start, end: Times at the left and the right end of the bar [s].
-        status: Most severe status of the activations in the bar, in lower case.
-        tooltip: Text about the activations in the bar.
-    """
-
-    start: float
-    end: float
-    status: str
-    tooltip: str
-
-
 def draw_lanes(timeline: Timeline, nodes: Sequence[OutlineNode]) -> str:
     """Return an SVG document with the activations of a run; the lanes are in the order of the tree.
 
@@ -431,7 +412,8 @@ def _group_activations(activations: Sequence[Activation], scale: float) -> list[
     return groups
 
 
-def _make_bar(node: OutlineNode, group: Sequence[Activation]) -> Bar:
+def _make_bar(node: OutlineNode, group: Sequence[Activation]) -> tuple[float, float, str, str]:
+    """Return start [s], end [s], most severe status in lower case, and tooltip of a bar."""
     start = group[0].start
     end = group[-1].end
     items = {activation.item for activation in group}
@@ -441,4 +423,4 @@ def _make_bar(node: OutlineNode, group: Sequence[Activation]) -> Bar:
     times_text = f"{start:.2f} s to {end:.2f} s ({end - start:.2f} s)"
     tooltip = "\n".join(filter(None, (heading, times_text, find_last_failure(group))))
     worst_status = min((activation.status for activation in group), key=_STATUSES_BY_SEVERITY.index)
-    return Bar(start, end, worst_status.lower(), tooltip)
+    return start, end, worst_status.lower(), tooltip

@@ -126,7 +126,6 @@ class _NodeDrawing:
 
     Attributes:
         node: The node.
-        id: Id of the group of the node in the document.
         status: Status of the node in a run in lower case, or "".
         symbol: Symbol before the title of a control node; "" for a skill.
         title: Name of the node, truncated to `MAX_LINE_LENGTH`.
@@ -137,7 +136,6 @@ class _NodeDrawing:
     """
 
     node: OutlineNode
-    id: str
     status: str
     symbol: str
     title: str
@@ -159,7 +157,9 @@ def make_svg(
     for box, indices in zip(boxes, list_child_indices(nodes), strict=True):
         box.children = [boxes[index] for index in indices]
     width, height = place_boxes(boxes)
-    return render_template("tree.svg", name=name, width=width, height=height, drawings=drawings)
+    return render_template(
+        "tree.svg", name=name, width=width, height=height, drawings=drawings, make_group_id=make_group_id
+    )
 
 
 def _make_drawing(node: OutlineNode, result: NodeResult) -> _NodeDrawing:
@@ -184,8 +184,7 @@ def _make_drawing(node: OutlineNode, result: NodeResult) -> _NodeDrawing:
             estimate_text_width(subtree, SUBTREE_NAME_SIZE, bold=True) + FRAME_PADDING if subtree else 0.0
         ),
     )
-    group_id = make_group_id(node.path)
-    return _NodeDrawing(node, group_id, result.status.lower(), symbol, title, lines, tooltip, indent, box)
+    return _NodeDrawing(node, result.status.lower(), symbol, title, lines, tooltip, indent, box)
 
 
 def make_group_id(path: str) -> str:

@@ -322,12 +322,9 @@ class KeyReader:
                     key = os.read(self._descriptor, 1)
                     if not key:
                         return
-                    self._handle_key(key)
-
-    def _handle_key(self, key: bytes) -> None:
-        if key == STEP_KEY:
-            self.control.step()
-        elif key in PAUSE_KEYS and self.control.is_paused:
-            self.control.resume()
-        elif key in PAUSE_KEYS:
-            self.control.pause()
+                    if key == STEP_KEY:
+                        self.control.step()
+                    elif key in PAUSE_KEYS and self.control.is_paused:
+                        self.control.resume()
+                    elif key in PAUSE_KEYS:
+                        self.control.pause()
