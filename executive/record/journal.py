@@ -176,17 +176,16 @@ class Journal:
         """
         if self._fd is None:
             return
-        fd = self._fd
-        self._fd = None
         advice = "check what the tool holds and what is in the bins"
         try:
             with explain_os_errors(Fault, f'the journal "{self._path}" may lack its last lines', advice):
                 if not self._has_failed:
-                    self._sync(fd)
+                    self._sync(self._fd)
         finally:
             # `_sync` has already raised an exception if the disk has an error.
             with contextlib.suppress(OSError):
-                os.close(fd)
+                os.close(self._fd)
+            self._fd = None
 
     def _write(self, fd: int, line: bytes) -> None:
         """Write a line without a buffer, so that the file contains all lines if the process crashes."""
@@ -208,6 +207,45 @@ class Journal:
         if status.st_size != self._file_size:
             lengths = f"from {self._file_size} to {status.st_size} bytes"
             raise OSError(errno.EIO, f"another program changed its length {lengths} during the run")
+
+
+def _measure_valid_length(content: bytes) -> int:
+    """Return the length [bytes] of a journal up to its last complete line, with or without a line feed."""
+    content = content.rstrip(b"\0")
+    last_line_start = content.rfind(b"\n") + 1
+    try:
+        from_json(content[last_line_start:])
+    except ValueError:
+        return last_line_start
+    return len(content)
+
+
+def _repair_end(fd: int) -> int:
+    """Remove an incomplete last line of a journal, add a missing line feed, and return the length [bytes]."""
+    with open(fd, "rb", closefd=False) as journal:
+        content = journal.read()
+    length = _measure_valid_length(content)
+    os.ftruncate(fd, length)
+    if length and content[length - 1 : length] != b"\n":
+        length += os.write(fd, b"\n")
+    os.fsync(fd)
+    return length
+
+
+def _lock(fd: int, path: Path) -> None:
+    """Lock the open journal for this process until the file is closed.
+
+    Raises:
+        InputError: Another process, or another `Journal` of this process, has locked the journal.
+        OSError: The file system does not support locks.
+    """
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise InputError(
+            f'the run directory "{path.parent}" is in use: another process writes its journal; '
+            "wait until that run has ended, or stop it with Ctrl-C"
+        ) from error
 
 
 def read_journal(path: Path) -> list[TimedEvent]:
@@ -267,45 +305,6 @@ def find_run_end(timed_events: Sequence[TimedEvent]) -> RunEnded | None:
     """
     last_event = timed_events[-1].event if timed_events else None
     return last_event if isinstance(last_event, RunEnded) else None
-
-
-def _measure_valid_length(content: bytes) -> int:
-    """Return the length [bytes] of a journal up to its last complete line, with or without a line feed."""
-    content = content.rstrip(b"\0")
-    last_line_start = content.rfind(b"\n") + 1
-    try:
-        from_json(content[last_line_start:])
-    except ValueError:
-        return last_line_start
-    return len(content)
-
-
-def _repair_end(fd: int) -> int:
-    """Remove an incomplete last line of a journal, add a missing line feed, and return the length [bytes]."""
-    with open(fd, "rb", closefd=False) as journal:
-        content = journal.read()
-    length = _measure_valid_length(content)
-    os.ftruncate(fd, length)
-    if length and content[length - 1 : length] != b"\n":
-        length += os.write(fd, b"\n")
-    os.fsync(fd)
-    return length
-
-
-def _lock(fd: int, path: Path) -> None:
-    """Lock the open journal for this process until the file is closed.
-
-    Raises:
-        InputError: Another process, or another `Journal` of this process, has locked the journal.
-        OSError: The file system does not support locks.
-    """
-    try:
-        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        raise InputError(
-            f'the run directory "{path.parent}" is in use: another process writes its journal; '
-            "wait until that run has ended, or stop it with Ctrl-C"
-        ) from error
 
 
 _DECISION_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), check_circular=False)

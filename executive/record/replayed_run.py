@@ -24,6 +24,9 @@ from executive.run.assembly import RunOptions, assemble_replay, assemble_resumed
 from executive.run.resumed_run import ResumedRun
 from executive.skill import Skill
 
+EVENTS_WITHOUT_REPLAY = (RunStarted, MotionPlanned, RequestGiven)
+"""Kinds of events that a replay does not emit."""
+
 
 @dataclass
 class ReplayResult:
@@ -197,10 +200,6 @@ def _describe_decision(decision: TimedEvent | None) -> str:
     values = ", ".join(f"{key} {value}" for key, value in fields if value and key not in ("outputs", "skill"))
     text = f"at {decision.clock:.3f} s (step {decision.tick}) {type(decision.event).__name__}: {values}"
     return shorten_quotations(escape_control_characters(text))
-
-
-EVENTS_WITHOUT_REPLAY = (RunStarted, MotionPlanned, RequestGiven)
-"""Kinds of events that a replay does not emit."""
 
 
 def resume_run(

@@ -21,43 +21,12 @@ from executive.mission.outline import OutlineNode
 from executive.skill import Skill
 from executive.tree.specification import Source
 
-
-@contextlib.contextmanager
-def replace_atomically(path: Path) -> Iterator[Path]:
-    """Yield the path of a temporary file that replaces `path` after the `with` block.
-
-    After an exception in the block, the temporary file is removed.
-
-    Raises:
-        OSError: The file cannot be written; `path` is unchanged.
-    """
-    temporary_path = path.with_name(f".{path.name}.part")
-    try:
-        temporary_path.touch()
-        yield temporary_path
-        temporary_path.replace(path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            temporary_path.unlink()
-        raise
-
-
-def write_atomically(path: Path, text: str) -> None:
-    """Replace the content of the file `path` by `text`, and sync the file to the disk.
-
-    Raises:
-        OSError: The file cannot be written; `path` is unchanged.
-    """
-    with replace_atomically(path) as temporary_path, temporary_path.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-
-
 LATEST_LINK = "latest"
 """Name of the link to the last run directory."""
 SCENE_FILE = "scene.yaml"
 """Name of the copy of the scene file."""
+_NODES_ADAPTER = TypeAdapter(list[OutlineNode], config=ConfigDict(ser_json_inf_nan="strings"))
+"""Encoder and decoder of `tree.json`."""
 
 
 class RunDirectory:
@@ -168,8 +137,36 @@ def make_unique_folder(day: Path, name: str) -> Path:
             number += 1
 
 
-_NODES_ADAPTER = TypeAdapter(list[OutlineNode], config=ConfigDict(ser_json_inf_nan="strings"))
-"""Encoder and decoder of `tree.json`."""
+@contextlib.contextmanager
+def replace_atomically(path: Path) -> Iterator[Path]:
+    """Yield the path of a temporary file that replaces `path` after the `with` block.
+
+    After an exception in the block, the temporary file is removed.
+
+    Raises:
+        OSError: The file cannot be written; `path` is unchanged.
+    """
+    temporary_path = path.with_name(f".{path.name}.part")
+    try:
+        temporary_path.touch()
+        yield temporary_path
+        temporary_path.replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            temporary_path.unlink()
+        raise
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Replace the content of the file `path` by `text`, and sync the file to the disk.
+
+    Raises:
+        OSError: The file cannot be written; `path` is unchanged.
+    """
+    with replace_atomically(path) as temporary_path, temporary_path.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def read_mission_of_run(

@@ -24,8 +24,7 @@ from executive.tree.node_registry import load_control_nodes
 from executive.tree.specification import Literal, LocatedName, Reason, Reference, Value
 from executive.view.text import replace_invalid_xml_characters
 
-_NAMES_FILE = Path(__file__).with_name("btcpp_names.txt")
-_REGISTERED_NAMES = frozenset(_NAMES_FILE.read_text(encoding="utf-8").split())
+_REGISTERED_NAMES = frozenset(Path(__file__).with_name("btcpp_names.txt").read_text("utf-8").split())
 """Names that BehaviorTree.CPP 4.10 registers or reserves."""
 _TYPE_NAMES: Mapping[object, str] = {bool: "bool", int: "int", float: "double", str: "std::string"}
 """Names of types in C++."""

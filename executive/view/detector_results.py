@@ -39,7 +39,6 @@ def list_metrics(source: str, detector: str, evaluation: Evaluation) -> Iterator
 
 
 def _make_class_table(evaluation: Evaluation) -> Table:
-    """Return a table with the precision and recall of every class."""
     table = _make_table("class", "objects", "precision", "recall")
     for label, metrics in evaluation.by_class.items():
         table.add_row(label, f"{metrics.objects}", f"{metrics.precision:.2%}", f"{metrics.recall:.2%}")

@@ -201,7 +201,7 @@ class SceneProxy:
 
 
 def _start_scene_server(socket_path: Path, shapes: Sequence[Shape]) -> LiveScene:
-    """Import viser and start the scene server."""
+    # The import of viser and trimesh takes 1 s, and only the first browser needs them.
     from executive.view.live_scene import LiveScene
 
     return LiveScene(socket_path, shapes)

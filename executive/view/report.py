@@ -194,7 +194,6 @@ def _describe_end(data: ReportData) -> str:
 
 
 def _make_node_results(data: ReportData) -> dict[str, NodeResult]:
-    """Return the result of each node that ran, by node path."""
     results = {}
     for path, activations in group_by_node(data.timeline.activations).items():
         lines = tuple(filter(None, (format_counts(activations), find_last_failure(activations))))

@@ -109,7 +109,6 @@ def _wrap_line(text: str, first_indent: str, indent: str) -> list[str]:
 
 
 def _list_details(node: OutlineNode, shows_ports: bool, shows_reasons: bool) -> Iterator[str]:
-    """Yield the texts below the line of a node."""
     if shows_reasons and node.trigger:
         yield node.trigger
     if shows_ports and (texts := describe_connections(node)):
