@@ -66,8 +66,7 @@ class ReplayResult:
 
     def as_json(self) -> dict[str, JsonValue]:
         """Return the attributes as JSON; the entry of a decision has its tick, clock, kind and fields."""
-        decisions = {"recorded": _to_json(self.recorded), "replayed": _to_json(self.replayed)}
-        return vars(self) | decisions
+        return vars(self) | {"recorded": _to_json(self.recorded), "replayed": _to_json(self.replayed)}
 
 
 def replay_run(

@@ -84,7 +84,7 @@ class ReportData:
         nodes: Nodes of the tree.
         timeline: Timeline of the run.
         last_item_changes: Last change of each item that is not a phantom.
-        activity_times: Time of the run by item and activity.
+        activities, times_by_item: Activities of the run, and their times by item.
         pictures: Pictures of decisions and failures.
         requests: Requests of the operator, in order.
         repeat_command: Command that repeats the run.
@@ -107,7 +107,7 @@ class ReportData:
         self.timeline = Timeline.from_events(events)
         all_items = self.timeline.items.list_items()
         self.last_item_changes = [item for item in all_items if item.state != "phantom"]
-        self.activity_times = compute_activity_times(self.timeline, self.nodes)
+        self.activities, self.times_by_item = compute_activity_times(self.timeline, self.nodes)
         self.pictures = collect_pictures(directory.pictures, [item.item for item in all_items])
         self.requests = list_requests(self.timeline)
         file = Path(self.start.file)
@@ -155,7 +155,6 @@ def render_report(data: ReportData) -> str:
     # A reason that repeats the status, such as "fault", is omitted.
     reason = "" if outcome is None or outcome.reason.upper() == data.status else outcome.reason
     warning = "" if result is None else result.disagreement
-    activities = data.activity_times.activities
     skill_colours = cycle(colour for colour in PALETTE if colour not in ACTIVITY_COLOURS.values())
     return render_template(
         "report.html",
@@ -168,8 +167,8 @@ def render_report(data: ReportData) -> str:
         list_labelled_sentences=list_labelled_sentences,
         titles={node.path: node.title for node in data.nodes},
         describe_place_on_table=describe_place_on_table,
-        colours={name: ACTIVITY_COLOURS.get(name) or next(skill_colours) for name in activities},
-        total_times={item: sum(row.values()) for item, row in data.activity_times.times_by_item.items()},
+        colours={name: ACTIVITY_COLOURS.get(name) or next(skill_colours) for name in data.activities},
+        total_times={item: sum(row.values()) for item, row in data.times_by_item.items()},
         tree=Markup(make_svg(data.nodes, data.start.mission, _make_node_results(data))),
         timeline=Markup(draw_lanes(data.timeline, data.nodes)),
         params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
@@ -232,22 +231,16 @@ def _link_picture(file: Path, item_names: Collection[str]) -> Picture:
     return Picture(quote(path), path, tick, "", subject)
 
 
-@dataclass(frozen=True)
-class ActivityTimes:
-    """Time of a run by item and activity [s].
-
-    Attributes:
-        activities: Activities that took time: look, skills by their first use, failed attempts, waiting.
-        times_by_item: Time by item and activity; `NO_ITEM` is the last key. The sum of all times is the
-            duration of the run.
-    """
-
-    activities: tuple[str, ...]
-    times_by_item: Mapping[str, Mapping[str, float]]
+TimesByItem = Mapping[str, Mapping[str, float]]
+"""Time by item and activity [s]; `NO_ITEM` is the last key. The sum is the duration of the run."""
 
 
-def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> ActivityTimes:
-    """Return the time by item and activity, from the start of a run to the last event of its timeline.
+def compute_activity_times(
+    timeline: Timeline, nodes: Sequence[OutlineNode]
+) -> tuple[tuple[str, ...], TimesByItem]:
+    """Return activities, and times by item, from the start of a run to the last event of its timeline.
+
+    The activities are those that took time: look, skills by their first use, failed attempts, waiting.
 
     If several skills run, the time belongs to the first started skill that works on an item. Time without
     such a skill belongs to the item that is selected next. `timeline.has_history` must be true.
@@ -280,7 +273,7 @@ def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> 
     all_activities = dict.fromkeys([LOOK, *skill_activities, FAILED_ATTEMPTS, WAITING])
     activities = tuple(name for name in all_activities if any(name in row for row in times.values()))
     items = sorted(times, key=lambda item: item == NO_ITEM)
-    return ActivityTimes(activities, {item: dict(times[item]) for item in items})
+    return activities, {item: dict(times[item]) for item in items}
 
 
 def _split_time(
