@@ -21,7 +21,7 @@ from executive.mission.analysis import UnhandledFailure
 from executive.mission.instance import get_mission_node, make_inspection_instance
 from executive.mission.nodes import InnerNode, SubtreeNode
 from executive.record.journal import Recorder
-from executive.record.recorded_run import RecordedRun, make_run_directory
+from executive.record.recorded_run import execute_recorded, make_run_directory
 from executive.record.result import is_confirmed_by_audit
 from executive.record.timeline import Timeline, group_by_node
 from executive.run.assembly import RunOptions, assemble
@@ -236,8 +236,8 @@ def run_trial(
             run.execute()
         else:
             directory = make_run_directory(run, loaded, options, runs_folder)
-            recorded_run = RecordedRun(run, loaded, directory, Recorder(directory))
-            run_directory = recorded_run.execute(mission.seed, start_time).run
+            recorder = Recorder(directory)
+            run_directory = execute_recorded(run, loaded, recorder, mission.seed, start_time).run
             try_write_report(run_directory)
         items = run.count_items()
         audit = run.count_ground_truth()

@@ -73,7 +73,7 @@ def run_command(
         from executive.record.result import find_exit_code
         from executive.record.run_directory import RunDirectory, find_run, read_cell
         from executive.run.assembly import RunOptions
-        from executive.view.live.page import LivePage
+        from executive.view.live_page import LivePage
         from executive.view.report import try_write_report
         from executive.view.terminal import describe_end, format_repeat_command, format_summary
 

@@ -8,7 +8,7 @@ import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import is_dataclass
 from operator import attrgetter
 from pathlib import Path
@@ -16,20 +16,9 @@ from pathlib import Path
 from pydantic import JsonValue, TypeAdapter, ValidationError
 from pydantic_core import from_json
 
+from executive import events
 from executive.errors import Fault, InputError, RecordLost, describe_os_error, explain_os_errors
-from executive.events import (
-    JOURNAL_FORMAT,
-    Event,
-    InputRead,
-    ItemChanged,
-    NodeEnded,
-    NodeStarted,
-    RunEnded,
-    RunStarted,
-    TargetSelected,
-    TimedEvent,
-    ToolCommanded,
-)
+from executive.events import JOURNAL_FORMAT, Event, RunEnded, RunStarted, TimedEvent
 from executive.record.picture_recorder import PictureRecorder
 from executive.record.run_directory import RunDirectory
 from executive.replay.recording_cell import check_input
@@ -66,6 +55,19 @@ def make_journal_schema() -> dict[str, JsonValue]:
         "oneOf": [{"$ref": f"#/definitions/{kind}"} for kind in EVENT_CLASSES],
         "definitions": definitions,
     }
+
+
+def _to_json_type(value: object) -> object:
+    """Convert a value to a type that the JSON encoder supports, or raise a TypeError."""
+    if isinstance(value, Mapping):
+        return dict(value)
+    if is_dataclass(value):
+        return vars(value)
+    raise TypeError(f"JSON has no equivalent of a {type(value).__name__}")
+
+
+_ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False, default=_to_json_type)
+"""Encoder of events, which are dataclasses with mappings."""
 
 
 def encode_event(timed: TimedEvent) -> bytes:
@@ -108,51 +110,6 @@ def decode_event(line: bytes) -> TimedEvent:
     return TimedEvent(tick, float(clock), event)
 
 
-def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
-    """Return the events in the lines of a journal.
-
-    Raises:
-        InputError: A line contains no event of this format, or the time of an event contradicts its control
-            step.
-    """
-    events: list[TimedEvent] = []
-    control_period = clock_offset = 0.0
-    for line_number, line in enumerate(lines, start=1):
-        try:
-            timed = decode_event(line)
-            event = timed.event
-            if isinstance(event, RunStarted):
-                control_period = event.step
-            step_time = timed.tick * control_period + clock_offset
-            if control_period and abs(timed.clock - step_time) > CLOCK_TOLERANCE:
-                raise ValueError(f'"tick" {timed.tick} and "clock" {timed.clock} contradict each other')
-            if isinstance(event, InputRead) and event.name == "clock" and not event.exception:
-                if not isinstance(event.value, int | float):
-                    raise ValueError(f"the clock is {event.value!r}, not a time in seconds")
-                clock_offset = event.value
-            elif isinstance(event, InputRead) and not event.exception:
-                check_input(event.name, event.value)
-        except ValueError as error:
-            problem = f"{file_name}:{line_number}: this line is no event ({error})"
-            cause = "an earlier version wrote the file, or somebody changed it after the run"
-            raise InputError(f"{problem}; {cause}; restore a copy of the file") from error
-        events.append(timed)
-    return events
-
-
-def _to_json_type(value: object) -> object:
-    """Convert a value to a type that the JSON encoder supports, or raise a TypeError."""
-    if isinstance(value, Mapping):
-        return dict(value)
-    if is_dataclass(value):
-        return vars(value)
-    raise TypeError(f"JSON has no equivalent of a {type(value).__name__}")
-
-
-_ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False, default=_to_json_type)
-"""Encoder of events, which are dataclasses with mappings."""
-
-
 class Journal:
     """Observer that appends the recorded events to a file, and locks the file against other processes.
 
@@ -171,7 +128,6 @@ class Journal:
     def __init__(self, path: Path, *, resume: bool = False) -> None:
         self._path = path
         self._has_failed = False
-        self._is_synced = True
         with explain_os_errors(InputError, f'cannot open the journal "{path}"'):
             fd = os.open(path, os.O_RDWR | os.O_APPEND | (0 if resume else os.O_CREAT), 0o644)
             try:
@@ -199,8 +155,8 @@ class Journal:
         try:
             self._write(self._fd, line)
             event = timed.event
-            is_placement = isinstance(event, ItemChanged) and event.state == "placed"
-            if is_placement or isinstance(event, ToolCommanded | RunEnded):
+            is_placement = isinstance(event, events.ItemChanged) and event.state == "placed"
+            if is_placement or isinstance(event, events.ToolCommanded | RunEnded):
                 self._sync(self._fd)
         except OSError as error:
             self._has_failed = True
@@ -220,16 +176,16 @@ class Journal:
         """
         if self._fd is None:
             return
-        fd, self._fd = self._fd, None
         advice = "check what the tool holds and what is in the bins"
         try:
             with explain_os_errors(Fault, f'the journal "{self._path}" may lack its last lines', advice):
-                if not self._is_synced and not self._has_failed:
-                    self._sync(fd)
+                if not self._has_failed:
+                    self._sync(self._fd)
         finally:
             # `_sync` has already raised an exception if the disk has an error.
             with contextlib.suppress(OSError):
-                os.close(fd)
+                os.close(self._fd)
+            self._fd = None
 
     def _write(self, fd: int, line: bytes) -> None:
         """Write a line without a buffer, so that the file contains all lines if the process crashes."""
@@ -238,12 +194,10 @@ class Journal:
             # If the disk is nearly full, the system may write only a part of the line.
             unwritten = unwritten[os.write(fd, unwritten) :]
         self._file_size += len(line)
-        self._is_synced = False
 
     def _sync(self, fd: int) -> None:
         """Sync the file to the disk, and raise an OSError if another program changed the file."""
         os.fsync(fd)
-        self._is_synced = True
         status = os.fstat(fd)
         # Writing to a deleted file causes no error, but its content is lost when the file is closed.
         if not self._path.exists():
@@ -253,40 +207,6 @@ class Journal:
         if status.st_size != self._file_size:
             lengths = f"from {self._file_size} to {status.st_size} bytes"
             raise OSError(errno.EIO, f"another program changed its length {lengths} during the run")
-
-
-def read_journal(path: Path) -> list[TimedEvent]:
-    """Return the events of a journal, one for each line.
-
-    An incomplete line and zero bytes at the end of the file are ignored; a power cut may leave them.
-
-    Raises:
-        InputError: The file cannot be read, has another format, or has a line without an event.
-    """
-    with explain_os_errors(InputError, f'cannot read the journal "{path}"'):
-        content = path.read_bytes()
-    return decode_events(content[: _measure_valid_length(content)].splitlines(), str(path))
-
-
-def find_run_start(events: Sequence[TimedEvent], path: Path, advice: str) -> RunStarted:
-    """Return the event of the start of the run in the directory `path`.
-
-    Raises:
-        InputError: The events lack the start of the run; `advice` is the end of the message.
-    """
-    for timed in events:
-        if isinstance(timed.event, RunStarted):
-            return timed.event
-    raise InputError(f'the run in "{path}" was interrupted before its start; {advice}')
-
-
-def find_run_end(events: Sequence[TimedEvent]) -> RunEnded | None:
-    """Return the last event if it is the end of the run; None if the run was interrupted or is running.
-
-    If the run was resumed after an end, that end is not returned.
-    """
-    last_event = events[-1].event if events else None
-    return last_event if isinstance(last_event, RunEnded) else None
 
 
 def _measure_valid_length(content: bytes) -> int:
@@ -328,6 +248,65 @@ def _lock(fd: int, path: Path) -> None:
         ) from error
 
 
+def read_journal(path: Path) -> list[TimedEvent]:
+    """Return the events of a journal, one for each line.
+
+    An incomplete line and zero bytes at the end of the file are ignored; a power cut may leave them.
+
+    Raises:
+        InputError: The file cannot be read or has another format, a line contains no event, or the time of
+            an event contradicts its control step.
+    """
+    with explain_os_errors(InputError, f'cannot read the journal "{path}"'):
+        content = path.read_bytes()
+    timed_events: list[TimedEvent] = []
+    control_period = 0.0
+    clock_offset = 0.0
+    lines = content[: _measure_valid_length(content)].splitlines()
+    for line_number, line in enumerate(lines, start=1):
+        try:
+            timed = decode_event(line)
+            event = timed.event
+            if isinstance(event, RunStarted):
+                control_period = event.step
+            step_time = timed.tick * control_period + clock_offset
+            if control_period and abs(timed.clock - step_time) > CLOCK_TOLERANCE:
+                raise ValueError(f'"tick" {timed.tick} and "clock" {timed.clock} contradict each other')
+            if isinstance(event, events.InputRead) and event.name == "clock" and not event.exception:
+                if not isinstance(event.value, int | float):
+                    raise ValueError(f"the clock is {event.value!r}, not a time in seconds")
+                clock_offset = event.value
+            elif isinstance(event, events.InputRead) and not event.exception:
+                check_input(event.name, event.value)
+        except ValueError as error:
+            problem = f"{path}:{line_number}: this line is no event ({error})"
+            cause = "an earlier version wrote the file, or somebody changed it after the run"
+            raise InputError(f"{problem}; {cause}; restore a copy of the file") from error
+        timed_events.append(timed)
+    return timed_events
+
+
+def find_run_start(timed_events: Sequence[TimedEvent], path: Path, advice: str) -> RunStarted:
+    """Return the event of the start of the run in the directory `path`.
+
+    Raises:
+        InputError: The events lack the start of the run; `advice` is the end of the message.
+    """
+    for timed in timed_events:
+        if isinstance(timed.event, RunStarted):
+            return timed.event
+    raise InputError(f'the run in "{path}" was interrupted before its start; {advice}')
+
+
+def find_run_end(timed_events: Sequence[TimedEvent]) -> RunEnded | None:
+    """Return the last event if it is the end of the run; None if the run was interrupted or is running.
+
+    If the run was resumed after an end, that end is not returned.
+    """
+    last_event = timed_events[-1].event if timed_events else None
+    return last_event if isinstance(last_event, RunEnded) else None
+
+
 _DECISION_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), check_circular=False)
 """Encoder with a unique text for each value, so that equal decisions have equal hashes."""
 
@@ -346,14 +325,14 @@ class Trace:
         """Add an event to the hash if it is a decision."""
         event = timed.event
         match event:
-            case NodeStarted(node, skill, item):
+            case events.NodeStarted(node, skill, item):
                 decision = ["status", node, "RUNNING", *(("", item) if skill else (None, None)), None]
-            case NodeEnded(node, status, skill):
+            case events.NodeEnded(node, status, skill):
                 details = (event.reason, event.item) if skill else (event.reason or None, None)
                 decision = ["status", node, status, *details, event.outputs]
-            case ItemChanged(item, label, state, position):
+            case events.ItemChanged(item, label, state, position):
                 decision = ["item", item, state, label, position, event.bin]
-            case TargetSelected(item, label, frame):
+            case events.TargetSelected(item, label, frame):
                 decision = ["decision", item, label, frame]
             case _:
                 return
@@ -373,6 +352,7 @@ class Recorder:
         resume: True to append to the journal of an interrupted run.
 
     Attributes:
+        directory: The run directory.
         trace: Trace of all events; the caller adds the events from before a resumption.
 
     Raises:
@@ -380,6 +360,7 @@ class Recorder:
     """
 
     def __init__(self, directory: RunDirectory, *, saves_pictures: bool = True, resume: bool = False) -> None:
+        self.directory = directory
         self.trace = Trace()
         self._journal = Journal(directory.journal, resume=resume)
         self._pictures = PictureRecorder(directory.pictures) if saves_pictures else None

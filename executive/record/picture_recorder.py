@@ -33,9 +33,10 @@ Source: Okabe and Ito, "Color Universal Design", 2008, without black.
 LINE_WIDTH = 1
 SELECTED_LINE_WIDTH = 3
 """Line widths of a box and of the selected box [pixel]."""
+JPEG_QUALITY = 80
+"""JPEG quality of pictures and of the image of the live page, 0 to 100."""
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _TEXT_SCALE = 0.4
-_JPEG_QUALITY = 80
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,14 +152,19 @@ class PictureRecorder:
 
     def _save(self, path: Path, picture: PictureContent) -> None:
         try:
-            image_bgr = draw_picture(picture)[:, :, ::-1]
-            _, data = cv2.imencode(".jpg", image_bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+            data = encode_jpeg(draw_picture(picture))
             path.parent.mkdir(parents=True, exist_ok=True)
             with replace_atomically(path) as temporary_file:
-                temporary_file.write_bytes(data.tobytes())
+                temporary_file.write_bytes(data)
         except Exception as error:
             # Only the text of the first error is stored: an exception would keep all images in memory.
             self.problem = self.problem or f"not every picture was drawn: {error}"
+
+
+def encode_jpeg(image: NDArray[np.uint8]) -> bytes:
+    """Return an image `(H, W, 3)`, RGB, as the content of a JPEG file."""
+    _, data = cv2.imencode(".jpg", image[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return data.tobytes()
 
 
 def find_picture(folder: Path, item: str, reason: str) -> Path | None:
@@ -167,8 +173,14 @@ def find_picture(folder: Path, item: str, reason: str) -> Path | None:
     `item` is "" for a failure without an item; `reason` is "" for the last selection of the item.
     """
     name_after_tick = "_".join(filter(None, (item, reason)))
-    pictures = [file for file in folder.glob("*.jpg") if file.stem.partition("_")[2] == name_after_tick]
-    return max(pictures, key=lambda file: int(file.stem.partition("_")[0]), default=None)
+    pictures = [file for file in folder.glob("*.jpg") if split_picture_name(file)[1] == name_after_tick]
+    return max(pictures, key=split_picture_name, default=None)
+
+
+def split_picture_name(file: Path) -> tuple[int, str]:
+    """Return the control step and the rest `<item>_<reason>` of the name of a picture; 0 without a step."""
+    tick, _, subject = file.stem.partition("_")
+    return int(tick) if tick.isdecimal() else 0, subject
 
 
 def draw_picture(picture: PictureContent) -> NDArray[np.uint8]:

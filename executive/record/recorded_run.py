@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
@@ -14,7 +14,7 @@ from typing import Protocol
 import yaml
 
 from executive.errors import ExecutiveError
-from executive.events import Observer, RunEnded, TimedEvent
+from executive.events import Observer, TimedEvent
 from executive.mission.file_search import read_source
 from executive.mission.load import LoadedMission
 from executive.mission.outline import make_outline
@@ -121,8 +121,7 @@ def record_run(
     with closing(run):
         directory = make_run_directory(run, loaded, options, runs_folder)
         recorder = Recorder(directory, saves_pictures=record.saves_pictures)
-        recorded_run = RecordedRun(run, loaded, directory, recorder, record)
-        result = recorded_run.execute(options.seed, start_time)
+        result = execute_recorded(run, loaded, recorder, options.seed, start_time, record)
     if not record.saves_pictures and not is_resumable(result.status):
         # Only a resumption and a video need the log of the simulated world.
         directory.world_log.unlink(missing_ok=True)
@@ -151,93 +150,70 @@ def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, fol
     return directory
 
 
-@dataclass
-class RecordedRun:
-    """A run with its recorder and its views.
+def execute_recorded(
+    run: Run, loaded: LoadedMission, recorder: Recorder, seed: int, start_time: float,
+    options: RecordOptions = RecordOptions(), earlier_events: Sequence[TimedEvent] = (),
+) -> Result:  # fmt: skip
+    """Execute a run with its recorder and its views, write and return its result.
 
-    Attributes:
+    Args:
         run: Run without views and recorder.
         loaded: Mission of the run.
-        directory: The run directory.
         recorder: Recorder of the run.
+        seed: Seed of the run.
+        start_time: Value of `time.perf_counter()` at the start [s].
         options: Views of the run, and whether the run starts paused.
         earlier_events: Events from before the resumption of the run; the observers receive them first.
+
+    Raises:
+        ExecutiveError: The result cannot be written.
     """
-
-    run: Run
-    loaded: LoadedMission
-    directory: RunDirectory
-    recorder: Recorder
-    options: RecordOptions = RecordOptions()
-    earlier_events: Sequence[TimedEvent] = ()
-
-    def __post_init__(self) -> None:
-        self._timeline = self.options.timeline or Timeline(has_history=False)
-
-    def execute(self, seed: int, start_time: float) -> Result:
-        """Execute the run, write and return its result; `start_time` is a `time.perf_counter()` value [s].
-
-        Raises:
-            ExecutiveError: The result cannot be written.
-        """
-        run_end, audit = self._execute_with_observers()
-        result = self._make_result(seed, run_end, audit, time.perf_counter() - start_time)
-        problems = list(filter(None, [self.recorder.problem]))
-        try:
-            write_result(self.directory.result, result)
-        except ExecutiveError as error:
-            problems.append(str(error))
-            if result.status != "FAULT":
-                # Without a result file, the output of `--json` must report the problem.
-                result = replace(result, status="FAULT", reason="fault", message=str(error), node="")
-        for view in self.options.views if problems else ():
-            view.show_message("; ".join(problems))
-        return result
-
-    def _make_result(
-        self, seed: int, run_end: RunEnded, audit: Mapping[str, int] | None, wall_time: float
-    ) -> Result:
-        """Return the result of the run from its end, its true object counts `audit`, and `wall_time` [s]."""
-        workcell = self.run.workcell
-        path = self.directory.path
-        timeline = self._timeline
-        accounts = workcell.accounts
-        item_counts = accounts.count_states()
-        end_values = asdict(run_end)
-        end_values["robot_time_s"] = end_values.pop("robot_time")
-        return Result(
-            **end_values,
-            mission=self.loaded.mission.name,
-            seed=seed,
-            items=ItemCounts(**item_counts),
-            unknown_labels=accounts.unknown_labels,
-            assumption_reasons=accounts.assumption_reasons,
-            audit=None if audit is None else Audit.from_counts(item_counts, audit, run_end.is_table_empty),
-            planning=timeline.planning,
-            requests=list_requests(timeline),
-            wall_time_s=round(wall_time, 3),
-            trace=self.recorder.trace.hexdigest(),
-            run=str(path),
-            diagnosis=diagnose(timeline, run_end, self.loaded, path, lambda: workcell.cell.arm.at_rest),
-        )
-
-    def _execute_with_observers(self) -> tuple[RunEnded, Mapping[str, int] | None]:
-        """Execute the run with all observers, close the observers, and return end and audit of the run."""
-        run = self.run
-        views = self.options.views
-        observers: list[Observer] = [self._timeline, *views]
-        if self.options.starts_paused:
-            run.control.pause()
-        with contextlib.ExitStack() as exit_stack:
-            # An exception is reported at once, without waiting for the pictures.
-            exit_stack.push(lambda exception_type, *_: self.recorder.close(wait=exception_type is None))
-            for view in views:
-                exit_stack.callback(view.close)
-            for view in views:
-                view.open(run)
-            for observer in observers:
-                run.add_observer(observer)
-                for timed in self.earlier_events:
-                    observer(timed)
-            run.add_recorder(self.recorder)
-            return run.execute(), run.count_ground_truth()
+    timeline = options.timeline or Timeline(has_history=False)
+    observers: list[Observer] = [timeline, *options.views]
+    if options.starts_paused:
+        run.control.pause()
+    with contextlib.ExitStack() as exit_stack:
+        # An exception is reported at once, without waiting for the pictures.
+        exit_stack.push(lambda exception_type, *_: recorder.close(wait=exception_type is None))
+        for view in options.views:
+            exit_stack.callback(view.close)
+        for view in options.views:
+            view.open(run)
+        for observer in observers:
+            run.add_observer(observer)
+            for timed in earlier_events:
+                observer(timed)
+        run.add_recorder(recorder)
+        run_end = run.execute()
+        audit = run.count_ground_truth()
+    workcell = run.workcell
+    path = recorder.directory.path
+    item_counts = workcell.accounts.count_states()
+    end_values = asdict(run_end)
+    end_values["robot_time_s"] = end_values.pop("robot_time")
+    result = Result(
+        **end_values,
+        mission=loaded.mission.name,
+        seed=seed,
+        items=ItemCounts(**item_counts),
+        unknown_labels=workcell.accounts.unknown_labels,
+        assumption_reasons=workcell.accounts.assumption_reasons,
+        audit=None if audit is None else Audit.from_counts(item_counts, audit, run_end.is_table_empty),
+        planning=timeline.planning,
+        requests=list_requests(timeline),
+        wall_time_s=round(time.perf_counter() - start_time, 3),
+        trace=recorder.trace.hexdigest(),
+        run=str(path),
+        diagnosis=diagnose(timeline, run_end, loaded, path, lambda: workcell.cell.arm.at_rest),
+    )
+    problems = [recorder.problem] if recorder.problem else []
+    try:
+        write_result(recorder.directory.result, result)
+    except ExecutiveError as error:
+        problems.append(str(error))
+        if result.status != "FAULT":
+            # Without a result file, the output of `--json` must report the problem.
+            result = replace(result, status="FAULT", reason="fault", message=str(error), node="")
+    for view in options.views if problems else ():
+        view.show_message("; ".join(problems))
+    return result

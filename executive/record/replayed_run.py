@@ -15,7 +15,7 @@ from executive.errors import InputError, escape_control_characters, shorten_quot
 from executive.events import MotionPlanned, NodeEnded, NodeStarted, RequestGiven, RunStarted, TimedEvent
 from executive.mission.load import LoadedMission
 from executive.record.journal import Recorder, find_run_end, find_run_start, read_journal
-from executive.record.recorded_run import RecordedRun, RecordOptions
+from executive.record.recorded_run import RecordOptions, execute_recorded
 from executive.record.result import Result, is_resumable, read_result
 from executive.record.run_directory import RunDirectory, read_mission_of_run
 from executive.record.timeline import get_skill_name
@@ -23,6 +23,9 @@ from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions, assemble_replay, assemble_resumed
 from executive.run.resumed_run import ResumedRun
 from executive.skill import Skill
+
+EVENTS_WITHOUT_REPLAY = (RunStarted, MotionPlanned, RequestGiven)
+"""Kinds of events that a replay does not emit."""
 
 
 @dataclass
@@ -63,8 +66,7 @@ class ReplayResult:
 
     def as_json(self) -> dict[str, JsonValue]:
         """Return the attributes as JSON; the entry of a decision has its tick, clock, kind and fields."""
-        decisions = {"recorded": _to_json(self.recorded), "replayed": _to_json(self.replayed)}
-        return vars(self) | decisions
+        return vars(self) | {"recorded": _to_json(self.recorded), "replayed": _to_json(self.replayed)}
 
 
 def replay_run(
@@ -136,7 +138,8 @@ class _Comparison:
         # After the last recorded step, the replay only halts its skills.
         self.result.is_complete = decision.tick > self._log.last_tick
         if self._has_recorded_end or any(map(self._is_in_complete_step, filter(None, (recorded, decision)))):
-            self.result.recorded, self.result.replayed = recorded, decision
+            self.result.recorded = recorded
+            self.result.replayed = decision
         self.run.control.stop()
 
     def compare_end(self) -> None:
@@ -190,18 +193,12 @@ def _to_json(decision: TimedEvent | None) -> dict[str, JsonValue] | None:
 
 
 def _describe_decision(decision: TimedEvent | None) -> str:
-    """Return kind, time and fields of a decision as text."""
     if decision is None:
         return "no further decision"
-    fields = {key: value for key, value in vars(decision.event).items() if value}
-    values = ", ".join(f"{key} {fields[key]}" for key in fields if key not in ("outputs", "skill"))
-    kind = type(decision.event).__name__
-    text = f"at {decision.clock:.3f} s (step {decision.tick}) {kind}: {values}"
+    fields = vars(decision.event).items()
+    values = ", ".join(f"{key} {value}" for key, value in fields if value and key not in ("outputs", "skill"))
+    text = f"at {decision.clock:.3f} s (step {decision.tick}) {type(decision.event).__name__}: {values}"
     return shorten_quotations(escape_control_characters(text))
-
-
-EVENTS_WITHOUT_REPLAY = (RunStarted, MotionPlanned, RequestGiven)
-"""Kinds of events that a replay does not emit."""
 
 
 def resume_run(
@@ -235,7 +232,8 @@ def resume_run(
     recorder = Recorder(directory, saves_pictures=record.saves_pictures, resume=True)
     try:
         events = read_journal(directory.journal)
-        log, start = InputLog(events), find_run_start(events, path, "run the mission again")
+        log = InputLog(events)
+        start = find_run_start(events, path, "run the mission again")
         lacks_only_result = _check_end(directory, events)
         loaded = read_mission_of_run(path, start, skills)
         # The control step of a halt or fault is not compared, because a corrected skill may act differently.
@@ -260,8 +258,7 @@ def resume_run(
         for timed in replayed_events:
             recorder.trace(timed)
         earlier_events = [each for each in replayed_events if isinstance(each.event, EVENTS_WITHOUT_REPLAY)]
-        recorded_run = RecordedRun(run, loaded, directory, recorder, record, earlier_events)
-        return recorded_run.execute(start.seed, start_time)
+        return execute_recorded(run, loaded, recorder, start.seed, start_time, record, earlier_events)
 
 
 def _check_end(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:

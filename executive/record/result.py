@@ -21,9 +21,6 @@ from executive.record.timeline import PlanningTotals, Timeline
 QUIT_REQUEST = "quit"
 """Request of the operator to end the run."""
 
-RESULT_VERSION = 3
-"""Version of the schema of `result.json`; versions before 3 had other keys."""
-
 MISTAKE_DESCRIPTIONS = {
     "wrong_bin": "in a wrong bin",
     "fell_in_wrong_bin": "fallen into a wrong bin",
@@ -82,7 +79,7 @@ class Result:
     """Result of a run; the fields are the keys of `result.json`.
 
     Attributes:
-        version: Version of the schema.
+        version: Version of the schema; versions before 3 had other keys.
         mission: Name of the mission.
         status, reason, message, node, is_table_empty, held_item, ticks: Fields of the event `RunEnded`.
         seed: Seed of all random numbers.
@@ -98,7 +95,7 @@ class Result:
         diagnosis: Diagnosis of a run that did not succeed, or None.
     """
 
-    version: int = RESULT_VERSION
+    version: int = 3
     mission: str
     status: RunStatus
     reason: str

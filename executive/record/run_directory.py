@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import yaml
 from pydantic import ConfigDict, TypeAdapter, ValidationError
@@ -17,50 +16,17 @@ from executive.cell.config import CellConfig
 from executive.errors import InputError, explain_os_errors
 from executive.events import RunStarted
 from executive.mission.cell_file import CellFile
+from executive.mission.load import LoadedMission, load_mission
 from executive.mission.outline import OutlineNode
 from executive.skill import Skill
 from executive.tree.specification import Source
-
-if TYPE_CHECKING:
-    from executive.mission.load import LoadedMission
-
-
-@contextlib.contextmanager
-def replace_atomically(path: Path) -> Iterator[Path]:
-    """Yield the path of a temporary file that replaces `path` after the `with` block.
-
-    After an exception in the block, the temporary file is removed.
-
-    Raises:
-        OSError: The file cannot be written; `path` is unchanged.
-    """
-    temporary_path = path.with_name(f".{path.name}.part")
-    try:
-        temporary_path.touch()
-        yield temporary_path
-        temporary_path.replace(path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            temporary_path.unlink()
-        raise
-
-
-def write_atomically(path: Path, text: str) -> None:
-    """Replace the content of the file `path` by `text`, and sync the file to the disk.
-
-    Raises:
-        OSError: The file cannot be written; `path` is unchanged.
-    """
-    with replace_atomically(path) as temporary_path, temporary_path.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-
 
 LATEST_LINK = "latest"
 """Name of the link to the last run directory."""
 SCENE_FILE = "scene.yaml"
 """Name of the copy of the scene file."""
+_NODES_ADAPTER = TypeAdapter(list[OutlineNode], config=ConfigDict(ser_json_inf_nan="strings"))
+"""Encoder and decoder of `tree.json`."""
 
 
 class RunDirectory:
@@ -110,7 +76,12 @@ class RunDirectory:
                     write_atomically(path, text)
             for name, text in texts.items():
                 write_atomically(self.path / name, text)
-        _update_latest_link(self.path.parents[1], self.path)
+        runs = self.path.parents[1]
+        temporary_link = runs / f".latest-{os.getpid()}"
+        # An error is ignored: a run needs no link, and some file systems do not support links.
+        with contextlib.suppress(OSError):
+            temporary_link.symlink_to(self.path.relative_to(runs), target_is_directory=True)
+            temporary_link.replace(runs / LATEST_LINK)
 
 
 def make_dated_folder(runs: Path, name: str, start_time: datetime) -> Path:
@@ -166,17 +137,36 @@ def make_unique_folder(day: Path, name: str) -> Path:
             number += 1
 
 
-def _update_latest_link(runs: Path, path: Path) -> None:
-    """Replace the link `runs/latest` atomically by a link to `path`."""
-    temporary_link = runs / f".latest-{os.getpid()}"
-    # An error is ignored: a run needs no link, and some file systems do not support links.
-    with contextlib.suppress(OSError):
-        temporary_link.symlink_to(path.relative_to(runs), target_is_directory=True)
-        temporary_link.replace(runs / LATEST_LINK)
+@contextlib.contextmanager
+def replace_atomically(path: Path) -> Iterator[Path]:
+    """Yield the path of a temporary file that replaces `path` after the `with` block.
+
+    After an exception in the block, the temporary file is removed.
+
+    Raises:
+        OSError: The file cannot be written; `path` is unchanged.
+    """
+    temporary_path = path.with_name(f".{path.name}.part")
+    try:
+        temporary_path.touch()
+        yield temporary_path
+        temporary_path.replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            temporary_path.unlink()
+        raise
 
 
-_NODES_ADAPTER = TypeAdapter(list[OutlineNode], config=ConfigDict(ser_json_inf_nan="strings"))
-"""Encoder and decoder of `tree.json`."""
+def write_atomically(path: Path, text: str) -> None:
+    """Replace the content of the file `path` by `text`, and sync the file to the disk.
+
+    Raises:
+        OSError: The file cannot be written; `path` is unchanged.
+    """
+    with replace_atomically(path) as temporary_path, temporary_path.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def read_mission_of_run(
@@ -194,8 +184,6 @@ def read_mission_of_run(
         MissionError: The mission has errors, for instance because installed skills have changed.
         InputError: A file in the directory cannot be read.
     """
-    from executive.mission.load import load_mission
-
     # The recorded cell file already contains the overrides of the cell.
     overrides = {key: text for key, text in start.overrides.items() if not key.startswith("cell.")}
     cell_path = Path(start.base) / "cell.yaml"

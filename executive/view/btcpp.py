@@ -24,8 +24,7 @@ from executive.tree.node_registry import load_control_nodes
 from executive.tree.specification import Literal, LocatedName, Reason, Reference, Value
 from executive.view.text import replace_invalid_xml_characters
 
-_NAMES_FILE = Path(__file__).with_name("btcpp_names.txt")
-_REGISTERED_NAMES = frozenset(_NAMES_FILE.read_text(encoding="utf-8").split())
+_REGISTERED_NAMES = frozenset(Path(__file__).with_name("btcpp_names.txt").read_text("utf-8").split())
 """Names that BehaviorTree.CPP 4.10 registers or reserves."""
 _TYPE_NAMES: Mapping[object, str] = {bool: "bool", int: "int", float: "double", str: "std::string"}
 """Names of types in C++."""
@@ -46,7 +45,8 @@ class _Exporter:
     """Exporter of one mission."""
 
     def __init__(self, mission: Mission, skills: Mapping[str, type[Skill]]) -> None:
-        self._mission, self._skills = mission, skills
+        self._mission = mission
+        self._skills = skills
         self._models: dict[str, Element] = {}
         self._used_subtrees: list[Subtree] = []
         self._use_counts: Counter[str] = Counter()
@@ -93,7 +93,9 @@ class _Exporter:
         return self._add_element(parent, kind, node.skill, declarations, values)
 
     def _add_subtree_reference(self, parent: Element, node: nodes.SubtreeNode) -> Element:
-        subtree, ports, values = self._mission.subtrees[node.name], [], {}
+        subtree = self._mission.subtrees[node.name]
+        ports = []
+        values = {}
         if not self._use_counts[node.name]:
             self._used_subtrees.append(subtree)
         self._use_counts[node.name] += 1
@@ -193,9 +195,11 @@ def _format(value: nodes.KeyValue) -> str:
 
 def _make_port_model(port: _Declaration) -> Element:
     if isinstance(port, Key):
-        value_type, is_output = port.value_type, port.kind is KeyKind.VARIABLE
+        value_type = port.value_type
+        is_output = port.kind is KeyKind.VARIABLE
     else:
-        value_type, is_output = port.type, getattr(port, "direction", None) is Direction.OUT
+        value_type = port.type
+        is_output = getattr(port, "direction", None) is Direction.OUT
     model = Element("output_port" if is_output else "input_port", name=_escape(port.name))
     attributes = {"type": _TYPE_NAMES.get(value_type), "default": _format_constant(port.default)}
     model.attrib |= {name: text for name, text in attributes.items() if text}

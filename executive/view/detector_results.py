@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
-from rich.table import Table
+from rich.table import Column, Table
 
 from executive.training.metrics import NO_OBJECT, Evaluation
 
@@ -39,7 +39,6 @@ def list_metrics(source: str, detector: str, evaluation: Evaluation) -> Iterator
 
 
 def _make_class_table(evaluation: Evaluation) -> Table:
-    """Return a table with the precision and recall of every class."""
     table = _make_table("class", "objects", "precision", "recall")
     for label, metrics in evaluation.by_class.items():
         table.add_row(label, f"{metrics.objects}", f"{metrics.precision:.2%}", f"{metrics.recall:.2%}")
@@ -76,8 +75,5 @@ def _make_error_table(evaluation: Evaluation) -> Table:
 
 def _make_table(row_heading: str, *headings: str) -> Table:
     """Return an empty table with a left-aligned column for the names of rows, and right-aligned columns."""
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1))
-    table.add_column(row_heading)
-    for heading in headings:
-        table.add_column(heading, justify="right")
-    return table
+    columns = (Column(heading, justify="right") for heading in headings)
+    return Table(row_heading, *columns, box=SIMPLE_HEAD, padding=(0, 1))

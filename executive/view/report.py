@@ -1,12 +1,18 @@
-"""Report of a run: the data in its run directory, and one self-contained HTML file without scripts."""
+"""Report of a run: one self-contained HTML file without scripts, from the data in the run directory.
+
+The page contains the timeline, with one lane for each node, and the durations of activities by item.
+"""
 
 from __future__ import annotations
 
 import base64
+import math
 import shlex
-from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass, replace
-from itertools import cycle
+from bisect import bisect_left
+from collections import defaultdict, deque
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import cycle, pairwise
 from operator import attrgetter
 from pathlib import Path
 from urllib.parse import quote
@@ -16,18 +22,26 @@ from markupsafe import Markup
 
 from executive.errors import ExecutiveError
 from executive.mission.file_search import get_shipped_folder
+from executive.mission.outline import OutlineNode
 from executive.perception.evidence import describe_unknown_labels
 from executive.record.diagnosis import list_labelled_sentences, make_resume_command
 from executive.record.journal import find_run_end, find_run_start, read_journal
-from executive.record.picture_recorder import PALETTE
+from executive.record.picture_recorder import PALETTE, split_picture_name
 from executive.record.result import is_resumable, list_requests, read_result
 from executive.record.run_directory import RunDirectory, convert_os_errors, read_tree, write_atomically
-from executive.record.timeline import Timeline, find_last_failure, format_counts, group_by_node
-from executive.view.report_timeline import FAILED_ATTEMPTS, LOOK, WAITING, compute_activity_times, draw_lanes
+from executive.record.timeline import Activation, Timeline, find_last_failure, format_counts, group_by_node
 from executive.view.svg import NodeResult, make_svg
 from executive.view.terminal import describe_place_on_table, format_repeat_command
-from executive.view.text import render_template
+from executive.view.text import estimate_text_width, render_template, wrap_and_truncate
 
+LOOK = "look"
+"""Activity: detection of the next item while the tool is empty."""
+FAILED_ATTEMPTS = "failed attempts"
+"""Activity: failed attempts to pick or place an item, and the looks before the next attempt."""
+WAITING = "waiting"
+"""Activity: no skill works on an item, moves the arm or senses the scene."""
+NO_ITEM = ""
+"""Key of the time that belongs to no item, such as the time of the last look at an empty table."""
 ACTIVITY_COLOURS = {LOOK: "#56B4E9", FAILED_ATTEMPTS: "#D55E00", WAITING: "#9aa5b4"}
 """Colours of the activities that are not skills; the colour of a skill is another colour of the palette."""
 MAX_EMBEDDED_SIZE = 3_000_000
@@ -36,7 +50,7 @@ INTERRUPTED = "INTERRUPTED"
 """Status of a run whose journal has no end: the run was killed, or is still running."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Picture:
     """Picture of a decision or a failure in a run.
 
@@ -70,7 +84,7 @@ class ReportData:
         nodes: Nodes of the tree.
         timeline: Timeline of the run.
         last_item_changes: Last change of each item that is not a phantom.
-        activity_times: Time of the run by item and activity.
+        activities, times_by_item: Activities of the run, and their times by item.
         pictures: Pictures of decisions and failures.
         requests: Requests of the operator, in order.
         repeat_command: Command that repeats the run.
@@ -93,7 +107,7 @@ class ReportData:
         self.timeline = Timeline.from_events(events)
         all_items = self.timeline.items.list_items()
         self.last_item_changes = [item for item in all_items if item.state != "phantom"]
-        self.activity_times = compute_activity_times(self.timeline, self.nodes)
+        self.activities, self.times_by_item = compute_activity_times(self.timeline, self.nodes)
         self.pictures = collect_pictures(directory.pictures, [item.item for item in all_items])
         self.requests = list_requests(self.timeline)
         file = Path(self.start.file)
@@ -135,10 +149,13 @@ def write_report(path: Path) -> Path:
 
 def render_report(data: ReportData) -> str:
     """Return the report of a run as HTML; texts of missions and skills are escaped."""
-    result, params, outcome = data.result, data.start.params, data.outcome
+    result = data.result
+    params = data.start.params
+    outcome = data.outcome
     # A reason that repeats the status, such as "fault", is omitted.
     reason = "" if outcome is None or outcome.reason.upper() == data.status else outcome.reason
     warning = "" if result is None else result.disagreement
+    skill_colours = cycle(colour for colour in PALETTE if colour not in ACTIVITY_COLOURS.values())
     return render_template(
         "report.html",
         data=data,
@@ -150,8 +167,8 @@ def render_report(data: ReportData) -> str:
         list_labelled_sentences=list_labelled_sentences,
         titles={node.path: node.title for node in data.nodes},
         describe_place_on_table=describe_place_on_table,
-        colours=_choose_colours(data.activity_times.activities),
-        total_times={item: sum(row.values()) for item, row in data.activity_times.times_by_item.items()},
+        colours={name: ACTIVITY_COLOURS.get(name) or next(skill_colours) for name in data.activities},
+        total_times={item: sum(row.values()) for item, row in data.times_by_item.items()},
         tree=Markup(make_svg(data.nodes, data.start.mission, _make_node_results(data))),
         timeline=Markup(draw_lanes(data.timeline, data.nodes)),
         params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
@@ -160,10 +177,10 @@ def render_report(data: ReportData) -> str:
 
 def _describe_end(data: ReportData) -> str:
     """Return a text about the end of the run: the verdict, the message, or the number of placed objects."""
-    result, outcome = data.result, data.outcome
-    if outcome is None:
+    result = data.result
+    if data.outcome is None:
         return "The journal has no end: the run was killed, or is still running."
-    if verdict := outcome.message if result is None else result.verdict:
+    if verdict := data.outcome.message if result is None else result.verdict:
         return verdict
     if result is None:
         return "The run ended, but its result.json is missing."
@@ -175,14 +192,7 @@ def _describe_end(data: ReportData) -> str:
     return f"{items.placed} of {items.seen} objects are in their bins{unplaced_text}."
 
 
-def _choose_colours(activities: Sequence[str]) -> dict[str, str]:
-    """Return the colour of each activity as `#rrggbb`."""
-    skill_colours = cycle(colour for colour in PALETTE if colour not in ACTIVITY_COLOURS.values())
-    return {activity: ACTIVITY_COLOURS.get(activity) or next(skill_colours) for activity in activities}
-
-
 def _make_node_results(data: ReportData) -> dict[str, NodeResult]:
-    """Return the result of each node that ran, by node path."""
     results = {}
     for path, activations in group_by_node(data.timeline.activations).items():
         lines = tuple(filter(None, (format_counts(activations), find_last_failure(activations))))
@@ -200,26 +210,209 @@ def collect_pictures(folder: Path, item_names: Collection[str]) -> list[Picture]
     pictures = sorted(links, key=attrgetter("tick", "file"))
     decisions = {picture.item: picture for picture in pictures if picture.item and not picture.reason}
     failures = [picture for picture in pictures if picture.reason]
+    shown_pictures = [*decisions.values(), *failures]
     free_size = MAX_EMBEDDED_SIZE
-    shown_pictures = []
-    for picture in (*decisions.values(), *failures):
+    for picture in shown_pictures:
         file = folder / Path(picture.file).name
         # Base64 encodes 3 bytes as 4 characters.
         if file.stat().st_size * 4 / 3 <= free_size:
-            source = "data:image/jpeg;base64," + base64.b64encode(file.read_bytes()).decode()
-            free_size -= len(source)
-            picture = replace(picture, source=source)
-        shown_pictures.append(picture)
+            picture.source = "data:image/jpeg;base64," + base64.b64encode(file.read_bytes()).decode()
+            free_size -= len(picture.source)
     return shown_pictures
 
 
 def _link_picture(file: Path, item_names: Collection[str]) -> Picture:
-    """Return a link to a picture, with the information in its file name `<tick>_<item>_<reason>`."""
     path = f"{file.parent.name}/{file.name}"
-    tick_text, _, subject = file.stem.partition("_")
-    tick = int(tick_text) if tick_text.isdecimal() else 0
+    tick, subject = split_picture_name(file)
     # The name of an item may be the beginning of the name of another item, so long names are tried first.
     for item in sorted(item_names, key=len, reverse=True):
         if subject == item or subject.startswith(f"{item}_"):
             return Picture(quote(path), path, tick, item, subject.removeprefix(item).removeprefix("_"))
     return Picture(quote(path), path, tick, "", subject)
+
+
+TimesByItem = Mapping[str, Mapping[str, float]]
+"""Time by item and activity [s]; `NO_ITEM` is the last key. The sum is the duration of the run."""
+
+
+def compute_activity_times(
+    timeline: Timeline, nodes: Sequence[OutlineNode]
+) -> tuple[tuple[str, ...], TimesByItem]:
+    """Return activities, and times by item, from the start of a run to the last event of its timeline.
+
+    The activities are those that took time: look, skills by their first use, failed attempts, waiting.
+
+    If several skills run, the time belongs to the first started skill that works on an item. Time without
+    such a skill belongs to the item that is selected next. `timeline.has_history` must be true.
+    """
+    skills = {node.path: node for node in nodes if node.kind == "skill"}
+    activations = [activation for activation in timeline.activations if activation.node in skills]
+    selections = timeline.selection_times
+    times: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
+    # The dictionary without values is used as an ordered set.
+    skill_activities: dict[str, None] = {}
+    failed_attempts = _find_failed_attempts(activations, skills, timeline)
+    for start, end, running in _split_time(activations, timeline.clock):
+        item_activation = next((activation for activation in running if activation.item), None)
+        if item_activation is not None:
+            item = item_activation.item
+            activity = skills[item_activation.node].skill.lower()
+        else:
+            index = bisect_left(selections, (end, ""))
+            item = selections[index][1] if index < len(selections) else NO_ITEM
+            running_nodes = [skills[activation.node] for activation in running]
+            is_look = any(node.senses or "arm" in node.uses for node in running_nodes)
+            activity = LOOK if is_look else WAITING
+        failed_start, failed_end = failed_attempts.get(item, (0.0, 0.0))
+        if failed_start <= start and end <= failed_end:
+            activity = FAILED_ATTEMPTS
+        elif item_activation is not None:
+            skill_activities[activity] = None
+        times[item][activity] += end - start
+    # A skill may have the name of another activity, so duplicates are removed.
+    all_activities = dict.fromkeys([LOOK, *skill_activities, FAILED_ATTEMPTS, WAITING])
+    activities = tuple(name for name in all_activities if any(name in row for row in times.values()))
+    items = sorted(times, key=lambda item: item == NO_ITEM)
+    return activities, {item: dict(times[item]) for item in items}
+
+
+def _split_time(
+    activations: Sequence[Activation], end_time: float
+) -> Iterator[tuple[float, float, list[Activation]]]:
+    """Yield start [s], end [s] and running skills of the intervals between successive starts and ends.
+
+    The intervals last from 0 to `end_time` [s]; the skills are in the order of their starts.
+    """
+    times = {0.0, end_time, *(activation.start for activation in activations)}
+    times |= {activation.end for activation in activations}
+    later_activations = deque(sorted(activations, key=lambda activation: activation.start))
+    running: list[Activation] = []
+    for start, end in pairwise(sorted(times)):
+        while later_activations and later_activations[0].start <= start:
+            running.append(later_activations.popleft())
+        running = [activation for activation in running if activation.end > start]
+        yield start, end, running
+
+
+def _find_failed_attempts(
+    activations: Sequence[Activation], skills: Mapping[str, OutlineNode], timeline: Timeline
+) -> dict[str, tuple[float, float]]:
+    """Return, for each item with a failed attempt, the start and the end of its failed attempts [s]."""
+    failed_attempts = {}
+    for activation in activations:
+        skill = skills[activation.node]
+        item = activation.item
+        # An attempt fails if a skill that acts on the item fails, not if a look fails.
+        if item and activation.status == "FAILURE" and skill.uses and not skill.senses:
+            selection_times = [time for time, selected in timeline.selection_times if selected == item]
+            first_start = min(other.start for other in activations if other.item == item)
+            # Looks before the next attempt count as part of the failed attempt.
+            end = next((time for time in selection_times if time > activation.end), activation.end)
+            failed_attempts[item] = min(selection_times, default=first_start), end
+    return failed_attempts
+
+
+MIN_AXIS_LENGTH = 900.0
+MAX_AXIS_LENGTH = 6000.0
+"""Minimum and maximum length of the time axis [pixel]."""
+PIXELS_PER_SECOND = 45.0
+"""Scale of the time axis between its minimum and maximum length [pixel/s]."""
+MIN_GAP = 1.0
+MIN_BAR_WIDTH = 3.0
+"""Activations share a bar if their gap is below `MIN_GAP` and the bar is below `MIN_BAR_WIDTH` [pixel]."""
+MAX_BAR_COUNT = 8000
+"""Maximum number of bars in addition to one bar per lane; a bar takes about 250 bytes."""
+_LEVEL_INDENT = 9
+"""Indentation of a name per tree level [pixel]."""
+_NAME_SIZE = 11.0
+"""Font size of names [pixel]."""
+_NAME_MARGIN = 12.0
+"""Margin between names and bars [pixel]."""
+_MAX_NAME_LENGTH = 34
+"""Maximum length of the name of a lane [characters]."""
+_TICK_PERIODS = (0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600)
+"""Allowed periods of the ticks of the time axis [s]; longer periods are multiples of the longest."""
+_MIN_TICK_DISTANCE = 55.0
+"""Minimum distance between two ticks of the time axis [pixel]."""
+_STATUSES_BY_SEVERITY = ("FAILURE", "RUNNING", "INVALID", "SUCCESS")
+"""Statuses of activations, the most severe first."""
+
+
+def draw_lanes(timeline: Timeline, nodes: Sequence[OutlineNode]) -> str:
+    """Return an SVG document with the activations of a run; the lanes are in the order of the tree.
+
+    Activations that are too close to be distinguished share a bar with the colour of the most severe status,
+    so that the size of the document does not depend on the duration of the run.
+    """
+    end_time = timeline.clock
+    axis_length = min(max(PIXELS_PER_SECOND * end_time, MIN_AXIS_LENGTH), MAX_AXIS_LENGTH)
+    # A run without control steps has the duration 0.
+    scale = axis_length / max(end_time, 1e-9)
+    groups_by_path = _group_by_bar(group_by_node(timeline.activations), scale)
+    lanes = []
+    axis_x = _NAME_MARGIN
+    for node in nodes:
+        if groups := groups_by_path.get(node.path):
+            name = "".join(wrap_and_truncate(node.name, _MAX_NAME_LENGTH))
+            name_x = _LEVEL_INDENT * node.depth
+            axis_x = max(axis_x, name_x + estimate_text_width(name, _NAME_SIZE) + _NAME_MARGIN)
+            lanes.append((node, name, name_x, [_make_bar(node, group) for group in groups]))
+    tick_times = _choose_tick_times(end_time, scale)
+    return render_template(
+        "timeline.svg",
+        axis_x=axis_x,
+        axis_length=axis_length,
+        scale=scale,
+        tick_times=tick_times,
+        lanes=lanes,
+    )
+
+
+def _choose_tick_times(end_time: float, scale: float) -> list[float]:
+    """Return the times of the ticks of the time axis, from 0 to `end_time` [s]; `scale` is in pixel/s."""
+    min_period = _MIN_TICK_DISTANCE / scale
+    multiple = _TICK_PERIODS[-1] * math.ceil(min_period / _TICK_PERIODS[-1])
+    period = next((period for period in _TICK_PERIODS if period >= min_period), multiple)
+    return [number * period for number in range(int(end_time / period) + 1)]
+
+
+def _group_by_bar(
+    activations_by_path: Mapping[str, Sequence[Activation]], scale: float
+) -> dict[str, list[list[Activation]]]:
+    """Return groups of activations, one per bar, by node path; at most `MAX_BAR_COUNT` plus one per lane.
+
+    If there are too many bars at the scale `scale` of the drawing [pixel/s], the scale is halved repeatedly.
+    """
+    while True:
+        groups_by_path = {path: _group_activations(each, scale) for path, each in activations_by_path.items()}
+        if sum(map(len, groups_by_path.values())) <= MAX_BAR_COUNT + len(groups_by_path):
+            return groups_by_path
+        scale /= 2
+
+
+def _group_activations(activations: Sequence[Activation], scale: float) -> list[list[Activation]]:
+    """Return the activations of a node in groups that cannot be distinguished at a scale [pixel/s]."""
+    groups: list[list[Activation]] = []
+    for activation in activations:
+        if groups and (
+            (activation.start - groups[-1][-1].end) * scale < MIN_GAP
+            and (activation.end - groups[-1][0].start) * scale < MIN_BAR_WIDTH
+        ):
+            groups[-1].append(activation)
+        else:
+            groups.append([activation])
+    return groups
+
+
+def _make_bar(node: OutlineNode, group: Sequence[Activation]) -> tuple[float, float, str, str]:
+    """Return start [s], end [s], most severe status in lower case, and tooltip of a bar."""
+    start = group[0].start
+    end = group[-1].end
+    items = {activation.item for activation in group}
+    item_text = f" of {group[0].item}" if len(items) == 1 and group[0].item else ""
+    status_text = group[0].status if len(group) == 1 else format_counts(group)
+    heading = f"{node.name}{item_text}: {status_text}"
+    times_text = f"{start:.2f} s to {end:.2f} s ({end - start:.2f} s)"
+    tooltip = "\n".join(filter(None, (heading, times_text, find_last_failure(group))))
+    worst_status = min((activation.status for activation in group), key=_STATUSES_BY_SEVERITY.index)
+    return start, end, worst_status.lower(), tooltip

@@ -39,20 +39,23 @@ FRAME_PADDING = 9.0
 FRAME_HEADER = 20.0
 """Height of the part of a frame that contains the name of the subtree [pixel]."""
 
-TITLE_SIZE, LINE_SIZE, EDGE_LABEL_SIZE, SUBTREE_NAME_SIZE = 13.0, 11.0, 11.0, 12.0
-"""Font sizes of titles, lines, labels of edges and names of subtrees; `tree.svg` repeats them [pixel]."""
-
+TITLE_SIZE = 13.0
+LINE_SIZE = 11.0
+SUBTREE_NAME_SIZE = 12.0
+"""Font sizes of titles, of lines and labels of edges, and of names of subtrees; see `tree.svg` [pixel]."""
 _INVALID_IN_ID = re.compile(r"[^A-Za-z0-9_/]")
 """Pattern of the characters of a path that are escaped in the id of an SVG element."""
-_BOX_PADDING, _SYMBOL_WIDTH, _EDGE_LABEL_GAP = 11.0, 32.0, 4.0
-"""Padding of a box, width of a symbol with margins, and gap after the label of an edge [pixel]."""
-_TITLE_HEIGHT, _LINE_HEIGHT = 28.0, 14.0
+_BOX_PADDING = 11.0
+"""Distance between the texts and the sides of a box without a symbol [pixel]."""
+_SYMBOL_WIDTH = 32.0
+"""Width of a symbol with its margins [pixel]."""
+_EDGE_LABEL_GAP = 4.0
+"""Gap after the label of an edge [pixel]."""
+_TITLE_HEIGHT = 28.0
+_LINE_HEIGHT = 14.0
 """Heights of the title and of another line in the box of a node [pixel]."""
 _MAX_CORNER_RADIUS = 6.0
 """Maximum radius of the rounded corners of an edge [pixel]."""
-
-ChildIndices = Sequence[Sequence[int]]
-"""Indices of the children of each node, by the index of the node."""
 
 
 @dataclass(frozen=True)
@@ -68,13 +71,58 @@ class NodeResult:
     lines: tuple[str, ...] = ()
 
 
-NO_RESULTS: Mapping[str, NodeResult] = MappingProxyType({})
-"""Results of the nodes of a mission that did not run."""
+@dataclass(eq=False)
+class NodeBox:
+    """Box of a node in the picture [pixel]; y points down.
+
+    Attributes:
+        depth: Depth of the node; 0 for the root.
+        width, height: Size of the box.
+        label_width: Width of the label of the line to the node; 0 for no label.
+        subtree_name_width: Width of the name of the subtree that starts at the node; 0 if none starts there.
+        children: Boxes of the children.
+        x: The x of the left side.
+        edge_x: The x of the vertical part of the line to the node.
+        right_end: The x of the right end of the node with its descendants and their frames.
+        band_top, band_height: The y of the top of the band, and its height.
+        middle_offset: Distance from the top of the band to the middle of the box.
+        edge: SVG path of the line from the parent; "" for the root.
+    """
+
+    depth: int
+    width: float
+    height: float
+    label_width: float = 0.0
+    subtree_name_width: float = 0.0
+    children: Sequence[NodeBox] = ()
+    x: float = 0.0
+    edge_x: float = 0.0
+    right_end: float = 0.0
+    band_top: float = 0.0
+    band_height: float = 0.0
+    middle_offset: float = 0.0
+    edge: str = ""
+
+    @property
+    def middle_y(self) -> float:
+        """The y of the middle of the box."""
+        return self.band_top + self.middle_offset
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Left side, top, width and height of the box."""
+        return self.x, self.middle_y - self.height / 2, self.width, self.height
+
+    @property
+    def frame(self) -> tuple[float, float, float, float]:
+        """Left side, top, width and height of the frame of the subtree that starts at the node."""
+        width = self.right_end - self.x + FRAME_PADDING
+        return self.x - FRAME_PADDING, self.band_top + NODE_GAP / 2, width, self.band_height - NODE_GAP
 
 
 @dataclass(frozen=True)
 class _NodeDrawing:
-    """Texts in the box of a node.
+    """Box of a node, and the texts in the box.
 
     Attributes:
         node: The node.
@@ -84,6 +132,7 @@ class _NodeDrawing:
         lines: CSS class and text of each line below the title: settings of the node, and notes on its result.
         tooltip: All information about the node, with one line per topic.
         indent: Distance between the texts and the left side of the box [pixel].
+        box: Box of the node.
     """
 
     node: OutlineNode
@@ -93,41 +142,54 @@ class _NodeDrawing:
     lines: Sequence[tuple[str, str]]
     tooltip: str
     indent: float
-
-    @property
-    def id(self) -> str:
-        """Id of the group of the node in the document."""
-        return make_group_id(self.node.path)
+    box: NodeBox
 
 
-def make_svg(nodes: Sequence[OutlineNode], name: str, results: Mapping[str, NodeResult] = NO_RESULTS) -> str:
+def make_svg(
+    nodes: Sequence[OutlineNode], name: str, results: Mapping[str, NodeResult] = MappingProxyType({})
+) -> str:
     """Return the drawing of a tree as an SVG document.
 
     `name` is the name of the mission, for the title; `results` contains results of nodes, by path.
     """
-    child_indices = list_child_indices(nodes)
-    parents = {child: parent for parent, children in enumerate(child_indices) for child in children}
     drawings = [_make_drawing(node, results.get(node.path, NodeResult())) for node in nodes]
-    depths = [node.depth for node in nodes]
-    layout = compute_layout(depths, child_indices, list(map(_compute_size, drawings)))
-    edges = [_make_edge(layout, parents.get(index), index, depth) for index, depth in enumerate(depths)]
-    return render_template("tree.svg", name=name, layout=layout, drawings=drawings, edges=edges)
+    boxes = [drawing.box for drawing in drawings]
+    for box, indices in zip(boxes, list_child_indices(nodes), strict=True):
+        box.children = [boxes[index] for index in indices]
+    width, height = place_boxes(boxes)
+    return render_template(
+        "tree.svg", name=name, width=width, height=height, drawings=drawings, make_group_id=make_group_id
+    )
+
+
+def _make_drawing(node: OutlineNode, result: NodeResult) -> _NodeDrawing:
+    symbol = "" if node.kind == "skill" else node.symbol or ControlNode.symbol
+    title = _truncate(node.title)
+    trigger_lines = wrap_and_truncate(node.trigger, MAX_LINE_LENGTH, 2)
+    detail_lines = wrap_and_truncate(node.detail, MAX_LINE_LENGTH, 3 if symbol else 2)
+    lines = [("line", line) for line in trigger_lines + detail_lines]
+    lines += [("note", _truncate(line)) for line in result.lines]
+    tooltip = "\n".join(filter(None, (*_list_tooltip_lines(node), *result.lines)))
+    indent = _SYMBOL_WIDTH if symbol else _BOX_PADDING
+    widths = [estimate_text_width(line, LINE_SIZE) for _, line in lines]
+    widths.append(estimate_text_width(title, TITLE_SIZE, bold=True))
+    label = node.parent_key
+    subtree = node.joined_subtrees
+    box = NodeBox(
+        depth=node.depth,
+        width=indent + max(widths) + _BOX_PADDING,
+        height=_TITLE_HEIGHT + _LINE_HEIGHT * len(lines),
+        label_width=estimate_text_width(label, LINE_SIZE) + _EDGE_LABEL_GAP if label else 0.0,
+        subtree_name_width=(
+            estimate_text_width(subtree, SUBTREE_NAME_SIZE, bold=True) + FRAME_PADDING if subtree else 0.0
+        ),
+    )
+    return _NodeDrawing(node, result.status.lower(), symbol, title, lines, tooltip, indent, box)
 
 
 def make_group_id(path: str) -> str:
     """Return the id of a node's group: its path with `-` for `/`, and `--<hex>-` for invalid characters."""
     return "node-" + _INVALID_IN_ID.sub(lambda match: f"--{ord(match[0]):x}-", path).replace("/", "-")
-
-
-def _make_drawing(node: OutlineNode, result: NodeResult) -> _NodeDrawing:
-    symbol = "" if node.kind == "skill" else node.symbol or ControlNode.symbol
-    trigger_lines = wrap_and_truncate(node.trigger, MAX_LINE_LENGTH, 2)
-    detail_lines = wrap_and_truncate(node.detail, MAX_LINE_LENGTH, 3 if symbol else 2)
-    lines = [("line", line) for line in trigger_lines + detail_lines]
-    lines += [("note", _truncate(line)) for line in result.lines]
-    indent = _SYMBOL_WIDTH if symbol else _BOX_PADDING
-    tooltip = "\n".join(filter(None, (*_list_tooltip_lines(node), *result.lines)))
-    return _NodeDrawing(node, result.status.lower(), symbol, _truncate(node.title), lines, tooltip, indent)
 
 
 def _list_tooltip_lines(node: OutlineNode) -> Sequence[str]:
@@ -149,167 +211,64 @@ def _truncate(text: str) -> str:
     return "".join(wrap_and_truncate(text, MAX_LINE_LENGTH))
 
 
-def _compute_size(drawing: _NodeDrawing) -> NodeSize:
-    """Return the sizes of the box of a node, of the label of its edge, and of the name of its subtree."""
-    widths = [estimate_text_width(line, LINE_SIZE) for _, line in drawing.lines]
-    widths.append(estimate_text_width(drawing.title, TITLE_SIZE, bold=True))
-    height = _TITLE_HEIGHT + _LINE_HEIGHT * len(drawing.lines)
-    label = drawing.node.parent_key
-    name = drawing.node.joined_subtrees
-    label_width = estimate_text_width(label, EDGE_LABEL_SIZE) + _EDGE_LABEL_GAP if label else 0.0
-    name_width = estimate_text_width(name, SUBTREE_NAME_SIZE, bold=True) + FRAME_PADDING if name else 0.0
-    return NodeSize(drawing.indent + max(widths) + _BOX_PADDING, height, label_width, name_width)
+def place_boxes(boxes: Sequence[NodeBox]) -> tuple[float, float]:
+    """Set the positions of the boxes of a tree, parents before their children; return width and height."""
+    _place_columns(boxes)
+    for box in reversed(boxes):
+        _measure_branch(box)
+    root = boxes[0]
+    root.band_top = MARGIN - NODE_GAP / 2
+    for box in boxes:
+        band_top = box.middle_y - _get_first_offset(box)
+        for child in box.children:
+            child.band_top = band_top
+            child.edge = _draw_edge(box, child)
+            band_top += child.band_height
+    return root.right_end + MARGIN, root.band_top + root.band_height + MARGIN - NODE_GAP / 2
 
 
-def _make_edge(layout: Layout, parent: int | None, child: int, depth: int) -> str:
-    """Return the SVG path of the line between the nodes `parent` and `child`; "" for no parent.
+def _place_columns(boxes: Sequence[NodeBox]) -> None:
+    """Set the x of each box, and of the vertical part of the line to the box."""
+    right_x = 0.0
+    for depth in range(max(box.depth for box in boxes) + 1):
+        column = [box for box in boxes if box.depth == depth]
+        edge_x = right_x + EDGE_SEGMENT_LENGTH if depth else MARGIN
+        edge_length = EDGE_SEGMENT_LENGTH + max(box.label_width for box in column) if depth else 0.0
+        padding = FRAME_PADDING if any(box.subtree_name_width for box in column) else 0.0
+        for box in column:
+            box.edge_x = edge_x
+            box.x = edge_x + edge_length + padding
+        right_x = column[0].x + max(box.width for box in column)
+
+
+def _measure_branch(box: NodeBox) -> None:
+    """Set the right end and the band of a box whose children have been measured."""
+    first_offset = _get_first_offset(box)
+    half_height = (box.height + NODE_GAP) / 2
+    children_height = sum(child.band_height for child in box.children)
+    box.middle_offset = max(half_height, first_offset)
+    box.band_height = box.middle_offset + max(half_height, children_height - first_offset)
+    box.right_end = max([box.x + box.width, *(child.right_end for child in box.children)])
+    if box.subtree_name_width:
+        box.middle_offset += FRAME_HEADER
+        box.band_height += FRAME_HEADER + FRAME_PADDING
+        box.right_end = max(box.right_end + FRAME_PADDING, box.x + box.subtree_name_width)
+
+
+def _get_first_offset(box: NodeBox) -> float:
+    """Return the middle offset of the first child, whose middle has the same y as the middle of `box`."""
+    return box.children[0].middle_offset if box.children else 0.0
+
+
+def _draw_edge(parent: NodeBox, child: NodeBox) -> str:
+    """Return the SVG path of the line between two boxes.
 
     The line runs to the right (command H), around a corner (q) down (V), and around a corner to the right.
     """
-    if parent is None:
-        return ""
-    start, end, edge_x = layout.boxes[parent], layout.boxes[child], layout.edge_xs[depth]
-    path = f"M{start.right_x:.0f} {start.middle_y:.0f}"
-    height = end.middle_y - start.middle_y
+    path = f"M{parent.x + parent.width:.0f} {parent.middle_y:.0f}"
+    height = child.middle_y - parent.middle_y
     if height >= 1:
         radius = min(_MAX_CORNER_RADIUS, height / 2)
-        path += f"H{edge_x - radius:.0f}q{radius:.0f} 0 {radius:.0f} {radius:.0f}"
-        path += f"V{end.middle_y - radius:.0f}q0 {radius:.0f} {radius:.0f} {radius:.0f}"
-    return f"{path}H{end.x:.0f}"
-
-
-@dataclass(frozen=True)
-class NodeSize:
-    """Sizes of the parts of a node [pixel].
-
-    Attributes:
-        width, height: Size of the box.
-        label_width: Width of the label of the line to the node; 0 for no label.
-        subtree_name_width: Width of the name of the subtree that starts at the node; 0 if none starts there.
-    """
-
-    width: float
-    height: float
-    label_width: float = 0.0
-    subtree_name_width: float = 0.0
-
-
-@dataclass(frozen=True)
-class Rectangle:
-    """Rectangle in the picture [pixel]; `x` and `y` are its top left corner, and y points down."""
-
-    x: float
-    y: float
-    width: float
-    height: float
-
-    @property
-    def right_x(self) -> float:
-        """The x of the right side [pixel]."""
-        return self.x + self.width
-
-    @property
-    def middle_y(self) -> float:
-        """The y of the middle [pixel]."""
-        return self.y + self.height / 2
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Layout of a picture of a tree [pixel].
-
-    Attributes:
-        boxes: Box of each node.
-        edge_xs: The x of the vertical parts of the lines to the nodes of each depth.
-        frames: Frame of each subtree, by the index of the first node of the subtree.
-        width, height: Size of the picture with margins.
-    """
-
-    boxes: tuple[Rectangle, ...]
-    edge_xs: tuple[float, ...]
-    frames: dict[int, Rectangle]
-    width: float
-    height: float
-
-
-def compute_layout(depths: Sequence[int], children: ChildIndices, sizes: Sequence[NodeSize]) -> Layout:
-    """Return the layout of a tree; its nodes are listed with parents before their children.
-
-    Args:
-        depths: Depth of each node; 0 for the root.
-        children: Indices of the children of each node.
-        sizes: Sizes of the parts of each node.
-    """
-    column_xs, edge_xs = _place_columns(depths, sizes)
-    band_heights, node_offsets = _compute_bands(children, sizes)
-    band_tops = _place_bands(children, band_heights, node_offsets)
-    boxes = tuple(
-        Rectangle(column_xs[depth], top + offset - size.height / 2, size.width, size.height)
-        for depth, top, offset, size in zip(depths, band_tops, node_offsets, sizes, strict=True)
-    )
-    right_xs = _find_branch_ends(children, sizes, boxes)
-    frames = {}
-    for index, box in enumerate(boxes):
-        if sizes[index].subtree_name_width:
-            x, y = box.x - FRAME_PADDING, band_tops[index] + NODE_GAP / 2
-            width = right_xs[index] - box.x + FRAME_PADDING
-            frames[index] = Rectangle(x, y, width, band_heights[index] - NODE_GAP)
-    height = band_tops[0] + band_heights[0] + MARGIN - NODE_GAP / 2
-    return Layout(boxes, edge_xs, frames, max(right_xs) + MARGIN, height)
-
-
-def _place_columns(depths: Sequence[int], sizes: Sequence[NodeSize]) -> tuple[list[float], tuple[float, ...]]:
-    """Return the x of each column, and the x of the vertical parts of the lines before each column."""
-    column_xs: list[float] = []
-    edge_xs: list[float] = []
-    right_x = 0.0
-    for depth in range(max(depths) + 1):
-        column = [size for size, node_depth in zip(sizes, depths, strict=True) if node_depth == depth]
-        padding = FRAME_PADDING if any(size.subtree_name_width for size in column) else 0.0
-        edge_xs.append(right_x + EDGE_SEGMENT_LENGTH if depth else MARGIN)
-        edge_length = EDGE_SEGMENT_LENGTH + max(size.label_width for size in column) if depth else 0.0
-        column_xs.append(edge_xs[-1] + edge_length + padding)
-        right_x = column_xs[-1] + max(size.width for size in column)
-    return column_xs, tuple(edge_xs)
-
-
-def _compute_bands(children: ChildIndices, sizes: Sequence[NodeSize]) -> tuple[list[float], list[float]]:
-    """Return by node the height of its band, and the distance from the top of the band to the box middle.
-
-    Children follow their parents in the lists, so the bands are computed from the last node to the first.
-    """
-    band_heights, node_offsets = [0.0] * len(sizes), [0.0] * len(sizes)
-    for index in reversed(range(len(sizes))):
-        size, node_children = sizes[index], children[index]
-        top_padding, bottom_padding = (FRAME_HEADER, FRAME_PADDING) if size.subtree_name_width else (0.0, 0.0)
-        half_height = (size.height + NODE_GAP) / 2
-        first_child_offset = node_offsets[node_children[0]] if node_children else 0.0
-        node_offsets[index] = top_padding + max(half_height, first_child_offset)
-        children_top = node_offsets[index] - first_child_offset
-        children_bottom = children_top + sum(band_heights[child] for child in node_children)
-        band_heights[index] = max(node_offsets[index] + half_height, children_bottom) + bottom_padding
-    return band_heights, node_offsets
-
-
-def _place_bands(children: ChildIndices, band_heights: list[float], node_offsets: list[float]) -> list[float]:
-    """Return the y of the top of each band, given the results of `_compute_bands`."""
-    band_tops = [MARGIN - NODE_GAP / 2] * len(band_heights)
-    for index, node_children in enumerate(children):
-        first_child_offset = node_offsets[node_children[0]] if node_children else 0.0
-        top = band_tops[index] + node_offsets[index] - first_child_offset
-        for child in node_children:
-            band_tops[child] = top
-            top += band_heights[child]
-    return band_tops
-
-
-def _find_branch_ends(
-    children: ChildIndices, sizes: Sequence[NodeSize], boxes: Sequence[Rectangle]
-) -> list[float]:
-    """Return the x of the right end of each node with its descendants and their frames."""
-    right_xs = [0.0] * len(sizes)
-    for index in reversed(range(len(sizes))):
-        box, name_width = boxes[index], sizes[index].subtree_name_width
-        right_x = max([box.right_x, *(right_xs[child] for child in children[index])])
-        right_xs[index] = max(right_x + FRAME_PADDING, box.x + name_width) if name_width else right_x
-    return right_xs
+        path += f"H{child.edge_x - radius:.0f}q{radius:.0f} 0 {radius:.0f} {radius:.0f}"
+        path += f"V{child.middle_y - radius:.0f}q0 {radius:.0f} {radius:.0f} {radius:.0f}"
+    return f"{path}H{child.x:.0f}"

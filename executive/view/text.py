@@ -12,6 +12,10 @@ from rich.cells import cell_len
 from executive.mission.grammar import USE_KEYWORD
 from executive.mission.outline import Connection, OutlineNode, list_child_indices
 
+MAX_LINE_LENGTH = 100
+"""Maximum length of a line [characters]."""
+_MIN_TEXT_LENGTH = 40
+"""Minimum length of the text of a line after its prefix [characters]."""
 _INVALID_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Pattern of the characters that XML 1.0 does not allow."""
 _CELL_WIDTH = 0.64
@@ -60,13 +64,6 @@ def render_template(template: str, **values: object) -> str:
     return replace_invalid_xml_characters(environment.get_template(template).render(values))
 
 
-MAX_LINE_LENGTH = 100
-"""Maximum length of a line [characters]."""
-
-_MIN_TEXT_LENGTH = 40
-"""Minimum length of the text of a line after its prefix [characters]."""
-
-
 def draw_text(nodes: Sequence[OutlineNode], *, shows_ports: bool = False, shows_reasons: bool = False) -> str:
     """Return the drawing of a tree as a text, with one line per node unless the line is too long.
 
@@ -76,8 +73,8 @@ def draw_text(nodes: Sequence[OutlineNode], *, shows_ports: bool = False, shows_
         shows_reasons: True to write the failure reasons of skills and catches below the node.
     """
     lines = []
-    prefixes, child_indices = draw_line_prefixes(nodes), list_child_indices(nodes)
-    for node, prefix, children in zip(nodes, prefixes, child_indices, strict=True):
+    prefixes = draw_line_prefixes(nodes)
+    for node, prefix, children in zip(nodes, prefixes, list_child_indices(nodes), strict=True):
         # Only the vertical strokes of the prefix continue in the lines below the name of the node.
         indent = prefix.replace("├─", "│ ").replace("└─", "  ") + ("│  " if children else "   ")
         detail = f"  ({node.detail})" if node.detail else ""
@@ -85,17 +82,6 @@ def draw_text(nodes: Sequence[OutlineNode], *, shows_ports: bool = False, shows_
         for text in _list_details(node, shows_ports, shows_reasons):
             lines += _wrap_line(text, indent, indent)
     return "\n".join(lines)
-
-
-def describe_connections(node: OutlineNode) -> list[str]:
-    """Return the texts about the variables that a skill reads and that it writes, without empty texts."""
-    texts = _format_variables("reads", node.reads, "<-"), _format_variables("writes", node.writes, "->")
-    return list(filter(None, texts))
-
-
-def describe_reasons(node: OutlineNode) -> str:
-    """Return a text with the failure reasons of a skill; "" for none."""
-    return f"may fail: {', '.join(node.reasons)}" if node.reasons else ""
 
 
 def draw_line_prefixes(nodes: Sequence[OutlineNode]) -> list[str]:
@@ -114,10 +100,42 @@ def draw_line_prefixes(nodes: Sequence[OutlineNode]) -> list[str]:
     return prefixes[::-1]
 
 
-def find_skill_names(nodes: Sequence[OutlineNode]) -> dict[str, str]:
-    """Return the names of skills by path, without the key of the parent: `Grasp` for `recover: Grasp`."""
-    nodes_and_children = zip(nodes, list_child_indices(nodes), strict=True)
-    return {node.path: node.name.rpartition(": ")[2] for node, children in nodes_and_children if not children}
+def _wrap_line(text: str, first_indent: str, indent: str) -> list[str]:
+    """Return the lines of a wrapped text; `first_indent` precedes the first line, `indent` all others."""
+    return textwrap.wrap(
+        text, max(MAX_LINE_LENGTH, len(indent) + _MIN_TEXT_LENGTH), initial_indent=first_indent,
+        subsequent_indent=f"{indent}  ", break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
+
+
+def _list_details(node: OutlineNode, shows_ports: bool, shows_reasons: bool) -> Iterator[str]:
+    if shows_reasons and node.trigger:
+        yield node.trigger
+    if shows_ports and (texts := describe_connections(node)):
+        yield "; ".join(texts)
+    if shows_reasons and node.reasons:
+        yield describe_reasons(node)
+
+
+def describe_connections(node: OutlineNode) -> list[str]:
+    """Return the texts about the variables that a skill reads and that it writes, without empty texts."""
+    texts = _format_variables("reads", node.reads, "<-"), _format_variables("writes", node.writes, "->")
+    return list(filter(None, texts))
+
+
+def _format_variables(verb: str, connections: Sequence[Connection], arrow: str) -> str:
+    """Return a text with the variables (`?` for optional), and the ports whose name differs; "" for none."""
+    texts = []
+    for connection in connections:
+        variable = f"${connection.variable}" + ("" if connection.required else "?")
+        has_same_name = connection.port == connection.variable
+        texts.append(variable if has_same_name else f"{connection.port} {arrow} {variable}")
+    return f"{verb} {', '.join(texts)}" if texts else ""
+
+
+def describe_reasons(node: OutlineNode) -> str:
+    """Return a text with the failure reasons of a skill; "" for none."""
+    return f"may fail: {', '.join(node.reasons)}" if node.reasons else ""
 
 
 def fold_subtrees(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
@@ -140,7 +158,12 @@ def fold_subtrees(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
             # Two uses of a subtree may have different params, and therefore different titles and details.
             is_equal = content_by_subtree[repeated_subtree] == content
             detail = "as above" if is_equal else "as above, other params"
-            folded_nodes.append(_make_use_node(node, repeated_subtree, detail))
+            outer_subtrees = node.subtrees[: node.subtrees.index(repeated_subtree)]
+            use_node = OutlineNode(
+                node.path, node.name, node.depth, detail, USE_KEYWORD, repeated_subtree, node.parent_key,
+                node.trigger, outer_subtrees, symbol="…",
+            )  # fmt: skip
+            folded_nodes.append(use_node)
             index = end
     return folded_nodes
 
@@ -156,40 +179,3 @@ def select_active_nodes(nodes: Sequence[OutlineNode], running_paths: Collection[
             active_nodes.append(node)
         are_ancestors_running.append(node.path in running_paths)
     return active_nodes
-
-
-def _wrap_line(text: str, first_indent: str, indent: str) -> list[str]:
-    """Return the lines of a wrapped text; `first_indent` precedes the first line, `indent` all others."""
-    return textwrap.wrap(
-        text, max(MAX_LINE_LENGTH, len(indent) + _MIN_TEXT_LENGTH), initial_indent=first_indent,
-        subsequent_indent=f"{indent}  ", break_long_words=False, break_on_hyphens=False,
-    )  # fmt: skip
-
-
-def _list_details(node: OutlineNode, shows_ports: bool, shows_reasons: bool) -> Iterator[str]:
-    """Yield the texts below the line of a node."""
-    if shows_reasons and node.trigger:
-        yield node.trigger
-    if shows_ports and (texts := describe_connections(node)):
-        yield "; ".join(texts)
-    if shows_reasons and node.reasons:
-        yield describe_reasons(node)
-
-
-def _format_variables(verb: str, connections: Sequence[Connection], arrow: str) -> str:
-    """Return a text with the variables (`?` for optional), and the ports whose name differs; "" for none."""
-    texts = []
-    for connection in connections:
-        variable = f"${connection.variable}" + ("" if connection.required else "?")
-        has_same_name = connection.port == connection.variable
-        texts.append(variable if has_same_name else f"{connection.port} {arrow} {variable}")
-    return f"{verb} {', '.join(texts)}" if texts else ""
-
-
-def _make_use_node(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
-    """Return a node that stands for a whole subtree; it replaces `node`, the first node of the subtree."""
-    outer_subtrees = node.subtrees[: node.subtrees.index(subtree)]
-    return OutlineNode(
-        node.path, node.name, node.depth, detail, USE_KEYWORD, subtree, node.parent_key, node.trigger,
-        outer_subtrees, symbol="…",
-    )  # fmt: skip

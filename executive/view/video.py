@@ -23,6 +23,7 @@ from executive.errors import InputError, explain_os_errors
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import compute_camera_matrix, compute_look_at_pose
 from executive.record.journal import find_run_start, read_journal
+from executive.record.picture_recorder import split_picture_name
 from executive.record.run_directory import RunDirectory, read_cell, replace_atomically
 from executive.record.timeline import Timeline, get_skill_name
 from executive.replay.replayed_cell import InputLog
@@ -72,7 +73,7 @@ def _draw_frames(directory: RunDirectory, period: float) -> Iterator[Image]:
     for step, world_picture in _render_pictures(directory, start.seed, max(1, round(period / start.step))):
         while later_events and later_events[0].tick <= step:
             timeline(later_events.popleft())
-        while later_files and int(later_files[0].stem.partition("_")[0]) <= step:
+        while later_files and split_picture_name(later_files[0])[0] <= step:
             camera_picture = _read_picture(later_files.popleft())
         text_line = np.zeros((TEXT_HEIGHT, 2 * PICTURE_SIZE[0], 3), np.uint8)
         text = f"{step * start.step:.1f} s   {_describe_state(timeline)}"

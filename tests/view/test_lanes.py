@@ -13,7 +13,7 @@ from made_up_runs import TREE, picks, ran
 
 from executive.mission.outline import OutlineNode
 from executive.record.timeline import Activation, Timeline
-from executive.view.report_timeline import MAX_AXIS_LENGTH, MAX_BAR_COUNT, MIN_AXIS_LENGTH, draw_lanes
+from executive.view.report import MAX_AXIS_LENGTH, MAX_BAR_COUNT, MIN_AXIS_LENGTH, draw_lanes
 
 THINNEST = 1.5
 SVG = "{http://www.w3.org/2000/svg}"

@@ -1,8 +1,10 @@
-"""View of a run in browsers: state of the page, messages to its server, and commands of browsers."""
+"""Live page: view of a run in browsers, with which a user watches and controls the run.
+
+The page is served by another process, `live_server`, which gets messages and returns commands of browsers.
+"""
 
 from __future__ import annotations
 
-import base64
 import contextlib
 import json
 import pickle
@@ -13,15 +15,12 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
-from typing import cast
 
 import numpy as np
 
-from executive import events
 from executive.cell.frame import Frame, FrameCaptured
 from executive.cell.workcell import Shape, Visuals
 from executive.errors import InputError
@@ -31,17 +30,26 @@ from executive.mission.outline import make_outline
 from executive.plugins import DISTRIBUTION
 from executive.processes import build_command
 from executive.record.result import Result
-from executive.record.timeline import Timeline
 from executive.run.run import Run
 from executive.view.svg import NodeResult, make_svg
 
-JPEG_QUALITY = 80
-"""JPEG quality of the camera image, 0 to 100."""
-OCCLUSION_DARKENING = 0.45
-"""Fraction by which the brightness of pixels that the arm occludes is reduced: 0 not at all, 1 to black."""
+LOOPBACK = "127.0.0.1"
+"""Network address at which the page is served."""
+POSE_PERIOD = 1 / 10
+"""Period at which poses are sent while a browser shows the page [s]."""
+CPU_RENDERING_POSE_PERIOD = 2.5
+"""Period at which poses are sent if a browser renders on the CPU and so slows down the run [s]."""
+BATCH_PERIOD = 0.03
+"""Period at which queued messages are sent in a batch [s]."""
+SHUTDOWN_TIMEOUT = 3.0
+"""Maximum time to wait for the end of the server process [s]."""
+MAX_QUEUED_MESSAGES = 32
+"""Length of the message queue at which images (about 1 MB each) and poses are dropped."""
+REQUIRED_PACKAGES = ("aiohttp", "viser")
+"""Optional dependencies of the project that the live page needs."""
 
-JsonObject = dict[str, object]
-"""Values of a JSON object, by key."""
+BodyPoses = Mapping[str, Sequence[float]]
+"""Poses of all bodies by name: position [m] and quaternion (w, x, y, z), `(7,)`."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +62,8 @@ class PageChange:
         is_paused: True if the run is paused.
         note: Message about the record of the run.
         result: Outcome of the run: `status`, `message`, `run` directory, and file of the `report` or "".
+        shapes: All shapes of the three-dimensional scene.
+        body_poses: New poses of all bodies of the scene.
     """
 
     clock: float | None = None
@@ -61,6 +71,8 @@ class PageChange:
     is_paused: bool | None = None
     note: str | None = None
     result: Mapping[str, str] | None = None
+    shapes: Sequence[Shape] | None = None
+    body_poses: BodyPoses | None = None
 
 
 @dataclass(frozen=True)
@@ -71,19 +83,7 @@ class CameraImage:
     search_event: FrameSearched
 
 
-BodyPoses = Mapping[str, Sequence[float]]
-"""Poses of all bodies by name: position [m] and quaternion (w, x, y, z), `(7,)`."""
-
-
-@dataclass(frozen=True)
-class SceneChange:
-    """Change of the three-dimensional scene: either all shapes, or new poses of all bodies."""
-
-    shapes: Sequence[Shape] | None = None
-    body_poses: BodyPoses | None = None
-
-
-Message = TimedEvent | PageChange | CameraImage | SceneChange
+Message = TimedEvent | PageChange | CameraImage
 """Message from the run to the server of the page."""
 
 
@@ -103,117 +103,6 @@ class PageCommand:
     text: str = ""
     browser_count: int = 0
     is_cpu_rendering: bool = False
-
-
-def encode_poses(poses: Mapping[str, Pose]) -> BodyPoses:
-    """Return positions [m] and quaternions of bodies by name; reorder (x, y, z, w) to (w, x, y, z)."""
-    return {
-        name: (*X_WB.position.tolist(), *np.roll(X_WB.quaternion, 1).tolist()) for name, X_WB in poses.items()
-    }
-
-
-class PageState:
-    """State of the live page, updated by the messages of a run.
-
-    Attributes:
-        values: All values for `page.js` by key: nodes by path, items by name, and other values.
-    """
-
-    def __init__(self) -> None:
-        self.values: JsonObject = {"is_paused": False, "has_ended": False, "nodes": {}, "items": {}}
-        self._changes: JsonObject = {}
-        self._timeline = Timeline(has_history=False)
-
-    def apply(self, message: Message) -> None:
-        """Update the state of the page for a message of the run."""
-        match message:
-            case events.TimedEvent():
-                self._timeline(message)
-                self._set_values(clock=message.clock)
-                self._apply_event(message.event)
-            case CameraImage():
-                self._set_values(look=_encode_camera_image(message))
-            case PageChange():
-                changes = asdict(message).items()
-                self._set_values(**{key: value for key, value in changes if value is not None})
-
-    def take_changes(self) -> JsonObject:
-        """Return the values that changed since the last call, by key."""
-        changes, self._changes = self._changes, {}
-        return changes
-
-    def _apply_event(self, event: events.Event) -> None:
-        match event:
-            case events.NodeStarted(node) | events.NodeEnded(node):
-                self._set_entry("nodes", node, self._describe_node(node))
-            case events.ItemChanged():
-                self._set_entry("items", event.item, vars(event))
-            case events.TargetSelected():
-                self._set_values(decision=vars(event))
-            case events.RunStarted():
-                self._set_values(run={"mission": event.mission, "seed": event.seed})
-            case events.OperatorAsked():
-                self._set_values(choices=event.choices)
-            case events.RequestGiven():
-                self._set_values(choices=None)
-            case events.RunEnded():
-                self._set_values(choices=None, has_ended=True)
-
-    def _describe_node(self, path: str) -> JsonObject:
-        """Return the status, last failure and item of a node, and the number of times it ended by status."""
-        activation = self._timeline.activation_by_path[path]
-        end_counts = self._timeline.end_counts.get(path, Counter())
-        statuses = {"done": "SUCCESS", "failed": "FAILURE", "halted": "INVALID"}
-        return {
-            **{name: end_counts[status] for name, status in statuses.items()},
-            "status": activation.status.lower(), "failure": activation.failure, "item": activation.item,
-        }  # fmt: skip
-
-    def _set_values(self, **values: object) -> None:
-        """Set values of the state by key, and store them as changes."""
-        self.values |= values
-        self._changes |= values
-
-    def _set_entry(self, key: str, name: str, value: JsonObject) -> None:
-        """Set an entry of `nodes` or `items`, and store it as a change."""
-        for values in (self.values, self._changes):
-            entries = cast("JsonObject", values.setdefault(key, {}))
-            entries[name] = value
-
-
-def _encode_camera_image(camera_image: CameraImage) -> JsonObject:
-    """Return the detections in a frame and its image as JPEG, darkened where the arm occludes the scene."""
-    import cv2
-
-    frame = camera_image.frame
-    image = cv2.cvtColor(frame.image, cv2.COLOR_RGB2BGR)
-    if frame.visible is not None:
-        occluded = ~frame.visible
-        image[occluded] = (image[occluded] * (1 - OCCLUSION_DARKENING)).astype(np.uint8)
-    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    height, width, _ = image.shape
-    return {
-        "source": "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode(),
-        "width": width, "height": height, "frame": frame.id, "camera": frame.camera,
-        "detector": camera_image.search_event.detector, "stamp": frame.stamp,
-        "detections": list(map(vars, camera_image.search_event.confident)),
-    }  # fmt: skip
-
-
-LOOPBACK = "127.0.0.1"
-"""Network address at which the page is served."""
-POSE_PERIOD = 1 / 10
-"""Period at which poses are sent while a browser shows the page [s]."""
-CPU_RENDERING_POSE_PERIOD = 2.5
-"""Period at which poses are sent if a browser renders on the CPU and so slows down the run [s]."""
-BATCH_PERIOD = 0.03
-"""Period at which queued messages are sent in a batch [s]."""
-SHUTDOWN_TIMEOUT = 3.0
-"""Maximum time to wait for the end of the server process [s]."""
-MAX_QUEUED_MESSAGES = 32
-"""Length of the message queue at which images (about 1 MB each) and poses are dropped."""
-REQUIRED_PACKAGES = ("aiohttp", "viser")
-"""Optional dependencies of the project that the live page needs."""
 
 
 class LivePage:
@@ -239,7 +128,7 @@ class LivePage:
             port = listener.getsockname()[1]
             self.address = f"http://{LOOPBACK}:{port}/{token}/"
             self._server = subprocess.Popen(
-                build_command("executive.view.live", str(listener.fileno())),
+                build_command("executive.view.live_server", str(listener.fileno())),
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._error_file,
                 pass_fds=[listener.fileno()],
                 # In a separate session the server gets no Ctrl-C, and can still show the result of the run.
@@ -275,8 +164,7 @@ class LivePage:
         # In the empty line of each node, the page writes how often the node succeeded, failed and was halted.
         empty_results = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
-        self._enqueue(SceneChange(shapes=shapes))
-        self._enqueue(PageChange(tree=make_svg(nodes, run.mission, empty_results)))
+        self._enqueue(PageChange(tree=make_svg(nodes, run.mission, empty_results), shapes=shapes))
         run.control.call_between_ticks(self._send_state)
         self._send_state()
 
@@ -311,7 +199,10 @@ class LivePage:
         self._queue.put(None)
         try:
             if self._server.wait(SHUTDOWN_TIMEOUT) != 0:
-                self.problem = self.problem or f"the page ended before the run: {self._read_last_error()}"
+                self._error_file.seek(0)
+                lines = self._error_file.read().decode(errors="replace").strip().splitlines()
+                cause = lines[-1] if lines else f"exit status {self._server.returncode}"
+                self.problem = self.problem or f"the page ended before the run: {cause}"
         except subprocess.TimeoutExpired:
             self._server.kill()
             self._server.wait()
@@ -331,10 +222,8 @@ class LivePage:
                 self._was_paused = not self._was_paused
                 self._enqueue(PageChange(is_paused=self._was_paused))
             if self._can_send_images:
-                self._enqueue(PageChange(clock=self._run.now))
-                if self._visuals is not None:
-                    body_poses = encode_poses(self._visuals.poses())
-                    self._enqueue(SceneChange(body_poses=body_poses))
+                poses = None if self._visuals is None else encode_poses(self._visuals.poses())
+                self._enqueue(PageChange(clock=self._run.now, body_poses=poses))
 
     @property
     def _can_send_images(self) -> bool:
@@ -370,19 +259,14 @@ class LivePage:
                     time.sleep(BATCH_PERIOD)
         self._has_server_ended = True
 
-    def _read_last_error(self) -> str:
-        """Return the last line that the server wrote to stderr, or the exit status of the server."""
-        self._error_file.seek(0)
-        lines = self._error_file.read().decode(errors="replace").strip().splitlines()
-        return lines[-1] if lines else f"exit status {self._server.returncode}"
-
     def _read_commands(self) -> None:
         """Run the commands that the server writes to stdout, until the server ends."""
         assert self._server.stdout is not None
         for line in self._server.stdout:
             with self._catch_errors():
                 self._run_command(PageCommand(**json.loads(line)))
-        self._browser_count, self._has_server_ended = 0, True
+        self._browser_count = 0
+        self._has_server_ended = True
 
     def _run_command(self, command: PageCommand) -> None:
         """Run a command of a browser; most command names are the names of methods of `RunControl`."""
@@ -396,3 +280,10 @@ class LivePage:
             control.add_request(command.text)
         elif control is not None:
             getattr(control, command.name)()
+
+
+def encode_poses(poses: Mapping[str, Pose]) -> BodyPoses:
+    """Return positions [m] and quaternions of bodies by name; reorder (x, y, z, w) to (w, x, y, z)."""
+    return {
+        name: (*X_WB.position.tolist(), *np.roll(X_WB.quaternion, 1).tolist()) for name, X_WB in poses.items()
+    }

@@ -14,8 +14,10 @@ import websockets.asyncio.server
 
 from executive.cell.workcell import Shape
 
-CAMERA_POSITION, CAMERA_TARGET = (1.35, -0.68, 0.95), (0.33, 0.0, 0.2)
-"""Initial position of the virtual camera, and the point at which it looks, in the world frame [m]."""
+CAMERA_POSITION = (1.35, -0.68, 0.95)
+"""Initial position of the virtual camera in the world frame [m]."""
+CAMERA_TARGET = (0.33, 0.0, 0.2)
+"""Point at which the virtual camera looks at first, in the world frame [m]."""
 BACKGROUND = (243, 245, 248)
 """Colour of the background, RGB, 0 to 255."""
 
@@ -57,24 +59,27 @@ class LiveScene:
                 if frame.visible != (pose is not None):
                     frame.visible = pose is not None
                 if pose is not None:
-                    frame.position, frame.wxyz = np.array(pose[:3]), np.array(pose[3:])
+                    frame.position = np.array(pose[:3])
+                    frame.wxyz = np.array(pose[3:])
 
     def _add_shape(self, path: str, shape: Shape) -> None:
         """Add a shape to the scene at `path`; the path without its last part is the path of the parent."""
-        scene, colour = self._server.scene, shape.colour
-        radius, height = shape.size[0] / 2, shape.size[2]
+        scene = self._server.scene
+        radius = shape.size[0] / 2
         quaternion = np.roll(shape.X_BS.quaternion, 1)  # (x, y, z, w) becomes (w, x, y, z).
-        pose_arguments: dict[str, Any] = {"position": shape.X_BS.position, "wxyz": quaternion}
+        options: dict[str, Any] = {
+            "color": shape.colour, "position": shape.X_BS.position, "wxyz": quaternion,
+        }  # fmt: skip
         if shape.kind == "box":
-            scene.add_box(path, color=colour, dimensions=shape.size, **pose_arguments)
+            scene.add_box(path, dimensions=shape.size, **options)
         elif shape.kind == "cylinder":
-            scene.add_cylinder(path, radius=radius, height=height, color=colour, **pose_arguments)
+            scene.add_cylinder(path, radius=radius, height=shape.size[2], **options)
         elif shape.kind == "sphere":
-            scene.add_icosphere(path, radius=radius, color=colour, **pose_arguments)
+            scene.add_icosphere(path, radius=radius, **options)
         else:
             mesh = trimesh.load_mesh(shape.file, process=False, skip_materials=True)
             vertices = np.asarray(mesh.vertices) * shape.size
-            scene.add_mesh_simple(path, vertices, np.asarray(mesh.faces), color=colour, **pose_arguments)
+            scene.add_mesh_simple(path, vertices, np.asarray(mesh.faces), **options)
 
 
 @contextlib.contextmanager
@@ -94,5 +99,4 @@ def _serve_on_unix_socket(socket_path: Path) -> Iterator[None]:
 
 
 def _make_scene_path(body: str) -> str:
-    """Return the path of a body in the scene; spaces and slashes in the name of the body are replaced."""
     return "/bodies/" + body.replace(" ", "_").replace("/", "_")

@@ -21,7 +21,8 @@ from events import (
 
 from executive.events import Event, OperatorAsked, RequestGiven, TargetSelected
 from executive.geometry import Pose
-from executive.view.live.page import CameraImage, PageState, encode_poses
+from executive.view.live_page import CameraImage, encode_poses
+from executive.view.live_server import PageState
 
 
 @pytest.mark.parametrize(

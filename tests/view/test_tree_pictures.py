@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 from executive.mission.outline import Connection, OutlineNode
 from executive.tree.node import ControlNode
 from executive.tree.node_registry import load_control_nodes
-from executive.view.svg import NodeResult, NodeSize, Rectangle, compute_layout, make_group_id, make_svg
+from executive.view.svg import NodeBox, NodeResult, make_group_id, make_svg, place_boxes
 
 RETRY = "up to 3 attempts, on Grasp.missed, Grasp.blocked"
 SVG = "{http://www.w3.org/2000/svg}"
@@ -139,17 +139,17 @@ def test_the_picture_is_drawn_exactly_there():
 
 
 def test_a_small_tree_stands_exactly_there():
-    sizes = [
-        NodeSize(60, 28),
-        NodeSize(50, 28, label_width=20),
-        NodeSize(40, 42, subtree_name_width=90),
-        NodeSize(30, 28),
+    boxes = [
+        NodeBox(0, 60, 28),
+        NodeBox(1, 50, 28, label_width=20),
+        NodeBox(1, 40, 42, subtree_name_width=90),
+        NodeBox(2, 30, 28),
     ]
-    plan = compute_layout([0, 1, 1, 2], [[1, 2], [], [3], []], sizes)
-    assert plan.boxes == (
-        Rectangle(16, 16, 60, 28), Rectangle(137, 16, 50, 28), Rectangle(137, 74, 40, 42),
-        Rectangle(219, 81, 30, 28),
-    )  # fmt: skip
-    assert plan.edge_xs == (16, 92, 203)
-    assert plan.frames == {2: Rectangle(128, 54, 130, 71)}
-    assert (plan.width, plan.height) == (274, 141)
+    boxes[0].children = boxes[1:3]
+    boxes[2].children = boxes[3:]
+    assert place_boxes(boxes) == (274, 141)
+    assert [box.bounds for box in boxes] == [
+        (16, 16, 60, 28), (137, 16, 50, 28), (137, 74, 40, 42), (219, 81, 30, 28),
+    ]  # fmt: skip
+    assert [box.edge_x for box in boxes] == [16, 92, 92, 203]
+    assert boxes[2].frame == (128, 54, 130, 71)

@@ -9,20 +9,13 @@ from made_up_runs import TREE, ran
 
 from executive.mission.outline import OutlineNode
 from executive.record.timeline import Activation, Timeline
-from executive.view.report_timeline import (
-    FAILED_ATTEMPTS,
-    LOOK,
-    NO_ITEM,
-    WAITING,
-    ActivityTimes,
-    compute_activity_times,
-)
+from executive.view.report import FAILED_ATTEMPTS, LOOK, NO_ITEM, WAITING, TimesByItem, compute_activity_times
 
 
 def times_of(
     course: list[Activation], nodes: Sequence[OutlineNode], decisions: list[tuple[float, str]], end: float
-) -> ActivityTimes:
-    """Return the times of activations and selections up to a time."""
+) -> tuple[tuple[str, ...], TimesByItem]:
+    """Return activities, and times of activations and selections up to a time."""
     return compute_activity_times(Timeline(activations=course, selection_times=decisions, clock=end), nodes)
 
 
@@ -41,16 +34,14 @@ def test_a_failed_attempt_a_look_ahead_and_a_wait_are_distinguished():
         ran("Transit", 6.1, 7.0, "duck-1"), ran("Release", 7.0, 7.1, "duck-1"),
         ran("Wait", 7.1, 8.1), ran("Detect", 8.1, 8.2),
     ]  # fmt: skip
-    times = times_of(course, TREE, [(1.1, "cube-1"), (2.3, "cube-1"), (4.1, "duck-1")], 8.5)
-    assert list(times.times_by_item) == ["cube-1", "duck-1", NO_ITEM]
-    assert times.times_by_item["cube-1"] == near(
+    activities, times = times_of(course, TREE, [(1.1, "cube-1"), (2.3, "cube-1"), (4.1, "duck-1")], 8.5)
+    assert list(times) == ["cube-1", "duck-1", NO_ITEM]
+    assert times["cube-1"] == near(
         {LOOK: 1.1, FAILED_ATTEMPTS: 1.2, "approach": 0.7, "grasp": 0.1, "transit": 1.9, "release": 0.1}
     )
-    assert times.times_by_item["duck-1"] == near(
-        {"approach": 0.9, "grasp": 0.1, "transit": 0.9, "release": 0.1}
-    )
-    assert times.times_by_item[NO_ITEM] == near({WAITING: 1.3, LOOK: 0.1})
-    assert times.activities == (LOOK, "approach", "grasp", "transit", "release", FAILED_ATTEMPTS, WAITING)
+    assert times["duck-1"] == near({"approach": 0.9, "grasp": 0.1, "transit": 0.9, "release": 0.1})
+    assert times[NO_ITEM] == near({WAITING: 1.3, LOOK: 0.1})
+    assert activities == (LOOK, "approach", "grasp", "transit", "release", FAILED_ATTEMPTS, WAITING)
 
 
 @pytest.mark.parametrize(
@@ -66,5 +57,5 @@ def test_a_failed_attempt_a_look_ahead_and_a_wait_are_distinguished():
     ],
 )  # fmt: skip
 def test_time_belongs_to_an_object_or_to_the_run(course, decisions, end, expected):
-    times = times_of(course, TREE, decisions, end)
-    assert times.times_by_item == {item: near(row) for item, row in expected.items()}
+    _, times = times_of(course, TREE, decisions, end)
+    assert times == {item: near(row) for item, row in expected.items()}

@@ -22,7 +22,7 @@ from executive.plugins import load_skills
 from executive.record.result import Result
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
-from executive.view.live.page import LivePage
+from executive.view.live_page import LivePage
 from tests.record.conftest import MISSION
 
 RESULT = Result(mission="sort", seed=3, status="SUCCESS", reason="", message="", node="", run="runs/x")
@@ -50,7 +50,7 @@ def run(page: LivePage, tmp_path: Path, request: pytest.FixtureRequest) -> Itera
 def find_server() -> str:
     """Return the number of the process that serves the page of the test, once it runs."""
     children = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
-    (server,) = (one for one in children if "executive.view.live" in Path(f"/proc/{one}/cmdline").read_text())
+    (server,) = (one for one in children if "view.live_server" in Path(f"/proc/{one}/cmdline").read_text())
     return server
 
 

@@ -1,25 +1,133 @@
-"""Server of the live page: access, files, messages to and from browsers, and proxy of the 3-D scene."""
+"""Server of the live page, in a process of its own: page state, 3-D scene, access, files and messages.
+
+The server reads messages of the run from stdin, and writes commands of browsers to stdout. It listens on the
+loopback address. Every request must come from the page itself and contain the secret token in the page
+address, so that no other page can read or control the run.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import base64
 import contextlib
 import json
+import os
+import pickle
 import secrets
+import socket
+import sys
+import tempfile
+import threading
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import aiohttp
+import numpy as np
 from aiohttp import WSMsgType, web
 from aiohttp.typedefs import Handler
 
+from executive import events
 from executive.cell.workcell import Shape
-from executive.view.live.page import PageCommand, PageState
+from executive.record.picture_recorder import encode_jpeg
+from executive.record.timeline import STATUS_TEXTS, Timeline
+from executive.view.live_page import LOOPBACK, CameraImage, Message, PageChange, PageCommand
 
 if TYPE_CHECKING:
-    from executive.view.live.live_scene import LiveScene
+    from executive.view.live_scene import LiveScene
+
+OCCLUSION_DARKENING = 0.45
+"""Fraction by which the brightness of pixels that the arm occludes is reduced: 0 not at all, 1 to black."""
+
+ENDED_STATUSES = ("SUCCESS", "FAILURE", "INVALID")
+"""Statuses of ended nodes; the page shows how often each node ended with each of them."""
+SCENE_KEYS = ("shapes", "body_poses")
+"""Fields of `PageChange` that belong to the scene, which `SceneProxy` serves."""
+
+JsonObject = dict[str, object]
+"""Values of a JSON object, by key."""
+
+
+class PageState:
+    """State of the live page, updated by the messages of a run.
+
+    Attributes:
+        values: All values for `page.js` by key: nodes by path, items by name, and other values.
+    """
+
+    def __init__(self) -> None:
+        self.values: JsonObject = {"is_paused": False, "has_ended": False, "nodes": {}, "items": {}}
+        self._changes: JsonObject = {}
+        self._timeline = Timeline(has_history=False)
+
+    def apply(self, message: Message) -> None:
+        """Update the state of the page for a message of the run."""
+        match message:
+            case events.TimedEvent():
+                self._timeline(message)
+                self._set_values(clock=message.clock)
+                self._apply_event(message.event)
+            case CameraImage():
+                self._set_values(look=_encode_camera_image(message))
+            case PageChange():
+                changes = vars(message).items()
+                values = {key: value for key, value in changes if value is not None and key not in SCENE_KEYS}
+                self._set_values(**values)
+
+    def take_changes(self) -> JsonObject:
+        """Return the values that changed since the last call, by key."""
+        changes = self._changes
+        self._changes = {}
+        return changes
+
+    def _apply_event(self, event: events.Event) -> None:
+        match event:
+            case events.NodeStarted(node) | events.NodeEnded(node):
+                activation = self._timeline.activation_by_path[node]
+                end_counts = self._timeline.end_counts.get(node, Counter())
+                counts = {STATUS_TEXTS[status]: end_counts[status] for status in ENDED_STATUSES}
+                entry = {"status": activation.status.lower(), "failure": activation.failure}
+                self._set_entry("nodes", node, {**counts, **entry, "item": activation.item})
+            case events.ItemChanged():
+                self._set_entry("items", event.item, vars(event))
+            case events.TargetSelected():
+                self._set_values(decision=vars(event))
+            case events.RunStarted():
+                self._set_values(run={"mission": event.mission, "seed": event.seed})
+            case events.OperatorAsked():
+                self._set_values(choices=event.choices)
+            case events.RequestGiven():
+                self._set_values(choices=None)
+            case events.RunEnded():
+                self._set_values(choices=None, has_ended=True)
+
+    def _set_values(self, **values: object) -> None:
+        self.values |= values
+        self._changes |= values
+
+    def _set_entry(self, key: str, name: str, value: JsonObject) -> None:
+        for values in (self.values, self._changes):
+            entries = cast("JsonObject", values.setdefault(key, {}))
+            entries[name] = value
+
+
+def _encode_camera_image(camera_image: CameraImage) -> JsonObject:
+    """Return the detections in a frame and its image as JPEG, darkened where the arm occludes the scene."""
+    frame = camera_image.frame
+    image = frame.image.copy()
+    if frame.visible is not None:
+        occluded = ~frame.visible
+        image[occluded] = (image[occluded] * (1 - OCCLUSION_DARKENING)).astype(np.uint8)
+    height, width, _ = image.shape
+    return {
+        "source": "data:image/jpeg;base64," + base64.b64encode(encode_jpeg(image)).decode(),
+        "width": width, "height": height, "frame": frame.id, "camera": frame.camera,
+        "detector": camera_image.search_event.detector, "stamp": frame.stamp,
+        "detections": list(map(vars, camera_image.search_event.confident)),
+    }  # fmt: skip
 
 
 SCENE_CONTENT_POLICY = (
@@ -44,15 +152,14 @@ class SceneProxy:
         self._scene: LiveScene | None = None
         self._start_lock = asyncio.Lock()
 
-    def set_shapes(self, shapes: Sequence[Shape]) -> None:
-        """Set the shapes of the scene; the next or a waiting request of a browser starts the scene server."""
-        self._shapes.set_result(shapes)
-
-    def set_body_poses(self, poses: Mapping[str, Sequence[float]]) -> None:
-        """Set the poses of bodies by name: position [m] and quaternion (w, x, y, z)."""
-        self._body_poses = poses
-        if self._scene is not None:
-            self._scene.set_body_poses(poses)
+    def apply(self, change: PageChange) -> None:
+        """Apply a change; once the shapes are known, a request of a browser starts the scene server."""
+        if change.shapes is not None:
+            self._shapes.set_result(change.shapes)
+        if change.body_poses is not None:
+            self._body_poses = change.body_poses
+            if self._scene is not None:
+                self._scene.set_body_poses(self._body_poses)
 
     async def forward_file(self, request: web.Request) -> web.Response:
         """Forward the request for a file to the scene server, and return the response."""
@@ -75,8 +182,7 @@ class SceneProxy:
                 "http://scene/", protocols=protocols, max_msg_size=MAX_SCENE_MESSAGE_SIZE
             ) as scene,
         ):
-            directions = (_forward(browser, scene), _forward(scene, browser))
-            tasks = [asyncio.create_task(direction) for direction in directions]
+            tasks = [asyncio.create_task(_forward(*pair)) for pair in ((browser, scene), (scene, browser))]
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in tasks:
                 task.cancel()
@@ -95,14 +201,13 @@ class SceneProxy:
 
 
 def _start_scene_server(socket_path: Path, shapes: Sequence[Shape]) -> LiveScene:
-    """Import viser and start the scene server."""
-    from executive.view.live.live_scene import LiveScene
+    # The import of viser and trimesh takes 1 s, and only the first browser needs them.
+    from executive.view.live_scene import LiveScene
 
     return LiveScene(socket_path, shapes)
 
 
 async def _forward(source: Connection, target: Connection) -> None:
-    """Forward the messages from `source` to `target` until a connection ends."""
     async for message in source:
         if message.type is WSMsgType.BINARY:
             await target.send_bytes(message.data)
@@ -158,7 +263,7 @@ class Server:
         self._send_command = send_command
         self._token = token
         # The name `localhost` could lead to another server, at [::1].
-        self._host = f"127.0.0.1:{port}"
+        self._host = f"{LOOPBACK}:{port}"
         # The value is True for a browser that renders on the CPU.
         self._browsers: dict[web.WebSocketResponse, bool] = {}
         self.app = web.Application(middlewares=[self._check_access])
@@ -200,7 +305,6 @@ class Server:
             await asyncio.wait(close_tasks, timeout=SHUTDOWN_TIMEOUT)
 
     async def _serve_file(self, request: web.Request) -> web.Response:
-        """Return a file of the page."""
         name = request.match_info["file"]
         if name not in _FILES:
             raise web.HTTPNotFound(text="there is no such file\n")
@@ -263,3 +367,63 @@ def parse_command(text: str) -> PageCommand | None:
         case {"name": "request", "text": str(text)}:
             return PageCommand("request", text)
     return None
+
+
+def main() -> None:
+    """Serve the page on the socket whose descriptor is the command-line argument, until stdin ends."""
+    os.nice(5)  # The tick loop of the run has precedence.
+    listener = socket.socket(fileno=int(sys.argv[1]))
+    # The run reads commands from stdout, so text that libraries print is redirected to stderr.
+    command_stream = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+
+    def write_command(command: PageCommand) -> None:
+        command_stream.write(json.dumps(asdict(command)) + "\n")
+        command_stream.flush()
+
+    with tempfile.TemporaryDirectory(prefix="executive-") as folder:
+        asyncio.run(_serve(listener, Path(folder) / "scene", write_command))
+    # Exit without the clean-up of libraries, because the run waits for this process.
+    os._exit(0)
+
+
+async def _serve(
+    listener: socket.socket, scene_socket: Path, write_command: Callable[[PageCommand], None]
+) -> None:
+    """Serve the page, and apply pickled batches of messages from stdin; the first batch has the token."""
+    loop = asyncio.get_running_loop()
+    input_ended = asyncio.Event()
+    (token, port), *first_messages = pickle.load(sys.stdin.buffer)
+    page_state = PageState()
+    scene_proxy = SceneProxy(scene_socket)
+    server = Server(page_state, scene_proxy, write_command, token, port)
+
+    def apply_batch(batch: list[Message]) -> None:
+        for message in batch:
+            page_state.apply(message)
+            if isinstance(message, PageChange):
+                scene_proxy.apply(message)
+
+    def read_batches() -> None:
+        try:
+            while True:
+                loop.call_soon_threadsafe(apply_batch, pickle.load(sys.stdin.buffer))
+        except EOFError:
+            pass
+        finally:
+            # If the run was killed, the input may end in the middle of a message.
+            loop.call_soon_threadsafe(input_ended.set)
+
+    apply_batch(first_messages)
+    runner = web.AppRunner(server.app, access_log=None)
+    await runner.setup()
+    await web.SockSite(runner, listener).start()
+    sender = asyncio.create_task(server.send_periodically())
+    threading.Thread(target=read_batches, daemon=True).start()
+    await input_ended.wait()
+    sender.cancel()
+    await server.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -14,10 +14,11 @@ from aiohttp import web
 from aiohttp.test_utils import make_mocked_request
 from events import at, run_started
 
-from executive.view.live.page import PageChange, PageCommand, PageState
-from executive.view.live.server import (
+from executive.view.live_page import PageChange, PageCommand
+from executive.view.live_server import (
     CONTENT_POLICY,
     SECURITY_HEADERS,
+    PageState,
     SceneProxy,
     Server,
     find_access_error,
