@@ -47,7 +47,8 @@ class JointRange(NamedTuple):
 
     def describe(self, joint: int) -> str:
         """Return the range of the joint with the index `joint` as text: `±170°` or `-30° to 120°`."""
-        lower, upper = math.degrees(self.lower[joint]), math.degrees(self.upper[joint])
+        lower = math.degrees(self.lower[joint])
+        upper = math.degrees(self.upper[joint])
         return f"±{upper:.0f}°" if lower == -upper else f"{lower:.0f}° to {upper:.0f}°"
 
 
@@ -97,7 +98,10 @@ def compute_min_time(displacement: Array, limits: JointLimits) -> Array:
     time. A long profile reaches the maximum velocity `v`; a medium profile reaches only the maximum
     acceleration `a`; a short profile reaches only the maximum jerk `j`.
     """
-    d, v, a, j = np.abs(displacement), limits.velocity, limits.acceleration, limits.jerk
+    d = np.abs(displacement)
+    v = limits.velocity
+    a = limits.acceleration
+    j = limits.jerk
     jerk_time = a / j  # [s] from zero to the maximum acceleration
     ramp_time = np.where(v >= a * jerk_time, v / a + jerk_time, 2 * np.sqrt(v / j))  # [s] to maximum velocity
     medium_time = jerk_time + np.sqrt(jerk_time**2 + 4 * d / a)

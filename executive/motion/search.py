@@ -26,7 +26,7 @@ from executive.motion.configurations import (
     solve_vertical_waypoints,
 )
 from executive.motion.joints import BranchKey, JointLimits, JointState, Kinematics
-from executive.motion.optimizer import OptimizationProblem, Optimizer, PayloadLimit
+from executive.motion.optimizer import MotionConstraints, Optimizer, PayloadLimit
 from executive.motion.trajectory import Connector, JointLimitError, MotionPiece, Trajectory, sample_pieces
 from executive.motion.transcription import SAMPLE_FRACTIONS
 
@@ -62,6 +62,9 @@ class MotionSearch:
         start: Joint positions at the start `(n,)` [rad].
         end: A goal, or joint positions at the end `(n,)` [rad].
         task: Load and obstacles of the free part; `task.obstacles` includes the target.
+
+    Attributes:
+        constraints: Constraints of the free part.
     """
 
     def __init__(
@@ -75,19 +78,25 @@ class MotionSearch:
     ) -> None:
         self._kinematics = kinematics
         self._limits = limits
-        self._connector = Connector(limits)
         self._travel_height = compute_travel_height(config)
         self._end = end
         self._straight_part_length = config.motion.straight
         discs = make_tool_discs(config, task.load)
-        if not isinstance(end, Goal) and task.load is None:
-            # A motion to joint positions, i.e. to a named pose, must be possible from any configuration.
-            discs = discs._replace(min_cosine=-1.0)
-        self._payload = PayloadLimit(task.load, kinematics) if task.load else None
         start_tcp_and_axis = kinematics.compute_tcps_and_axes(start[None])
-        tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, self._locate_free_part_end(), strict=True))
-        self._clearance = ClearanceModel(config, task.obstacles, tcps[:, :2], discs)
-        self._clearance.relax_end_margins(tcps, axes)
+        if isinstance(end, Goal):
+            x, y, z = end.position
+            end_tcp_and_axis = (np.array([[x, y, z + end.slow_length]]), np.array([[0.0, 0.0, -1.0]]))
+        else:
+            end_tcp_and_axis = kinematics.compute_tcps_and_axes(end[None])
+            if task.load is None:
+                # A motion to joint positions, i.e. to a named pose, must be possible from any configuration.
+                discs = discs._replace(min_cosine=-1.0)
+        tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, end_tcp_and_axis, strict=True))
+        clearance = ClearanceModel(config, task.obstacles, tcps[:, :2], discs)
+        clearance.relax_end_margins(tcps, axes)
+        payload = PayloadLimit(task.load, kinematics) if task.load else None
+        self._connector = Connector(limits)
+        self.constraints = MotionConstraints(self._connector, kinematics, clearance, payload)
         # The motion up to a via point is the same for all candidates, and is planned once per height.
         self._get_rise = functools.cache(self._plan_rise)
         self._departure = departure = self._plan_departure(start, float(tcps[0, 2]))
@@ -95,7 +104,14 @@ class MotionSearch:
 
     def plan_motions(self) -> Iterator[Trajectory]:
         """Plan and yield motions, the best first; motions that stop at via points are last."""
-        remaining_candidates = islice(self._list_candidates(), MAX_CANDIDATES)
+        if isinstance(self._end, Goal):
+            arrival_length = self._end.slow_length or self._straight_part_length
+            all_candidates = find_candidates(
+                self._kinematics, self._limits, self._start, self._end, arrival_length
+            )
+        else:
+            all_candidates = iter([Candidate(0.0, JointState.at_rest(self._end), None, None)])
+        remaining_candidates = islice(all_candidates, MAX_CANDIDATES)
         candidates: list[Candidate] = []
         while group := list(islice(remaining_candidates, COMPARED_CANDIDATES)):
             yield from self._plan_direct_motions_and_detours(group)
@@ -105,28 +121,6 @@ class MotionSearch:
                 with contextlib.suppress(Unreachable, JointLimitError):
                     free_part = self._connect_by_via_points(candidate, extra_height, prefers_lines=True)
                     yield self._build_motion(candidate, *free_part)
-
-    def require_clearance(self, qs: Array) -> None:
-        """Check that joint positions `(N, n)` [rad] keep the required distances from obstacles.
-
-        Raises:
-            Blocked: A distance is too small.
-        """
-        self._clearance.require_clearance(*self._kinematics.compute_tcps_and_axes(qs))
-
-    def _locate_free_part_end(self) -> tuple[Array, Array]:
-        """Return tool centre point [m] and tool axis, `(1, 3)` each, at the end of the free part."""
-        if not isinstance(self._end, Goal):
-            return self._kinematics.compute_tcps_and_axes(self._end[None])
-        x, y, z = self._end.position
-        return np.array([[x, y, z + self._end.slow_length]]), np.array([[0.0, 0.0, -1.0]])
-
-    def _list_candidates(self) -> Iterator[Candidate]:
-        """Return an iterator of candidates for the end of the motion, the fastest first."""
-        if not isinstance(self._end, Goal):
-            return iter([Candidate(0.0, JointState.at_rest(self._end), None, None)])
-        arrival_length = self._end.slow_length or self._straight_part_length
-        return find_candidates(self._kinematics, self._limits, self._start, self._end, arrival_length)
 
     def _plan_direct_motions_and_detours(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
         """Plan and yield refined detours and collision-free direct motions, the fastest first."""
@@ -162,7 +156,8 @@ class MotionSearch:
         """
         with contextlib.suppress(JointLimitError):
             motion = self._build_motion(candidate, *optimizer.connect_states(keeps_timing=keeps_timing))
-            yield (self._payload.make_safe_motion(motion) if self._payload else motion).duration, motion
+            payload = self.constraints.payload
+            yield (payload.make_safe_motion(motion) if payload else motion).duration, motion
 
     def _evaluate_candidates(
         self, candidates: Sequence[Candidate]
@@ -177,26 +172,22 @@ class MotionSearch:
         for candidate in candidates:
             costs = [duration for duration, _ in direct_motions]
             costs += [self._compute_total_cost(*pair) for pair in optimizers]
-            if (
-                min(costs, default=math.inf)
-                <= self._compute_straight_duration(candidate) + candidate.min_duration
-            ):
+            min_duration = self._compute_straight_duration(candidate) + candidate.min_duration
+            if min(costs, default=math.inf) <= min_duration:
                 break
-            problem = OptimizationProblem(
-                self._start, candidate.free_part_end, self._connector, self._kinematics, self._clearance,
-                self._payload,
-            )  # fmt: skip
+            start = self._start
+            end = candidate.free_part_end
             with contextlib.suppress(JointLimitError, Unreachable):
-                free_part = self._connector.connect(self._start, candidate.free_part_end)
+                free_part = self._connector.connect(start, end)
                 qs = free_part.sample(SAMPLE_FRACTIONS * free_part.duration).q
-                if problem.compute_slack(qs).min() >= 0:
+                if self.constraints.compute_slack(qs).min() >= 0:
                     motion = self._build_motion(candidate, free_part)
                     direct_motions.append((motion.duration, motion))
                     continue
                 initial_guess = self._connect_by_via_points(candidate, EXTRA_HEIGHTS[0], prefers_lines=False)
                 duration = sum(piece.duration for piece in initial_guess)
                 qs = sample_pieces(initial_guess, SAMPLE_FRACTIONS * duration).q
-                optimizer = Optimizer(problem, qs, duration)
+                optimizer = Optimizer(self.constraints, start, end, qs, duration)
                 optimizer.improve(INITIAL_STEP_COUNT)
                 optimizers.append((candidate, optimizer))
         direct_motions.sort(key=itemgetter(0))
@@ -238,7 +229,8 @@ class MotionSearch:
             Unreachable: A via point is out of reach in the branch of the candidate.
             JointLimitError: No motion connects two of the states.
         """
-        height, end = self._travel_height + extra_height, candidate.free_part_end
+        height = self._travel_height + extra_height
+        end = candidate.free_part_end
         connect = self._connector.connect
         rise, start_via_point = self._get_rise(height, prefers_lines)
         (x, y, z), _ = self._locate_tool(end.q)
@@ -287,13 +279,14 @@ class MotionSearch:
         The cell file may require a straight departure. If the seal of a load permits less acceleration than
         the joints, the load also departs straight, because contact with the support could break the seal.
         """
-        length = self._straight_part_length or (LIFT_OFF_DISTANCE if self._payload else 0.0)
+        payload = self.constraints.payload
+        length = self._straight_part_length or (LIFT_OFF_DISTANCE if payload else 0.0)
         if not length or height + length > self._travel_height:
             return None
         waypoints = find_vertical_waypoints(self._kinematics, start, length)
         if waypoints is None:
             return None
-        acceleration = self._payload.max_lift_acceleration if self._payload else math.inf
+        acceleration = payload.max_lift_acceleration if payload else math.inf
         line = CartesianLine(
             waypoints, length, self._limits, max_acceleration=acceleration, ends_in_motion=True
         )

@@ -77,11 +77,11 @@ class Connector:
         for vector in vectors:
             if len(vector) != joint_count or not math.isfinite(sum(vector)):
                 raise Fault(f"a motion needs states of {joint_count} finite numbers, not {vector}")
-        inputs, profile = self._inputs, Profile(joint_count)
+        inputs = self._inputs
         inputs.current_position, inputs.current_velocity, inputs.current_acceleration = vectors[:3]
         inputs.target_position, inputs.target_velocity, inputs.target_acceleration = vectors[3:]
         inputs.minimum_duration = min_duration
-        cause: str | None = None
+        profile = Profile(joint_count)
         try:
             result = self._ruckig.calculate(inputs, profile)
         except (RuckigError, ValueError) as error:
@@ -91,10 +91,10 @@ class Connector:
                 cause = str(result)
             elif np.any(_find_max_speeds(profile) > (1 + _RELATIVE_TOLERANCE) * self.limits.velocity):
                 cause = "the profile exceeds a velocity limit"
-        if cause is not None:
-            states = f"from {start.q.round(4)} to {end.q.round(4)} rad"
-            raise JointLimitError(f"ruckig finds no valid profile {states}: {cause}")
-        return PointToPoint(profile)
+            else:
+                return PointToPoint(profile)
+        states = f"from {start.q.round(4)} to {end.q.round(4)} rad"
+        raise JointLimitError(f"ruckig finds no valid profile {states}: {cause}")
 
 
 def _find_max_speeds(profile: Profile) -> Array:
@@ -150,18 +150,20 @@ class Trajectory:
         self.duration = self._end_times[-1]
         starts = [piece.state_at(0.0) for piece in pieces]
         ends = [piece.state_at(piece.duration) for piece in pieces]
-        self.start, self.end, self._end_state = starts[0].q, ends[-1].q, ends[-1]
-        rest_at_start, rest_at_end = JointState.at_rest(self.start), JointState.at_rest(self.end)
+        self.start = starts[0].q
+        self.end = ends[-1].q
+        self._end_state = ends[-1]
         # One operation for all pairs of states that must be equal: each piece starts where the last one ends.
-        differences = np.abs(np.subtract([rest_at_start, *ends], [*starts, rest_at_end])).max(axis=2)
+        states_before = [JointState.at_rest(self.start), *ends]
+        states_after = [*starts, JointState.at_rest(self.end)]
+        differences = np.abs(np.subtract(states_before, states_after)).max(axis=2)
         pair, quantity = np.unravel_index(np.argmax(differences), differences.shape)
         if not differences[pair, quantity] <= _MAX_STATE_DIFFERENCE:  # Also true for NaN.
             problems = {0: "the start is not at rest", len(pieces): "the end is not at rest"}
             problem = problems.get(int(pair), f"pieces {pair} and {pair + 1} do not meet")
-            difference = (
-                f"{('position', 'velocity', 'acceleration')[quantity]} differs by {differences.max():.2g}"
-            )
-            raise Fault(f"invalid trajectory: {problem}; the joint {difference}")
+            name = ("position", "velocity", "acceleration")[quantity]
+            difference = differences.max()
+            raise Fault(f"invalid trajectory: {problem}; the joint {name} differs by {difference:.2g}")
 
     def make_slower_copy(self, speed_factor: float) -> Trajectory:
         """Return a copy of the motion whose velocities are multiplied by `speed_factor`, 0 to 1."""
@@ -207,8 +209,9 @@ class Trajectory:
         for name, peaks in zip(("velocity", "acceleration", "jerk"), peak_fractions, strict=True):
             joint = np.argmax(peaks)
             if peaks[joint] > 1 + _MAX_STATE_DIFFERENCE:
-                factor = f"{peaks[joint]:.3f} times"
-                raise JointLimitError(f"the {name} of joint {joint + 1} would be {factor} its limit")
+                raise JointLimitError(
+                    f"the {name} of joint {joint + 1} would be {peaks[joint]:.3f} times its limit"
+                )
         return states
 
 
@@ -257,7 +260,8 @@ def downsample_path(qs: Array, max_spacing: float) -> Array:
 def sample_pieces(pieces: Sequence[MotionPiece], times: Array) -> JointState:
     """Return the states of consecutive pieces, each array `(N, n)`, at increasing `times` `(N,)` [s]."""
     end_times = [*accumulate(piece.duration for piece in pieces[:-1]), math.inf]
-    states, start_time = [JointState(*np.empty((3, 0, len(pieces[0].state_at(0.0).q))))], 0.0
+    states = [JointState(*np.empty((3, 0, len(pieces[0].state_at(0.0).q))))]
+    start_time = 0.0
     for piece, end_time in zip(pieces, end_times, strict=True):
         piece_times = times[(start_time <= times) & (times < end_time)] - start_time
         if len(piece_times):
@@ -296,13 +300,15 @@ def plan_braking(trajectory: Trajectory, start_time: float, limits: JointLimits)
     the stop limits of joint acceleration and jerk; if no candidate is within the limits, the candidate with
     the smallest excess. The braking begins at path time `start_time` [s].
     """
-    best_path_times, min_peak_fraction = np.array([start_time]), math.inf
+    best_path_times = np.array([start_time])
+    min_peak_fraction = math.inf
     for profile in _list_profiles(trajectory, start_time):
         peak_fraction = _compute_peak_fraction(trajectory, start_time, profile, limits)
         if peak_fraction <= 1.0:
             return profile.path_times
         if peak_fraction < min_peak_fraction:
-            best_path_times, min_peak_fraction = profile.path_times, peak_fraction
+            best_path_times = profile.path_times
+            min_peak_fraction = peak_fraction
     return best_path_times
 
 
@@ -342,9 +348,12 @@ def _make_profile(start_time: float, braking_time: float, ramp_fraction: float) 
     """Return the profile that brakes from full speed at `start_time` to rest within `braking_time` [s]."""
     inputs = InputParameter(1)
     inputs.control_interface = ControlInterface.Velocity
-    inputs.current_position, inputs.current_velocity, inputs.target_velocity = [start_time], [1.0], [0.0]
+    inputs.current_position = [start_time]
+    inputs.current_velocity = [1.0]
+    inputs.target_velocity = [0.0]
     deceleration = 1.0 / (braking_time * (1 - ramp_fraction))
-    inputs.max_acceleration, inputs.max_jerk = [deceleration], [deceleration / (braking_time * ramp_fraction)]
+    inputs.max_acceleration = [deceleration]
+    inputs.max_jerk = [deceleration / (braking_time * ramp_fraction)]
     profile = Profile(1)
     Ruckig(1).calculate(inputs, profile)
     times = (step * STEP for step in range(1, _count_steps(profile.duration) + 1))
@@ -362,5 +371,5 @@ def _compute_peak_fraction(
         accelerations.append(acceleration * rate**2 + velocity * rate_derivative)
     accelerations.append(np.zeros_like(accelerations[0]))
     jerks = np.diff(accelerations, axis=0) / STEP
-    fractions = np.abs(accelerations) / limits.stop_acceleration, np.abs(jerks) / limits.stop_jerk
+    fractions = (np.abs(accelerations) / limits.stop_acceleration, np.abs(jerks) / limits.stop_jerk)
     return float(max(map(np.max, fractions)))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 
 from executive.cell.config import CellConfig, ObjectConfig
+from executive.cell.objects import MIN_LIFT_ACCELERATION, SAFETY_FACTOR
 from executive.errors import InputError
 from executive.geometry import GRAVITY
 from executive.manipulation.tool_goals import MAX_ROLL_DISTANCE
@@ -15,7 +16,6 @@ from executive.mission.findings import Finding, make_error, make_warning, sugges
 from executive.mission.model.mission import Mission
 from executive.mission.model.values import Literal, LocatedName
 from executive.mission.parse.cell_file import CellFile
-from executive.motion.optimizer import MIN_LIFT_ACCELERATION, SAFETY_FACTOR
 from executive.tree.keys import Key
 
 _LIMIT_KEY = Key(doc="Maximum number of objects.", ge=1, value_type=int)
