@@ -94,9 +94,10 @@ class CellLocalizer:
         if not is_visible or any(bin.contains(position, BIN_THICKNESS) for bin in self.bins):
             return ""
         object_class = self.classes[detection.label]
-        return evidence.describe_size_contradiction(
-            detection, position, frame, object_class
-        ) or evidence.describe_top_contradiction(detection, position, frame, self.classes)
+        size_contradiction = evidence.describe_size_contradiction(detection, position, frame, object_class)
+        if size_contradiction:
+            return size_contradiction
+        return evidence.describe_top_contradiction(detection, position, frame, self.classes)
 
     def _find_height(self, detection: Detection, frame: Frame) -> float:
         """Return the height of the centre of a detected object [m].

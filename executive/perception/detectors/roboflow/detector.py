@@ -25,12 +25,13 @@ from executive.perception.detectors.detector_registry import (
     find_class_map_errors,
 )
 from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
-from executive.perception.detectors.roboflow.answers import read_answer, read_output
 from executive.perception.detectors.roboflow.inference_process import (
     KEY_VARIABLE,
     ApiKey,
     InferenceProcess,
     NoAnswer,
+    read_answer,
+    read_output,
 )
 from executive.perception.detectors.views import Region, remove_duplicates, search_regions
 
@@ -153,7 +154,9 @@ class RoboflowOptions(DetectorOptions):
 
 def _check_model(options: RoboflowOptions) -> OptionErrors:
     """Yield the first invalid option for requests to a model, with a message."""
-    api, model_id, parts = options.api, options.model_id, options.model_id.split("/")
+    api = options.api
+    model_id = options.model_id
+    parts = model_id.split("/")
     if unused_options := [name for name in WORKFLOW_OPTIONS if name in options.model_fields_set]:
         names = ", ".join(unused_options)
         yield unused_options[0], f"api: {api} does not use {names}; write api: workflow, or delete {names}"
@@ -245,14 +248,12 @@ class RoboflowDetector(ThreadedDetector):
 
     Args:
         config: Section of the detector in the cell file.
-        options: Options of this kind of detector.
         context: Parts of the cell and of the run that the detector uses.
-        key: API key of the user.
     """
 
-    def __init__(self, config: DetectorConfig, options: RoboflowOptions, context: DetectorContext) -> None:
+    def __init__(self, config: DetectorConfig, context: DetectorContext) -> None:
+        self._options = options = RoboflowOptions.read(config)
         super().__init__(config, context, options.deadline)
-        self._options = options
         self._read_answer = read_output if options.api == "workflow" else read_answer
         server = options.model_dump(include={"url", "model_id", "api", *WORKFLOW_OPTIONS})
         # A proxy cannot reach a server on this computer.
@@ -261,12 +262,8 @@ class RoboflowDetector(ThreadedDetector):
 
     @classmethod
     def from_config(cls, config: DetectorConfig, context: DetectorContext) -> RoboflowDetector:
-        """Return the detector for a section of a cell file, without a request and without an API key.
-
-        Raises:
-            InputError: An option is missing, unknown or invalid.
-        """
-        return cls(config, RoboflowOptions.read(config), context)
+        """Return the detector of a section of a cell file; raise InputError for a wrong option."""
+        return cls(config, context)
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
