@@ -69,6 +69,7 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
                 message = f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}'
                 yield ("arm", "poses_deg", name), message
     kinematics = build_planning_kinematics(config)
+    q_start = np.zeros(config.arm.joint_count)
     places: list[tuple[KeyPath, str, Array, float]] = [
         (("bins", name, "position"), f'the bin "{name}"', build_bin(name, bin).slots, bin.position[2])
         for name, bin in config.bins.items()
@@ -80,8 +81,6 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
         approach_height = max(0.0, compute_travel_height(config) - height)
         try:
             for x, y in positions.tolist():
-                find_configuration_pairs(
-                    kinematics, Goal((x, y, height)), approach_height, np.zeros(config.arm.joint_count)
-                )
+                find_configuration_pairs(kinematics, Goal((x, y, height)), approach_height, q_start)
         except Unreachable as error:
             yield key_path, f"{place_name} is out of reach: {error}"

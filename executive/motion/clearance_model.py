@@ -166,21 +166,18 @@ class ClearanceModel:
         min_slack = np.minimum(pair_slack, tilt_slack)
         return NearestPairs(min_slack, pair_slack, tilt_slack, distances, discs, near_prisms[prisms])
 
-    def compute_slack_changes(
-        self, pairs: NearestPairs, displaced_tcps: Array, displaced_axes: Array
-    ) -> Array:
+    def compute_slack_changes(self, pairs: NearestPairs, tcps: Array, axes: Array) -> Array:
         """Return the change of the slack of each state for each of `M` small displacements `(N, M)` [m].
 
         Args:
             pairs: Pairs of the states; for each state, only the slack of its pair or of its tilt counts.
-            displaced_tcps: Displaced tool centre points `(N, M, 3)` [m].
-            displaced_axes: Displaced tool axes `(N, M, 3)`.
+            tcps: Displaced tool centre points `(N, M, 3)` [m].
+            axes: Displaced tool axes `(N, M, 3)`.
         """
-        new_distances = self._compute_distances(
-            displaced_tcps, displaced_axes, pairs.disc_indices[:, None], pairs.prism_indices[:, None]
-        )
-        slack_change = new_distances - pairs.distances[:, None]
-        tilt_change = self._compute_tilt_slack(displaced_axes) - pairs.tilt_slack[:, None]
+        discs = pairs.disc_indices[:, None]
+        prisms = pairs.prism_indices[:, None]
+        slack_change = self._compute_distances(tcps, axes, discs, prisms) - pairs.distances[:, None]
+        tilt_change = self._compute_tilt_slack(axes) - pairs.tilt_slack[:, None]
         return np.where((pairs.tilt_slack < pairs.pair_slack)[:, None], tilt_change, slack_change)
 
     def require_clearance(self, tcps: Array, axes: Array) -> None:

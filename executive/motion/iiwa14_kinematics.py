@@ -120,16 +120,13 @@ class Iiwa14:
         return tcp.T, axis.T
 
     def find_branch(self, q: ArrayLike) -> BranchKey:
-        """Return the index of the flip, and the redundancy angle [rad]."""
+        """Return the index of the flip, and the redundancy angle [rad]; 0: elbow up."""
         is_flipped = np.asarray(q, dtype=float)[[1, 3, 5]] < 0  # shoulder, elbow, wrist
-        return int(is_flipped @ [4, 2, 1]), self.compute_redundancy_angle(q)
-
-    def compute_redundancy_angle(self, q: ArrayLike) -> float:
-        """Return the angle of the elbow about the line from shoulder to wrist [rad]; 0: elbow up."""
         frames = self.compute_joint_frames(q)
         shoulder, elbow, wrist = (frames[i].position for i in (1, 3, 5))
         _, up, side = _compute_elbow_frame(wrist - shoulder)
-        return math.atan2(float((elbow - shoulder) @ side), float((elbow - shoulder) @ up))
+        angle = math.atan2(float((elbow - shoulder) @ side), float((elbow - shoulder) @ up))
+        return int(is_flipped @ [4, 2, 1]), angle
 
     def solve(self, poses: Sequence[Pose], branch: BranchKey) -> Array:
         """Return the joint positions in one branch."""
@@ -139,7 +136,7 @@ class Iiwa14:
     def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
         """Return the solutions for all flips and evenly spaced redundancy angles, that of `q_seed` first."""
         offsets = np.radians(np.arange(0.0, 360.0, math.degrees(angle_step)))
-        angles = self.compute_redundancy_angle(q_seed) + offsets
+        angles = self.find_branch(q_seed)[1] + offsets
         solutions = self._solve_angles([X_WT], angles).reshape(-1, IIWA14_JOINT_COUNT)
         return Solutions(solutions, list(product(range(len(FLIPS)), angles.tolist())))
 
@@ -214,9 +211,8 @@ class Iiwa14:
         sines = np.sin(angles)
         joint_rotations = np.tile(np.eye(3), (len(angles), 1, 1))
         for parity in (0, 1):
-            _rotate(
-                joint_rotations[parity::2].transpose(1, 2, 0), cosines[parity::2], sines[parity::2], parity
-            )
+            joints = slice(parity, None, 2)
+            _rotate(joint_rotations[joints].transpose(1, 2, 0), cosines[joints], sines[joints], parity)
         for joint, R_joint in enumerate(joint_rotations):
             p = p + lengths.get(joint, 0.0) * R[:, 2]
             R = R @ R_joint

@@ -20,6 +20,7 @@ from executive.cell.objects import MIN_LIFT_ACCELERATION, SAFETY_FACTOR, Load
 from executive.cell.protocols import STEP
 from executive.geometry import GRAVITY, Array
 from executive.motion.clearance_model import ClearanceModel, NearestPairs
+from executive.motion.configurations import Candidate
 from executive.motion.joints import JointState, Kinematics
 from executive.motion.trajectory import Connector, JointLimitError, PointToPoint, Trajectory
 from executive.motion.transcription import (
@@ -135,20 +136,22 @@ class PayloadLimit:
 
 
 @dataclass(frozen=True, eq=False)
-class MotionConstraints:
-    """Constraints of all motions of a search.
+class MotionProblem:
+    """Start and constraints of all motions of a search.
 
     The slack of a state is the smallest of these margins: each clearance minus the required clearance [m],
     the maximum tilt of the tool minus its tilt as an equivalent distance [m], and the distance of each joint
     from its range limits [rad].
 
     Attributes:
+        start: State at the start of the free part.
         connector: Planner of motions between two states within the joint limits.
         kinematics: Kinematics of the arm.
         clearance: Model of the distances from the obstacles.
         payload: Acceleration limit due to the load, or None.
     """
 
+    start: JointState
     connector: Connector
     kinematics: Kinematics
     clearance: ClearanceModel
@@ -206,30 +209,26 @@ class Optimizer:
     """Optimizer of the motion between two states.
 
     Args:
-        constraints: Constraints of the motion.
-        start, end: States at the start and at the end of the motion.
-        initial_qs: Samples `(M, n)` [rad] of a motion that stops at via points, at `SAMPLE_FRACTIONS`.
+        problem: Start and constraints of the motion.
+        candidate: End of the motion.
+        qs: Samples `(M, n)` [rad] of a motion that stops at via points, at `SAMPLE_FRACTIONS`.
         duration: Duration of the motion that stops at via points [s].
 
     Attributes:
+        candidate: End of the motion.
         cost: Duration of the best motion, plus the cost of its violated constraints [s].
 
     Raises:
         JointLimitError: The initial motion cannot be approximated within the joint limits.
     """
 
-    def __init__(
-        self,
-        constraints: MotionConstraints,
-        start: JointState,
-        end: JointState,
-        initial_qs: Array,
-        duration: float,
-    ) -> None:
-        self._constraints = constraints
-        self._transcription = Transcription(start, end, constraints.connector.limits)
+    def __init__(self, problem: MotionProblem, candidate: Candidate, qs: Array, duration: float) -> None:
+        self.candidate = candidate
+        self._problem = problem
+        limits = problem.connector.limits
+        self._transcription = Transcription(problem.start, candidate.free_part_end, limits)
         for fraction in INITIAL_DURATION_FRACTIONS:
-            motion = self._transcription.fit(fraction * duration / STEP_COUNT, initial_qs)
+            motion = self._transcription.fit(fraction * duration / STEP_COUNT, qs)
             if motion is not None:
                 break
         else:
@@ -248,7 +247,7 @@ class Optimizer:
                 return
             samples = np.flatnonzero(self._nearest_pairs.slack < MAX_SLACK)
             pairs = self._nearest_pairs.select(samples)
-            gradients = self._constraints.compute_gradients(self._iterate.qs[samples], pairs)
+            gradients = self._problem.compute_gradients(self._iterate.qs[samples], pairs)
             distance_constraints = LinearizedConstraints(
                 pairs.slack, samples[:, None], gradients[:, None], np.zeros(len(samples))
             )
@@ -261,11 +260,11 @@ class Optimizer:
 
     def _set_iterate(self, motion: DiscreteMotion) -> None:
         self._iterate = motion
-        self._nearest_pairs = self._constraints.find_nearest_pairs(motion.qs)
+        self._nearest_pairs = self._problem.find_nearest_pairs(motion.qs)
         violations = [-float(self._nearest_pairs.slack.min())]
-        if self._constraints.payload is not None:
+        if self._problem.payload is not None:
             sample_time = motion.step_duration / SAMPLES_PER_STEP
-            constraints = self._constraints.payload.linearize(motion.qs, sample_time, MAX_SLACK)
+            constraints = self._problem.payload.linearize(motion.qs, sample_time, MAX_SLACK)
             violations.append(-float(constraints.slack.min(initial=MAX_SLACK)))
             self._payload_constraints = [constraints]
         cost = motion.duration + VIOLATION_COST * max(0.0, *violations)
@@ -286,7 +285,7 @@ class Optimizer:
         Raises:
             JointLimitError: No motion connects two of the states.
         """
-        connector = self._constraints.connector
+        connector = self._problem.connector
         states = []
         for state in self._transcription.compute_states(self._best_motion)[:: 1 if keeps_timing else 2]:
             # While an acceleration `a` falls to 0 with the maximum jerk `j`, it changes the velocity by

@@ -27,7 +27,7 @@ from executive.geometry import Array, Pose
 from executive.motion.arms import build_planning_kinematics
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import JointLimits, Kinematics
-from executive.motion.optimizer import MotionConstraints
+from executive.motion.optimizer import MotionProblem
 from executive.motion.search import MotionSearch
 from executive.motion.trajectory import JointLimitError, Trajectory, downsample_path
 from executive.processes import wait_until_done
@@ -72,18 +72,18 @@ class Planner:
         errors: list[str] = []
         for motion in search.plan_motions():
             try:
-                self._check_motion(motion, search.constraints, task)
+                self._check_motion(motion, search.problem, task)
             except (Blocked, Unreachable, JointLimitError) as error:
                 errors.append(str(error))
             else:
-                payload = search.constraints.payload
+                payload = search.problem.payload
                 return payload.make_safe_motion(motion) if payload else motion
         if not errors:
             raise Blocked("no motion inside the joint limits leads to the goal")
         summary = f"; all {len(errors)} motions that were tried are blocked" if len(errors) > 1 else ""
         raise Blocked(f"{errors[0]}{summary}")
 
-    def _check_motion(self, motion: Trajectory, constraints: MotionConstraints, task: Task) -> None:
+    def _check_motion(self, motion: Trajectory, problem: MotionProblem, task: Task) -> None:
         """Check joint limits and collisions of a motion.
 
         Raises:
@@ -94,7 +94,7 @@ class Planner:
         has_guarded_part = motion.guarded_start_time < math.inf
         # The first state always belongs to the free part, which therefore is never empty.
         free_qs = qs[: max(1, math.ceil(motion.guarded_start_time / STEP))] if has_guarded_part else qs
-        constraints.require_clearance(free_qs)
+        problem.require_clearance(free_qs)
         if self._check_collision is not None:
             free_path = downsample_path(free_qs, MAX_CHECK_SPACING)
             self._check_collision(free_path, _treat_target_as_obstacle(task))

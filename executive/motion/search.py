@@ -13,7 +13,7 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.layout import compute_travel_height
+from executive.cell.layout import Vector3, compute_travel_height
 from executive.cell.protocols import STEP
 from executive.errors import Unreachable
 from executive.geometry import Array, make_tool_down_pose
@@ -26,7 +26,7 @@ from executive.motion.configurations import (
     solve_vertical_waypoints,
 )
 from executive.motion.joints import BranchKey, JointLimits, JointState, Kinematics
-from executive.motion.optimizer import MotionConstraints, Optimizer, PayloadLimit
+from executive.motion.optimizer import MotionProblem, Optimizer, PayloadLimit
 from executive.motion.trajectory import Connector, JointLimitError, MotionPiece, Trajectory, sample_pieces
 from executive.motion.transcription import SAMPLE_FRACTIONS
 
@@ -64,7 +64,7 @@ class MotionSearch:
         task: Load and obstacles of the free part; `task.obstacles` includes the target.
 
     Attributes:
-        constraints: Constraints of the free part.
+        problem: Start and constraints of the free part.
     """
 
     def __init__(
@@ -95,19 +95,18 @@ class MotionSearch:
         clearance = ClearanceModel(config, task.obstacles, tcps[:, :2], discs)
         clearance.relax_end_margins(tcps, axes)
         payload = PayloadLimit(task.load, kinematics) if task.load else None
-        self._connector = Connector(limits)
-        self.constraints = MotionConstraints(self._connector, kinematics, clearance, payload)
+        self._departure = departure = self._plan_departure(start, float(tcps[0, 2]), payload)
+        free_start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
+        self.problem = MotionProblem(free_start, Connector(limits), kinematics, clearance, payload)
         # The motion up to a via point is the same for all candidates, and is planned once per height.
         self._get_rise = functools.cache(self._plan_rise)
-        self._departure = departure = self._plan_departure(start, float(tcps[0, 2]))
-        self._start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
 
     def plan_motions(self) -> Iterator[Trajectory]:
         """Plan and yield motions, the best first; motions that stop at via points are last."""
         if isinstance(self._end, Goal):
-            arrival_length = self._end.slow_length or self._straight_part_length
+            length = self._end.slow_length or self._straight_part_length
             all_candidates = find_candidates(
-                self._kinematics, self._limits, self._start, self._end, arrival_length
+                self._kinematics, self._limits, self.problem.start, self._end, length
             )
         else:
             all_candidates = iter([Candidate(0.0, JointState.at_rest(self._end), None, None)])
@@ -125,28 +124,60 @@ class MotionSearch:
     def _plan_direct_motions_and_detours(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
         """Plan and yield refined detours and collision-free direct motions, the fastest first."""
         motions, optimizers = self._evaluate_candidates(candidates)
-        next_costs = [*(self._compute_total_cost(*pair) for pair in optimizers), math.inf][1:]
-        deferred_optimizers: list[tuple[Candidate, Optimizer]] = []
-        for (candidate, optimizer), next_cost in zip(optimizers, next_costs, strict=True):
+        next_costs = [*map(self._compute_total_cost, optimizers), math.inf][1:]
+        deferred_optimizers: list[Optimizer] = []
+        for optimizer, next_cost in zip(optimizers, next_costs, strict=True):
             optimizer.improve(REFINEMENT_STEP_COUNT)
-            cost = self._compute_total_cost(candidate, optimizer)
+            cost = self._compute_total_cost(optimizer)
             while motions and motions[0][0] <= cost:
                 yield motions.pop(0)[1]
-            detours = list(self._build_detour(candidate, optimizer, keeps_timing=False))
+            detours = list(self._build_detour(optimizer, keeps_timing=False))
             if not detours or detours[0][0] > cost:
-                detours += self._build_detour(candidate, optimizer, keeps_timing=True)
+                detours += self._build_detour(optimizer, keeps_timing=True)
             else:
-                deferred_optimizers.append((candidate, optimizer))
+                deferred_optimizers.append(optimizer)
             motions = sorted([*motions, *detours], key=itemgetter(0))
             # A detour may take longer than estimated by its optimizer; then the next detour is refined first.
             while motions and motions[0][0] <= MAX_DURATION_FACTOR * next_cost:
                 yield motions.pop(0)[1]
         yield from (motion for _, motion in motions)
-        for candidate, optimizer in deferred_optimizers:
-            yield from (motion for _, motion in self._build_detour(candidate, optimizer, keeps_timing=True))
+        for optimizer in deferred_optimizers:
+            yield from (motion for _, motion in self._build_detour(optimizer, keeps_timing=True))
+
+    def _evaluate_candidates(
+        self, candidates: Sequence[Candidate]
+    ) -> tuple[list[tuple[float, Trajectory]], list[Optimizer]]:
+        """Return pairs `(duration [s], direct motion)` without collision, and optimizers for the others.
+
+        Both lists begin with the fastest motion.
+        """
+        direct_motions: list[tuple[float, Trajectory]] = []
+        optimizers: list[Optimizer] = []
+        for candidate in candidates:
+            costs = [duration for duration, _ in direct_motions]
+            costs += map(self._compute_total_cost, optimizers)
+            min_duration = self._compute_straight_duration(candidate) + candidate.min_duration
+            if min(costs, default=math.inf) <= min_duration:
+                break
+            with contextlib.suppress(JointLimitError, Unreachable):
+                free_part = self.problem.connector.connect(self.problem.start, candidate.free_part_end)
+                qs = free_part.sample(SAMPLE_FRACTIONS * free_part.duration).q
+                if self.problem.compute_slack(qs).min() >= 0:
+                    motion = self._build_motion(candidate, free_part)
+                    direct_motions.append((motion.duration, motion))
+                    continue
+                initial_guess = self._connect_by_via_points(candidate, EXTRA_HEIGHTS[0], prefers_lines=False)
+                duration = sum(piece.duration for piece in initial_guess)
+                qs = sample_pieces(initial_guess, SAMPLE_FRACTIONS * duration).q
+                optimizer = Optimizer(self.problem, candidate, qs, duration)
+                optimizer.improve(INITIAL_STEP_COUNT)
+                optimizers.append(optimizer)
+        direct_motions.sort(key=itemgetter(0))
+        optimizers.sort(key=self._compute_total_cost)
+        return direct_motions, optimizers
 
     def _build_detour(
-        self, candidate: Candidate, optimizer: Optimizer, *, keeps_timing: bool
+        self, optimizer: Optimizer, *, keeps_timing: bool
     ) -> Iterator[tuple[float, Trajectory]]:
         """Yield a detour as a pair `(duration [s], motion)`, unless it exceeds a joint limit.
 
@@ -155,48 +186,14 @@ class MotionSearch:
         the motion after its slowdown for the load; the returned motion is not slowed down yet.
         """
         with contextlib.suppress(JointLimitError):
-            motion = self._build_motion(candidate, *optimizer.connect_states(keeps_timing=keeps_timing))
-            payload = self.constraints.payload
+            free_part = optimizer.connect_states(keeps_timing=keeps_timing)
+            motion = self._build_motion(optimizer.candidate, *free_part)
+            payload = self.problem.payload
             yield (payload.make_safe_motion(motion) if payload else motion).duration, motion
 
-    def _evaluate_candidates(
-        self, candidates: Sequence[Candidate]
-    ) -> tuple[list[tuple[float, Trajectory]], list[tuple[Candidate, Optimizer]]]:
-        """Return pairs `(duration [s], direct motion)` and pairs `(candidate, optimizer)`.
-
-        The direct motions are free of collision; the optimizers plan detours to the other candidates. Both
-        lists begin with the fastest motion.
-        """
-        direct_motions: list[tuple[float, Trajectory]] = []
-        optimizers: list[tuple[Candidate, Optimizer]] = []
-        for candidate in candidates:
-            costs = [duration for duration, _ in direct_motions]
-            costs += [self._compute_total_cost(*pair) for pair in optimizers]
-            min_duration = self._compute_straight_duration(candidate) + candidate.min_duration
-            if min(costs, default=math.inf) <= min_duration:
-                break
-            start = self._start
-            end = candidate.free_part_end
-            with contextlib.suppress(JointLimitError, Unreachable):
-                free_part = self._connector.connect(start, end)
-                qs = free_part.sample(SAMPLE_FRACTIONS * free_part.duration).q
-                if self.constraints.compute_slack(qs).min() >= 0:
-                    motion = self._build_motion(candidate, free_part)
-                    direct_motions.append((motion.duration, motion))
-                    continue
-                initial_guess = self._connect_by_via_points(candidate, EXTRA_HEIGHTS[0], prefers_lines=False)
-                duration = sum(piece.duration for piece in initial_guess)
-                qs = sample_pieces(initial_guess, SAMPLE_FRACTIONS * duration).q
-                optimizer = Optimizer(self.constraints, start, end, qs, duration)
-                optimizer.improve(INITIAL_STEP_COUNT)
-                optimizers.append((candidate, optimizer))
-        direct_motions.sort(key=itemgetter(0))
-        optimizers.sort(key=lambda pair: self._compute_total_cost(*pair))
-        return direct_motions, optimizers
-
-    def _compute_total_cost(self, candidate: Candidate, optimizer: Optimizer) -> float:
+    def _compute_total_cost(self, optimizer: Optimizer) -> float:
         """Return the cost of a detour plus the duration of departure and arrival [s]."""
-        return optimizer.cost + self._compute_straight_duration(candidate)
+        return optimizer.cost + self._compute_straight_duration(optimizer.candidate)
 
     def _compute_straight_duration(self, candidate: Candidate) -> float:
         """Return the duration of departure and arrival [s]."""
@@ -231,7 +228,7 @@ class MotionSearch:
         """
         height = self._travel_height + extra_height
         end = candidate.free_part_end
-        connect = self._connector.connect
+        connect = self.problem.connector.connect
         rise, start_via_point = self._get_rise(height, prefers_lines)
         (x, y, z), _ = self._locate_tool(end.q)
         if candidate.branch is None or z >= height:
@@ -248,38 +245,37 @@ class MotionSearch:
 
         If the tool starts above `height` or does not point down, the via point is the start itself.
         """
-        q = self._start.q
+        q = self.problem.start.q
         (x, y, z), is_pointing_down = self._locate_tool(q)
         if not is_pointing_down or z >= height:
-            return [], self._start
+            return [], self.problem.start
         if prefers_lines and self._departure is None:
             waypoints = find_vertical_waypoints(self._kinematics, q, height - z)
             if waypoints is not None:
                 line = CartesianLine(waypoints, height - z, self._limits)
                 return [line], JointState.at_rest(waypoints[-1])
         via_point = self._solve_via_point((x, y, height), self._kinematics.find_branch(q), q)
-        return [self._connector.connect(self._start, via_point)], via_point
+        return [self.problem.connector.connect(self.problem.start, via_point)], via_point
 
     def _locate_tool(self, q: Array) -> tuple[Array, bool]:
         """Return the tool centre point `(3,)` [m] at `q` `(n,)` [rad], and True if the tool points down."""
         tcps, axes = self._kinematics.compute_tcps_and_axes(q[None])
         return tcps[0], bool(-axes[0, 2] > MIN_RISE_COSINE)
 
-    def _solve_via_point(
-        self, position: tuple[float, float, float], branch: BranchKey, q_seed: Array
-    ) -> JointState:
+    def _solve_via_point(self, position: Vector3, branch: BranchKey, q_seed: Array) -> JointState:
         """Return the state of rest at a via point [m], with the last joint as in `q_seed` `(n,)` [rad]."""
         (q,) = self._kinematics.solve([make_tool_down_pose(position)], branch)
         q[-1] = q_seed[-1]
         return JointState.at_rest(q)
 
-    def _plan_departure(self, start: Array, height: float) -> CartesianLine | None:
+    def _plan_departure(
+        self, start: Array, height: float, payload: PayloadLimit | None
+    ) -> CartesianLine | None:
         """Return the straight motion upwards from the start, or None if the free part begins at the start.
 
         The cell file may require a straight departure. If the seal of a load permits less acceleration than
         the joints, the load also departs straight, because contact with the support could break the seal.
         """
-        payload = self.constraints.payload
         length = self._straight_part_length or (LIFT_OFF_DISTANCE if payload else 0.0)
         if not length or height + length > self._travel_height:
             return None

@@ -127,9 +127,8 @@ class Transcription:
         quadratic = np.pad(np.append(velocity_ends, jerk_ends), (acceleration_count, 0))
         bound = np.zeros((4, len(linear)))
         bound[2, :acceleration_count] = self._max_inner_accelerations
-        bound[1, acceleration_count:-jerk_count] = np.repeat(
-            velocity_fraction * limits.velocity, velocity_count
-        )
+        max_velocity = velocity_fraction * limits.velocity
+        bound[1, acceleration_count:-jerk_count] = np.repeat(max_velocity, velocity_count)
         bound[3, -jerk_count:] = np.repeat(jerk_fraction * limits.jerk, STEP_COUNT)
         final_bound = np.zeros((4, 2 * limits.joint_count))
         final_bound[0, limits.joint_count :] = end.q - start.q
@@ -152,17 +151,13 @@ class Transcription:
 
     def fit(self, step: float, qs: Array) -> DiscreteMotion | None:
         """Return the motion with time steps of `step` [s] that is nearest to `qs` `(M, n)` [rad], or None."""
+        start = self._start
         inner_count = self._inner_count
         sample_map = self._matrices.sample_map
         position_map = sample_map[:, 1:-1]
-        boundary_terms = np.outer(sample_map[:, 0], self._start.qdd) + np.outer(
-            sample_map[:, -1], self._end.qdd
-        )
-        residual = (
-            qs
-            - self._start.q
-            - (np.outer(self._matrices.sample_times, self._start.qd * step) + step**2 * boundary_terms)
-        )
+        quadratic = np.outer(sample_map[:, 0], start.qdd) + np.outer(sample_map[:, -1], self._end.qdd)
+        boundary_terms = np.outer(self._matrices.sample_times, start.qd * step) + step**2 * quadratic
+        residual = qs - start.q - boundary_terms
         hessian = self._matrices.hessian.copy()
         scale = self._max_inner_accelerations * step**2
         squares = np.kron(np.eye(len(self._max_acceleration)), position_map.T @ position_map)

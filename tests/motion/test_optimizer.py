@@ -9,7 +9,8 @@ from joint_states import LIMITS, positions
 from executive.cell.objects import Obstacle
 from executive.geometry import Array, make_tool_down_pose
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
-from executive.motion.optimizer import MotionConstraints
+from executive.motion.joints import JointState
+from executive.motion.optimizer import MotionProblem
 
 POST = Obstacle(0.5, 0.0, 0.04, 0.22, "the post")
 LEFT = (0.5, -0.2, 0.12)
@@ -24,14 +25,14 @@ def over_the_post(config, kinematics, connector):
     start, _ = kinematics.solve(poses, (branch, 0.0))
     discs = make_tool_discs(config, None)
     clearance = ClearanceModel(config, (POST,), np.array([LEFT[:2], RIGHT[:2]]), discs)
-    return start, MotionConstraints(connector, kinematics, clearance)
+    return MotionProblem(JointState.at_rest(start), connector, kinematics, clearance)
 
 
 @given(positions, st.floats(0, 1))
 @settings(max_examples=60)
 def test_slopes_are_the_derivatives_of_slack_by_the_joints(over_the_post, q: Array, share: float) -> None:
-    start, problem = over_the_post
-    qs = (start + share * (q - start))[None]
+    problem = over_the_post
+    qs = (problem.start.q + share * (q - problem.start.q))[None]
     h = 1e-5
     here = problem.compute_slack(qs)
     found = problem.compute_gradients(qs, problem.find_nearest_pairs(qs))[0]
@@ -42,8 +43,8 @@ def test_slopes_are_the_derivatives_of_slack_by_the_joints(over_the_post, q: Arr
 
 
 def test_near_a_joints_limit_that_is_what_slack_and_slopes_tell(over_the_post) -> None:
-    start, problem = over_the_post
-    qs = start[None].copy()
+    problem = over_the_post
+    qs = problem.start.q[None].copy()
     qs[0, 6] = -LIMITS.position.upper[6] + 0.003
     slack = problem.compute_slack(qs)
     assert slack[0] == pytest.approx(0.003 - 0.01)

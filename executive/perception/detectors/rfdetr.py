@@ -24,11 +24,7 @@ from pydantic import Field
 from executive.cell.config import DetectorConfig
 from executive.cell.frame import Box, Detection
 from executive.errors import InputError, Unavailable
-from executive.perception.detectors.detector_registry import (
-    DetectorOptions,
-    OptionErrors,
-    find_class_map_errors,
-)
+from executive.perception.detectors.detector_registry import DetectorOptions, OptionErrors
 from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
 from executive.perception.detectors.views import Region, remove_duplicates, search_regions
 from executive.perception.envelope import is_measured
@@ -285,7 +281,7 @@ class RfdetrDetector(ThreadedDetector):
         except InputError as error:
             yield "labels", str(error)
             return
-        errors = list(find_class_map_errors(config, options.class_map, names))
+        errors = list(options.find_class_map_errors(config, options.class_map, names))
         yield from errors
         if not errors and path.is_file() and not is_measured(path, base):
             for message in find_model_errors(path, names, path.stat().st_mtime_ns):

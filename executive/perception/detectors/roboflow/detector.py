@@ -19,11 +19,7 @@ from pydantic import Field
 from executive.cell.config import DetectorConfig
 from executive.cell.frame import Detection
 from executive.errors import DeadlinePassed, InputError, Unavailable
-from executive.perception.detectors.detector_registry import (
-    DetectorOptions,
-    OptionErrors,
-    find_class_map_errors,
-)
+from executive.perception.detectors.detector_registry import DetectorOptions, OptionErrors
 from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
 from executive.perception.detectors.roboflow.inference_process import (
     KEY_VARIABLE,
@@ -149,7 +145,7 @@ class RoboflowOptions(DetectorOptions):
         yield from _check_url(options.url)
         yield from _check_workflow(options) if options.api == "workflow" else _check_model(options)
         if options.labels:
-            yield from find_class_map_errors(config, options.class_map, options.labels)
+            yield from cls.find_class_map_errors(config, options.class_map, options.labels)
 
 
 def _check_model(options: RoboflowOptions) -> OptionErrors:
