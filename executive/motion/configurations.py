@@ -223,12 +223,12 @@ class CartesianLine:
         self.duration: float = self._profile.duration
 
     def state_at(self, time: float) -> JointState:
-        """Return the state at `time`, 0 to `duration` [s]."""
+        """Return the state at `time`."""
         (distance,), (speed,), (acceleration,) = self._profile.at_time(time)
         return self._compute_state(distance, speed, acceleration)
 
     def sample(self, times: Array) -> JointState:
-        """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
+        """Return the states at `times`."""
         samples = np.array([self._profile.at_time(time) for time in times.tolist()])[:, :, 0].T
         return self._compute_state(samples[0], *samples[1:, :, None])
 

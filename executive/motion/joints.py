@@ -75,9 +75,8 @@ class JointLimits:
     @staticmethod
     def from_config(config: LimitsConfig) -> JointLimits:
         """Return the limits of a cell file."""
-        lower, upper = np.radians(config.position_ranges_deg).T
         return JointLimits(
-            position=JointRange(lower, upper),
+            position=JointRange(*np.radians(config.position_ranges_deg).T),
             velocity=np.radians(config.velocity_deg),
             acceleration=np.array(config.acceleration),
             jerk=np.array(config.jerk),

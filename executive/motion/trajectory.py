@@ -30,10 +30,39 @@ from executive.geometry import Array
 from executive.motion.joints import JointLimits, JointState
 
 _RELATIVE_TOLERANCE = 1e-9  # fraction of a limit
+_MAX_STATE_DIFFERENCE = 1e-6
+"""Maximum difference of joint states that count as equal [rad, rad/s, rad/s²]."""
+MIN_BRAKING_TIME = 0.02
+"""Shortest time from full speed to rest [s]."""
+MAX_BRAKING_TIME = 0.5
+"""Longest time from full speed to rest [s]."""
+RETREAT_TIME = 0.15
+"""Path time before a collision to which the arm moves back after the collision [s]."""
+MAX_RETREAT_RATE = 0.75
+"""Largest rate at which the arm moves back, as a fraction of the speed of the planned motion."""
+_STEP_COUNT_ROUNDING = 1e-9  # fraction of a control period
+_BRAKING_TIMES = np.geomspace(MIN_BRAKING_TIME, MAX_BRAKING_TIME, 18)
+"""Candidates for the time from full speed to rest, the shortest first [s]."""
+_RAMP_FRACTIONS = (1 / 2, 1 / 3)
+"""Candidates for the duration of each ramp of the deceleration, as fractions of the braking time."""
 
 
 class JointLimitError(ValueError):
     """No motion within the joint limits exists, or a motion exceeds a limit."""
+
+
+class MotionPiece(Protocol):
+    """A piece of a motion, from time 0 to its duration."""
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+
+    def state_at(self, time: float) -> JointState:
+        """Return the state at `time`, 0 to `duration` [s]."""
+
+    def sample(self, times: Array) -> JointState:
+        """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
 
 
 class PointToPoint:
@@ -44,11 +73,11 @@ class PointToPoint:
         self.duration: float = profile.duration
 
     def state_at(self, time: float) -> JointState:
-        """Return the state at `time`, 0 to `duration` [s]."""
+        """Return the state at `time`."""
         return JointState(*map(np.array, self._profile.at_time(time)))
 
     def sample(self, times: Array) -> JointState:
-        """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
+        """Return the states at `times`."""
         return JointState(*np.array([self._profile.at_time(time) for time in times.tolist()]).swapaxes(0, 1))
 
 
@@ -111,24 +140,6 @@ def _find_max_speeds(profile: Profile) -> Array:
     return np.array(max_speeds)
 
 
-_MAX_STATE_DIFFERENCE = 1e-6
-"""Maximum difference of joint states that count as equal [rad, rad/s, rad/s²]."""
-
-
-class MotionPiece(Protocol):
-    """A piece of a motion, from time 0 to its duration."""
-
-    @property
-    def duration(self) -> float:
-        """Duration [s]."""
-
-    def state_at(self, time: float) -> JointState:
-        """Return the state at `time`, 0 to `duration` [s]."""
-
-    def sample(self, times: Array) -> JointState:
-        """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
-
-
 class Trajectory:
     """A motion of `n` joints, at rest at both ends; implements `executive.cell.arm.Motion`.
 
@@ -162,8 +173,7 @@ class Trajectory:
             problems = {0: "the start is not at rest", len(pieces): "the end is not at rest"}
             problem = problems.get(int(pair), f"pieces {pair} and {pair + 1} do not meet")
             name = ("position", "velocity", "acceleration")[quantity]
-            difference = differences.max()
-            raise Fault(f"invalid trajectory: {problem}; the joint {name} differs by {difference:.2g}")
+            raise Fault(f"invalid trajectory: {problem}; the joint {name} differs by {differences.max():.2g}")
 
     def make_slower_copy(self, speed_factor: float) -> Trajectory:
         """Return a copy of the motion whose velocities are multiplied by `speed_factor`, 0 to 1."""
@@ -215,15 +225,17 @@ class Trajectory:
         return states
 
 
-def compute_peak_fractions(states: JointState, limits: JointLimits) -> Array:
-    """Return the largest velocity, acceleration and jerk of each joint as fractions of the limits `(3, n)`.
-
-    `states` are the samples of a motion. The jerk before the last sample is ignored, because the last
-    interval is shorter than a control period.
-    """
-    jerk = np.diff(states.qdd, axis=0)[:-1] / STEP
-    fractions = (states.qd / limits.velocity, states.qdd / limits.acceleration, jerk / limits.jerk)
-    return np.array([np.abs(values).max(axis=0, initial=0.0) for values in fractions])
+def sample_pieces(pieces: Sequence[MotionPiece], times: Array) -> JointState:
+    """Return the states of consecutive pieces, each array `(N, n)`, at increasing `times` `(N,)` [s]."""
+    end_times = [*accumulate(piece.duration for piece in pieces[:-1]), math.inf]
+    states = [JointState(*np.empty((3, 0, len(pieces[0].state_at(0.0).q))))]
+    start_time = 0.0
+    for piece, end_time in zip(pieces, end_times, strict=True):
+        piece_times = times[(start_time <= times) & (times < end_time)] - start_time
+        if len(piece_times):
+            states.append(piece.sample(piece_times))
+        start_time = end_time
+    return JointState(*map(np.concatenate, zip(*states, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,6 +259,17 @@ class _SlowPiece:
         return JointState(state.q, self.speed_factor * state.qd, self.speed_factor**2 * state.qdd)
 
 
+def compute_peak_fractions(states: JointState, limits: JointLimits) -> Array:
+    """Return the largest velocity, acceleration and jerk of each joint as fractions of the limits `(3, n)`.
+
+    `states` are the samples of a motion. The jerk before the last sample is ignored, because the last
+    interval is shorter than a control period.
+    """
+    jerk = np.diff(states.qdd, axis=0)[:-1] / STEP
+    fractions = (states.qd / limits.velocity, states.qdd / limits.acceleration, jerk / limits.jerk)
+    return np.array([np.abs(values).max(axis=0, initial=0.0) for values in fractions])
+
+
 def downsample_path(qs: Array, max_spacing: float) -> Array:
     """Return points of a path `(N, n)` [rad], between which joints move by up to `max_spacing` [rad]."""
     indices = [0]
@@ -255,34 +278,6 @@ def downsample_path(qs: Array, max_spacing: float) -> Array:
         if max(abs(a - b) for a, b in zip(points[index + 1], points[indices[-1]], strict=True)) > max_spacing:
             indices.append(index)
     return qs[[*indices, len(qs) - 1]]
-
-
-def sample_pieces(pieces: Sequence[MotionPiece], times: Array) -> JointState:
-    """Return the states of consecutive pieces, each array `(N, n)`, at increasing `times` `(N,)` [s]."""
-    end_times = [*accumulate(piece.duration for piece in pieces[:-1]), math.inf]
-    states = [JointState(*np.empty((3, 0, len(pieces[0].state_at(0.0).q))))]
-    start_time = 0.0
-    for piece, end_time in zip(pieces, end_times, strict=True):
-        piece_times = times[(start_time <= times) & (times < end_time)] - start_time
-        if len(piece_times):
-            states.append(piece.sample(piece_times))
-        start_time = end_time
-    return JointState(*map(np.concatenate, zip(*states, strict=True)))
-
-
-MIN_BRAKING_TIME = 0.02
-"""Shortest time from full speed to rest [s]."""
-MAX_BRAKING_TIME = 0.5
-"""Longest time from full speed to rest [s]."""
-RETREAT_TIME = 0.15
-"""Path time before a collision to which the arm moves back after the collision [s]."""
-MAX_RETREAT_RATE = 0.75
-"""Largest rate at which the arm moves back, as a fraction of the speed of the planned motion."""
-_STEP_COUNT_ROUNDING = 1e-9  # fraction of a control period
-_BRAKING_TIMES = np.geomspace(MIN_BRAKING_TIME, MAX_BRAKING_TIME, 18)
-"""Candidates for the time from full speed to rest, the shortest first [s]."""
-_RAMP_FRACTIONS = (1 / 2, 1 / 3)
-"""Candidates for the duration of each ramp of the deceleration, as fractions of the braking time."""
 
 
 class _BrakingProfile(NamedTuple):

@@ -117,18 +117,17 @@ class Transcription:
         # fix the final state.
         half_step_map = matrices.half_step_map
         velocity_count = len(half_step_map)
-        acceleration_count = self._inner_count
         jerk_count = limits.joint_count * STEP_COUNT
         jerk_ends = np.zeros((limits.joint_count, STEP_COUNT))
         jerk_ends[:, 0] = -start.qdd
         jerk_ends[:, -1] = end.qdd
         velocity_ends = np.outer(start.qdd, half_step_map[:, 0]) + np.outer(end.qdd, half_step_map[:, -1])
-        linear = np.pad(np.repeat(start.qd, velocity_count), (acceleration_count, jerk_count))
-        quadratic = np.pad(np.append(velocity_ends, jerk_ends), (acceleration_count, 0))
+        linear = np.pad(np.repeat(start.qd, velocity_count), (self._inner_count, jerk_count))
+        quadratic = np.pad(np.append(velocity_ends, jerk_ends), (self._inner_count, 0))
         bound = np.zeros((4, len(linear)))
-        bound[2, :acceleration_count] = self._max_inner_accelerations
+        bound[2, : self._inner_count] = self._max_inner_accelerations
         max_velocity = velocity_fraction * limits.velocity
-        bound[1, acceleration_count:-jerk_count] = np.repeat(max_velocity, velocity_count)
+        bound[1, self._inner_count : -jerk_count] = np.repeat(max_velocity, velocity_count)
         bound[3, -jerk_count:] = np.repeat(jerk_fraction * limits.jerk, STEP_COUNT)
         final_bound = np.zeros((4, 2 * limits.joint_count))
         final_bound[0, limits.joint_count :] = end.q - start.q

@@ -172,13 +172,13 @@ def compute_projection_matrix(matrix: Array, region: Box) -> tuple[float, ...]:
     The clipping planes are at `NEAR_PLANE` and `FAR_PLANE`.
     """
     near = NEAR_PLANE
-    far = FAR_PLANE
     # Sides of the region in the near plane [m], in OpenGL's camera frame.
     left, right = ((x - matrix[0, 2]) / matrix[0, 0] * near for x in region[::2])
     top, bottom = ((matrix[1, 2] - y) / matrix[1, 1] * near for y in region[1::2])
     x_row = [2 * near / (right - left), 0.0, (right + left) / (right - left), 0.0]
     y_row = [0.0, 2 * near / (top - bottom), (top + bottom) / (top - bottom), 0.0]
-    depth_row = [0.0, 0.0, -(far + near) / (far - near), -2 * far * near / (far - near)]
+    depth = FAR_PLANE - near
+    depth_row = [0.0, 0.0, -(FAR_PLANE + near) / depth, -2 * FAR_PLANE * near / depth]
     return tuple(np.array([x_row, y_row, depth_row, [0.0, 0.0, -1.0, 0.0]]).T.ravel().tolist())
 
 

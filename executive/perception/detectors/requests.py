@@ -162,10 +162,10 @@ class ThreadedDetector:
         regions = self._list_regions(view, frame.image.shape[1::-1])
         future = self._thread.submit(lambda: self._search(frame.image, regions))
         clock = self._context.clock
-        config = self._config
-        due_time = clock.now + config.latency
+        due_time = clock.now + self._config.latency
         expiry_time = clock.now + self._timeout
-        return PendingSearch(future, due_time, clock, self._context.name, config.error_rates, expiry_time)
+        error_rates = self._config.error_rates
+        return PendingSearch(future, due_time, clock, self._context.name, error_rates, expiry_time)
 
     def close(self) -> None:
         """End the thread after the running search; cancel all searches that have not started."""
