@@ -128,7 +128,6 @@ def estimate_offset(frame: Frame, bins: Sequence[Bin]) -> CameraOffset | None:
 
 
 def _make_camera_offset(fit: PoseFit, frame: Frame, bins: Sequence[Bin]) -> CameraOffset:
-    """Return the camera offset that corresponds to a fitted pose."""
     samples = fit.samples
     expected_pixels = project(frame.matrix, frame.X_WC, samples.world_points)
     distances = np.linalg.norm(samples.pixels - expected_pixels, axis=1)

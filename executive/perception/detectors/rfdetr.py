@@ -149,7 +149,6 @@ def _shorten(error: Exception) -> str:
 
 
 def _explain_load_error(path: Path, error: Exception) -> str:
-    """Return why a file is no model, and what to do."""
     content = path.read_bytes() if path.is_file() else b""
     if content.startswith(b"version https://git-lfs"):
         return "it is a pointer of Git LFS; fetch the file with `git lfs pull`"

@@ -149,7 +149,6 @@ class RoboflowOptions(DetectorOptions):
 
 
 def _check_model(options: RoboflowOptions) -> OptionErrors:
-    """Yield the first invalid option for requests to a model, with a message."""
     api = options.api
     model_id = options.model_id
     parts = model_id.split("/")
@@ -166,7 +165,6 @@ def _check_model(options: RoboflowOptions) -> OptionErrors:
 
 
 def _check_workflow(options: RoboflowOptions) -> OptionErrors:
-    """Yield each invalid option for requests to a workflow, with a message."""
     names = {"workspace": options.workspace, "workflow_id": options.workflow_id}
     for option, name in names.items():
         if not name:
