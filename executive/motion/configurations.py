@@ -12,7 +12,7 @@ The limits of `v`, `a` and `j` keep every joint within its limits on the whole l
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,16 +22,7 @@ from ruckig import Trajectory as Profile
 from executive.cell.arm import Goal
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose, make_tool_down_pose
-from executive.motion.joints import (
-    BranchKey,
-    JointLimits,
-    JointRange,
-    JointState,
-    Kinematics,
-    Solutions,
-    compute_min_time,
-    wrap_angles,
-)
+from executive.motion.joints import BranchKey, JointLimits, JointRange, JointState, Kinematics, wrap_angles
 
 PREFERRED_LIMIT_DISTANCE = math.radians(1.0)
 """Preferred minimum distance of joint positions from their limits [rad]."""
@@ -86,7 +77,7 @@ def find_configuration_pairs(
         if is_inside.any():
             branches = tuple(lower.branches[index] for index in np.flatnonzero(is_inside))
             return ConfigurationPairs(upper.qs[is_inside], lower.qs[is_inside], branches)
-    raise _make_unreachable_error(kinematics, poses, (upper, lower))
+    raise _make_unreachable_error(kinematics, poses, (upper.qs, lower.qs))
 
 
 def find_vertical_waypoints(kinematics: Kinematics, q: Array, length: float) -> Array | None:
@@ -145,13 +136,13 @@ def _turn_last_joint(
 
 
 def _make_unreachable_error(
-    kinematics: Kinematics, poses: list[Pose], end_solutions: tuple[Solutions, Solutions]
+    kinematics: Kinematics, poses: list[Pose], qs_by_pose: Sequence[Array]
 ) -> Unreachable:
     """Return the error for the first pose whose solutions all exceed the joint range.
 
     If each pose has a solution, the error states that no branch contains solutions of both poses.
     """
-    for pose, (qs, _) in zip(poses, end_solutions, strict=True):
+    for pose, qs in zip(poses, qs_by_pose, strict=True):
         x, y, z = pose.position
         if not np.any(kinematics.joint_range.contains(qs)):
             excess = kinematics.joint_range.compute_excess(qs)
@@ -343,3 +334,22 @@ def find_candidates(
             arrival = CartesianLine(waypoints, length, limits, goal.guarded_speed, starts_in_motion=True)
             free_part_end = arrival.state_at(0.0)
         yield Candidate(float(durations[index]), free_part_end, arrival, branch)
+
+
+def compute_min_time(displacement: Array, limits: JointLimits) -> Array:
+    """Return the minimum time `(...)` [s] of a motion from rest to rest by `displacement` `(..., n)` [rad].
+
+    Each joint has the symmetric seven-phase profile of limited jerk, and the slowest joint determines the
+    time. A long profile reaches the maximum velocity `v`; a medium profile reaches only the maximum
+    acceleration `a`; a short profile reaches only the maximum jerk `j`.
+    """
+    d = np.abs(displacement)
+    v = limits.velocity
+    a = limits.acceleration
+    j = limits.jerk
+    jerk_time = a / j  # [s] from zero to the maximum acceleration
+    ramp_time = np.where(v >= a * jerk_time, v / a + jerk_time, 2 * np.sqrt(v / j))  # [s] to maximum velocity
+    medium_time = jerk_time + np.sqrt(jerk_time**2 + 4 * d / a)
+    short_time = 4 * np.cbrt(d / 2 / j)
+    time_below_max_velocity = np.where(d >= 2 * a * jerk_time**2, medium_time, short_time)
+    return np.max(np.where(d >= v * ramp_time, d / v + ramp_time, time_below_max_velocity), axis=-1)

@@ -1,4 +1,4 @@
-"""Joints of an arm: state, range, limits, the minimum time of a motion, and the protocol of kinematics."""
+"""Joints of an arm: state, range, limits, and the protocol of kinematics."""
 
 from __future__ import annotations
 
@@ -12,6 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from executive.cell.device_config import LimitsConfig
 from executive.geometry import Array, Pose
+
+BranchKey = tuple[float, ...]
+"""Key of a branch of the inverse kinematics; the meaning of the numbers depends on the arm.
+
+In each branch, a tool pose has at most one solution, and a short path of the tool has continuous solutions.
+"""
 
 
 class JointState(NamedTuple):
@@ -88,32 +94,6 @@ class JointLimits:
     def joint_count(self) -> int:
         """Number of joints, `n`."""
         return len(self.velocity)
-
-
-def compute_min_time(displacement: Array, limits: JointLimits) -> Array:
-    """Return the minimum time `(...)` [s] of a motion from rest to rest by `displacement` `(..., n)` [rad].
-
-    Each joint has the symmetric seven-phase profile of limited jerk, and the slowest joint determines the
-    time. A long profile reaches the maximum velocity `v`; a medium profile reaches only the maximum
-    acceleration `a`; a short profile reaches only the maximum jerk `j`.
-    """
-    d = np.abs(displacement)
-    v = limits.velocity
-    a = limits.acceleration
-    j = limits.jerk
-    jerk_time = a / j  # [s] from zero to the maximum acceleration
-    ramp_time = np.where(v >= a * jerk_time, v / a + jerk_time, 2 * np.sqrt(v / j))  # [s] to maximum velocity
-    medium_time = jerk_time + np.sqrt(jerk_time**2 + 4 * d / a)
-    short_time = 4 * np.cbrt(d / 2 / j)
-    time_below_max_velocity = np.where(d >= 2 * a * jerk_time**2, medium_time, short_time)
-    return np.max(np.where(d >= v * ramp_time, d / v + ramp_time, time_below_max_velocity), axis=-1)
-
-
-BranchKey = tuple[float, ...]
-"""Key of a branch of the inverse kinematics; the meaning of the numbers depends on the arm.
-
-In each branch, a tool pose has at most one solution, and a short path of the tool has continuous solutions.
-"""
 
 
 class Solutions(NamedTuple):

@@ -61,18 +61,17 @@ class PayloadLimit:
 
     The force on the seal is `m |a + g|`, with the mass `m` of the load, the acceleration `a` of its centre,
     and `g` = 9.81 m/s² upwards.
+
+    Attributes:
+        max_lift_acceleration: Maximum upward acceleration [m/s²].
     """
 
     def __init__(self, load: Load, kinematics: Kinematics) -> None:
         # Maximum of |a + g| [m/s²].
         self._max_specific_force = load.holding_force / SAFETY_FACTOR / load.object_class.mass
+        self.max_lift_acceleration = max(self._max_specific_force - GRAVITY, MIN_LIFT_ACCELERATION)
         self._centre_offset = load.object_class.height / 2
         self._kinematics = kinematics
-
-    @property
-    def max_lift_acceleration(self) -> float:
-        """Maximum upward acceleration [m/s²]."""
-        return max(self._max_specific_force - GRAVITY, MIN_LIFT_ACCELERATION)
 
     def find_acceleration_fraction(self, trajectory: Trajectory) -> float:
         """Return the largest factor, 0 to 1, on the accelerations with which the safety factor holds."""

@@ -199,9 +199,9 @@ def is_measured(weights: Path, folder: Path) -> bool:
 
 def format_measurements(measurements: Iterable[Measurement], new: Measurement) -> str:
     """Return the text of a measurement file in which `new` replaces the measurement of its detector."""
-    by_detector = {measurement.detector: measurement for measurement in (*measurements, new)}
-    ordered = tuple(by_detector[name] for name in sorted(by_detector))
-    content = MeasurementFile(measurements=ordered).model_dump(mode="json")
+    others = [measurement for measurement in measurements if measurement.detector != new.detector]
+    ordered = sorted((*others, new), key=lambda measurement: measurement.detector)
+    content = MeasurementFile(measurements=tuple(ordered)).model_dump(mode="json")
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
 
 

@@ -28,8 +28,12 @@ from executive.cell.layout import compute_travel_height
 from executive.cell.protocols import STEP
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
-from executive.motion.configurations import find_configuration_pairs, find_vertical_waypoints
-from executive.motion.joints import JointLimits, JointState, Kinematics, compute_min_time
+from executive.motion.configurations import (
+    compute_min_time,
+    find_configuration_pairs,
+    find_vertical_waypoints,
+)
+from executive.motion.joints import JointLimits, JointState, Kinematics
 from executive.motion.planner import Planner
 from executive.motion.trajectory import Connector, Trajectory, compute_peak_fractions, plan_braking
 from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world

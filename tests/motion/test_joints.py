@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, shares
 
-from executive.motion.joints import JointLimits, JointState, compute_min_time
+from executive.motion.configurations import compute_min_time
+from executive.motion.joints import JointLimits, JointState
 from executive.motion.trajectory import Connector
 
 CONNECTOR = Connector(LIMITS)

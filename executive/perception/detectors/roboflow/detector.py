@@ -123,13 +123,6 @@ class RoboflowOptions(DetectorOptions):
         note = f", through the proxy in {parts.scheme.upper()}_PROXY or ALL_PROXY (see NO_PROXY),"
         return f"{origin}{note}" if select_proxy(self.url, get_environ_proxies(self.url)) else origin
 
-    @property
-    def model_or_workflow(self) -> str:
-        """Kind and name of the model or the workflow, for messages."""
-        if self.api == "workflow":
-            return f"workflow {self.workspace}/{self.workflow_id}"
-        return f"model {self.model_id}"
-
     @classmethod
     def find_errors(cls, config: DetectorConfig) -> OptionErrors:
         """Yield each invalid option in the section `config`, with an error message."""
@@ -225,9 +218,12 @@ def describe_invalid_answer(problem: str, options: RoboflowOptions) -> str:
 def _fill_in(template: tuple[str, str], options: RoboflowOptions) -> tuple[str, str]:
     """Return failure and advice of a template, with the names of model, workflow and options inserted."""
     problem, advice = template
-    problem = problem.format(model=options.model_or_workflow, output=options.workflow_output)
-    names = "workspace and workflow_id" if options.api == "workflow" else "model_id"
-    return problem, advice.format(options=names)
+    model = f"model {options.model_id}"
+    names = "model_id"
+    if options.api == "workflow":
+        model = f"workflow {options.workspace}/{options.workflow_id}"
+        names = "workspace and workflow_id"
+    return problem.format(model=model, output=options.workflow_output), advice.format(options=names)
 
 
 def shorten_to_line(text: str) -> str:
