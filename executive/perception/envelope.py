@@ -248,7 +248,7 @@ statistics in the measurement, in which the error rates apply; None if unknown o
 
 @dataclass(frozen=True, eq=False)
 class RatedDetector:
-    """Detector whose answers carry the error rates of its envelope.
+    """Detector whose answers carry the error rates of its envelope; implements `ClosableDetector`.
 
     Attributes:
         detector: The detector.

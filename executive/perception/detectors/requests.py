@@ -73,7 +73,7 @@ class DetectorContext:
 
 @dataclass(frozen=True, eq=False)
 class ChangedRequest:
-    """Request with a changed answer.
+    """Request with a changed answer; implements `executive.cell.protocols.Request`.
 
     Attributes:
         request: The original request.
@@ -103,7 +103,7 @@ class ChangedRequest:
 
 @dataclass(eq=False)
 class PendingSearch:
-    """Running detection.
+    """Running detection; implements `executive.cell.protocols.Request`.
 
     Attributes:
         future: Detections, which are available after the thread has searched all regions.
@@ -237,7 +237,7 @@ def _is_valid(detection: Detection, frame: Frame) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class ScreenedDetector:
-    """Detector with screened answers.
+    """Detector with screened answers; implements `executive.cell.protocols.Detector`.
 
     Attributes:
         detector: The detector.
