@@ -319,7 +319,7 @@ def find_candidates(
         Unreachable: No joint configuration reaches the goal.
     """
     pairs = find_configuration_pairs(kinematics, goal, length, start.q)
-    durations = compute_min_time(pairs.upper_qs - start.q, limits)
+    durations = limits.compute_min_time(pairs.upper_qs - start.q)
     previous_qs: list[Array] = []
     for index in np.argsort(durations, kind="stable"):
         goal_q = pairs.lower_qs[index]
@@ -334,22 +334,3 @@ def find_candidates(
             arrival = CartesianLine(waypoints, length, limits, goal.guarded_speed, starts_in_motion=True)
             free_part_end = arrival.state_at(0.0)
         yield Candidate(float(durations[index]), free_part_end, arrival, branch)
-
-
-def compute_min_time(displacement: Array, limits: JointLimits) -> Array:
-    """Return the minimum time `(...)` [s] of a motion from rest to rest by `displacement` `(..., n)` [rad].
-
-    Each joint has the symmetric seven-phase profile of limited jerk, and the slowest joint determines the
-    time. A long profile reaches the maximum velocity `v`; a medium profile reaches only the maximum
-    acceleration `a`; a short profile reaches only the maximum jerk `j`.
-    """
-    d = np.abs(displacement)
-    v = limits.velocity
-    a = limits.acceleration
-    j = limits.jerk
-    jerk_time = a / j  # [s] from zero to the maximum acceleration
-    ramp_time = np.where(v >= a * jerk_time, v / a + jerk_time, 2 * np.sqrt(v / j))  # [s] to maximum velocity
-    medium_time = jerk_time + np.sqrt(jerk_time**2 + 4 * d / a)
-    short_time = 4 * np.cbrt(d / 2 / j)
-    time_below_max_velocity = np.where(d >= 2 * a * jerk_time**2, medium_time, short_time)
-    return np.max(np.where(d >= v * ramp_time, d / v + ramp_time, time_below_max_velocity), axis=-1)

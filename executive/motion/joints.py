@@ -95,6 +95,25 @@ class JointLimits:
         """Number of joints, `n`."""
         return len(self.velocity)
 
+    def compute_min_time(self, displacement: Array) -> Array:
+        """Return the minimum time `(...)` [s] from rest to rest for a `displacement` `(..., n)` [rad].
+
+        Each joint has the symmetric seven-phase profile of limited jerk, and the slowest joint determines the
+        time. A long profile reaches the maximum velocity `v`; a medium profile reaches only the maximum
+        acceleration `a`; a short profile reaches only the maximum jerk `j`.
+        """
+        d = np.abs(displacement)
+        v = self.velocity
+        a = self.acceleration
+        j = self.jerk
+        # [s] from zero to the maximum acceleration, and to the maximum velocity
+        jerk_time = a / j
+        ramp_time = np.where(v >= a * jerk_time, v / a + jerk_time, 2 * np.sqrt(v / j))
+        medium_time = jerk_time + np.sqrt(jerk_time**2 + 4 * d / a)
+        short_time = 4 * np.cbrt(d / 2 / j)
+        time_below_max_velocity = np.where(d >= 2 * a * jerk_time**2, medium_time, short_time)
+        return np.max(np.where(d >= v * ramp_time, d / v + ramp_time, time_below_max_velocity), axis=-1)
+
 
 class Solutions(NamedTuple):
     """Inverse-kinematics solutions of one tool pose in `N` branches.
