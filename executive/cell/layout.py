@@ -1,17 +1,14 @@
-"""Bins, object classes, travel and pile heights, bin boxes and unreachable places of a cell file."""
+"""Bins, object classes, travel and pile heights, and bin boxes of a cell file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
-from executive.cell.workcell import KeyPath
-from executive.errors import Unreachable
-from executive.geometry import Array
 
 Vector3 = tuple[float, float, float]
 """Three values along x, y and z [m]."""
@@ -61,28 +58,6 @@ def list_bin_boxes(size: Vector3) -> Sequence[tuple[Vector3, Vector3]]:
     end_walls = [(end_size, (x, 0.0, wall_z)) for x in (wall_x, -wall_x)]
     side_walls = [(side_size, (0.0, y, wall_z)) for y in (wall_y, -wall_y)]
     return floor, *end_walls, *side_walls
-
-
-def find_unreachable_places(
-    config: CellConfig, require_reachable: Callable[[Array, float], None]
-) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key in the cell file and error message of each bin or safe place that the arm cannot reach.
-
-    `require_reachable` is a function of a position `(2,)` [m] and of the height of the surface below the
-    position [m]. The function raises `Unreachable` if the arm cannot reach the position.
-    """
-    places: list[tuple[KeyPath, str, Array, float]] = [
-        (("bins", name, "position"), f'the bin "{name}"', build_bin(name, bin).slots, bin.position[2])
-        for name, bin in config.bins.items()
-    ]
-    safe_position = np.array([config.safe_place[:2]])
-    places.append((("safe_place",), "the safe place", safe_position, config.safe_place[2]))
-    for key_path, place_name, positions, surface_height in places:
-        try:
-            for position in positions:
-                require_reachable(position, surface_height)
-        except Unreachable as error:
-            yield key_path, f"{place_name} is out of reach: {error}"
 
 
 def build_bins(config: CellConfig) -> dict[str, Bin]:

@@ -114,6 +114,12 @@ class ObjectClass:
         return self.looks_like or self.label
 
 
+SAFETY_FACTOR = 2.0
+"""Ratio of the maximum force that a seal withstands to the largest force on the seal during a motion."""
+MIN_LIFT_ACCELERATION = 0.5
+"""Lower limit of the maximum acceleration of a lift, even if the seal withstands less [m/s²]."""
+
+
 @dataclass(frozen=True)
 class Load:
     """Object in the tool.

@@ -27,10 +27,10 @@ from executive.events import Emit, discard_event
 from executive.geometry import GRAVITY, Array, Pose
 from executive.mission.cell_file import load_cell
 from executive.mission.file_search import get_shipped_folder
-from executive.motion.arms import build_planner, find_arm_errors, find_places_out_of_reach
+from executive.motion.arms import build_planning_kinematics, find_arm_errors, find_places_out_of_reach
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.planner import PlanningArm
-from executive.motion.straight_paths import StraightMotion, StraightPlanner
+from executive.motion.straight_paths import StraightMotion, plan_straight_motion
 from executive.perception.camera_model import MountedCamera, compute_hull_mask
 from executive.perception.detectors.requests import PendingSearch
 from executive.perception.localization import CellLocalizer
@@ -330,8 +330,6 @@ def list_grid_points(config: CellConfig) -> list[tuple[float, float]]:
 class FakeArm(PlanningArm[StraightMotion]):
     """An arm that moves on straight joint paths, stops without braking, and never hits an obstacle by itself.
 
-    `StraightPlanner` plans its motions.
-
     Args:
         world: The world that contains the held object.
         config: The cell file.
@@ -351,9 +349,9 @@ class FakeArm(PlanningArm[StraightMotion]):
     q = np.zeros(0)
 
     def __init__(self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit) -> None:
-        planner = build_planner(config)
-        straight_planner = StraightPlanner(config, planner.kinematics)
-        super().__init__(config, planner, straight_planner.plan, clock, emit)
+        kinematics = build_planning_kinematics(config)
+        plan_motion = functools.partial(plan_straight_motion, config, kinematics)
+        super().__init__(config, kinematics, plan_motion, clock, emit)
         self.q = self.poses["home"]
         self.tool_velocity = np.zeros(3)
         self.next_obstacle: str | None = None
@@ -387,8 +385,7 @@ class FakeArm(PlanningArm[StraightMotion]):
     def set_tool_position(self, position: Array) -> None:
         """Move the tool, which then points down, to a position `(3,)` [m] at once."""
         x, y, z = map(float, position)
-        kinematics = self.planner.kinematics
-        self.q = find_configuration_pairs(kinematics, Goal((x, y, z)), 0.0, self.q).lower_qs[0]
+        self.q = find_configuration_pairs(self.kinematics, Goal((x, y, z)), 0.0, self.q).lower_qs[0]
         self._path = []
 
     def stop(self) -> None:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 
 from executive.cell.config import CellConfig, ObjectConfig
+from executive.cell.objects import MIN_LIFT_ACCELERATION, SAFETY_FACTOR
 from executive.errors import InputError
 from executive.geometry import GRAVITY
 from executive.manipulation.tool_goals import MAX_ROLL_DISTANCE
@@ -16,7 +17,6 @@ from executive.mission.findings import Finding, make_error, make_warning, sugges
 from executive.mission.mission_file import Mission
 from executive.mission.nodes import SkillNode
 from executive.mission.ports import find_literals, find_problem
-from executive.motion.optimizer import MIN_LIFT_ACCELERATION, SAFETY_FACTOR
 from executive.skill import HOLDING, Direction, Param, Port, Skill
 from executive.tree.keys import Key
 from executive.tree.specification import Literal, LocatedName, Reference, Span

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
+import numpy as np
+
 from executive.cell.arm import Goal
 from executive.cell.config import CellConfig
-from executive.cell.layout import find_unreachable_places
+from executive.cell.layout import build_bin, compute_travel_height
 from executive.cell.workcell import KeyPath
+from executive.errors import Unreachable
 from executive.geometry import Array
-from executive.motion.clearance_model import SAMPLING_MARGIN
+from executive.motion.configurations import find_configuration_pairs
 from executive.motion.iiwa14_kinematics import IIWA14_JOINT_COUNT, Iiwa14
 from executive.motion.joints import JointLimits, JointRange, Kinematics
-from executive.motion.planner import CollisionCheck, Planner
 
 KinematicsFactory = Callable[[float, JointRange, float | None], Kinematics]
 """Function that builds kinematics from tool length [m], joint range, and minimum link distance [m]."""
@@ -21,6 +23,8 @@ ARMS_BY_URDF: Mapping[str, tuple[int, KinematicsFactory]] = {
     "kuka_iiwa/model.urdf": (IIWA14_JOINT_COUNT, Iiwa14)
 }
 """Number of joints and kinematics of each supported arm, by the key `arm.urdf` of cell files."""
+SAMPLING_MARGIN = 0.001
+"""Addition to the margin of the cell, because only samples of a motion are checked [m]."""
 
 
 def find_arm_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
@@ -32,11 +36,11 @@ def find_arm_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
         return
     joint_count, _ = ARMS_BY_URDF[config.arm.urdf]
     if config.arm.joint_count != joint_count:
-        yield (
-            ("arm", "limits"),
+        message = (
             f"the arm {config.arm.urdf} has {joint_count} joints, but the limits of {config.arm.joint_count} "
-            f"joints are given; write {joint_count} values for each limit and pose",
+            f"joints are given; write {joint_count} values for each limit and pose"
         )
+        yield ("arm", "limits"), message
 
 
 def build_kinematics(config: CellConfig, min_link_distance: float | None = None) -> Kinematics:
@@ -46,10 +50,9 @@ def build_kinematics(config: CellConfig, min_link_distance: float | None = None)
     return factory(config.tool.length, joint_range, min_link_distance)
 
 
-def build_planner(config: CellConfig, check_collision: CollisionCheck | None = None) -> Planner:
-    """Return the planner for the arm of a cell file, optionally with an additional collision check."""
-    kinematics = build_kinematics(config, config.motion.margin + SAMPLING_MARGIN)
-    return Planner(config, kinematics, check_collision)
+def build_planning_kinematics(config: CellConfig) -> Kinematics:
+    """Return the kinematics of the arm of a cell file, whose links keep the margin of planned motions."""
+    return build_kinematics(config, config.motion.margin + SAMPLING_MARGIN)
 
 
 def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
@@ -58,12 +61,6 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
     The tool must reach each slot of each bin and the safe place, from travel height down to the release
     height in one inverse kinematics branch. Each named pose must be within the joint limits.
     """
-    planner = build_planner(config)
-
-    def require_reachable(position: Array, floor_height: float) -> None:
-        height = floor_height + config.max_object_height
-        planner.require_reachable(Goal((float(position[0]), float(position[1]), height)))
-
     ranges = config.arm.limits.position_ranges_deg
     for name, pose in config.arm.poses_deg.items():
         for joint, (angle, (lower, upper)) in enumerate(zip(pose, ranges, strict=True), start=1):
@@ -71,4 +68,19 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
                 limit = f"{upper:g}" if lower == -upper else f"{lower:g} to {upper:g}"
                 message = f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}'
                 yield ("arm", "poses_deg", name), message
-    yield from find_unreachable_places(config, require_reachable)
+    kinematics = build_planning_kinematics(config)
+    q_start = np.zeros(config.arm.joint_count)
+    places: list[tuple[KeyPath, str, Array, float]] = [
+        (("bins", name, "position"), f'the bin "{name}"', build_bin(name, bin).slots, bin.position[2])
+        for name, bin in config.bins.items()
+    ]
+    safe_position = np.array([config.safe_place[:2]])
+    places.append((("safe_place",), "the safe place", safe_position, config.safe_place[2]))
+    for key_path, place_name, positions, surface_height in places:
+        height = surface_height + config.max_object_height
+        approach_height = max(0.0, compute_travel_height(config) - height)
+        try:
+            for x, y in positions.tolist():
+                find_configuration_pairs(kinematics, Goal((x, y, height)), approach_height, q_start)
+        except Unreachable as error:
+            yield key_path, f"{place_name} is out of reach: {error}"

@@ -21,6 +21,7 @@ from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, compute_max_pile_hei
 from executive.cell.objects import BIN_THICKNESS, Load, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
+from executive.motion.arms import SAMPLING_MARGIN
 
 OBSERVED_RADIUS = 0.05
 """Radius around the ends of a motion in which only known obstacles count [m]."""
@@ -28,8 +29,6 @@ UNDETECTED_HEIGHT_SLOPE = 1.5
 """Increase of the assumed height of undetected objects with the distance beyond `OBSERVED_RADIUS` [m/m]."""
 POSITION_TOLERANCE = 0.003
 """Tolerance of the position of an observed object, and of a load relative to the tool axis [m]."""
-SAMPLING_MARGIN = 0.001
-"""Addition to the margin of the cell, because only samples of a motion are checked [m]."""
 MAX_PENETRATION = 2e-4
 """Maximum depth by which a moving load may be pressed into its support [m]."""
 DISTANCE_PER_COSINE = 0.1
@@ -133,7 +132,8 @@ class ClearanceModel:
     ) -> None:
         self._margin = config.motion.margin + SAMPLING_MARGIN
         self._prisms = _build_prisms(config, obstacles)
-        self._end_positions, self._discs = end_positions, discs
+        self._end_positions = end_positions
+        self._discs = discs
         self._end_margins = np.full(len(self._prisms.names), self._margin)
 
     def relax_end_margins(self, tcps: Array, axes: Array, min_margin: float = -math.inf) -> None:
@@ -159,26 +159,25 @@ class ClearanceModel:
         flat_slack = slack.reshape(-1, len(tcps))
         pairs = flat_slack.argmin(axis=0)
         states = np.arange(len(tcps))
-        pair_slack, tilt_slack = flat_slack[pairs, states], self._compute_tilt_slack(axes)
+        pair_slack = flat_slack[pairs, states]
+        tilt_slack = self._compute_tilt_slack(axes)
         prisms, discs = np.divmod(pairs, len(self._discs.radii))
         distances = required_distances[prisms, states] + pair_slack
         min_slack = np.minimum(pair_slack, tilt_slack)
         return NearestPairs(min_slack, pair_slack, tilt_slack, distances, discs, near_prisms[prisms])
 
-    def compute_slack_changes(
-        self, pairs: NearestPairs, displaced_tcps: Array, displaced_axes: Array
-    ) -> Array:
+    def compute_slack_changes(self, pairs: NearestPairs, tcps: Array, axes: Array) -> Array:
         """Return the change of the slack of each state for each of `M` small displacements `(N, M)` [m].
 
         Args:
             pairs: Pairs of the states; for each state, only the slack of its pair or of its tilt counts.
-            displaced_tcps: Displaced tool centre points `(N, M, 3)` [m].
-            displaced_axes: Displaced tool axes `(N, M, 3)`.
+            tcps: Displaced tool centre points `(N, M, 3)` [m].
+            axes: Displaced tool axes `(N, M, 3)`.
         """
-        discs, prisms = pairs.disc_indices[:, None], pairs.prism_indices[:, None]
-        new_distances = self._compute_distances(displaced_tcps, displaced_axes, discs, prisms)
-        slack_change = new_distances - pairs.distances[:, None]
-        tilt_change = self._compute_tilt_slack(displaced_axes) - pairs.tilt_slack[:, None]
+        discs = pairs.disc_indices[:, None]
+        prisms = pairs.prism_indices[:, None]
+        slack_change = self._compute_distances(tcps, axes, discs, prisms) - pairs.distances[:, None]
+        tilt_change = self._compute_tilt_slack(axes) - pairs.tilt_slack[:, None]
         return np.where((pairs.tilt_slack < pairs.pair_slack)[:, None], tilt_change, slack_change)
 
     def require_clearance(self, tcps: Array, axes: Array) -> None:
@@ -238,7 +237,8 @@ class ClearanceModel:
         self, tcps: Array, axes: Array, disc_indices: NDArray[np.intp], prism_indices: NDArray[np.intp]
     ) -> Array:
         """Return the distances between discs and prisms [m], negative inside; all arrays broadcast."""
-        offsets, radii = self._discs.offsets[disc_indices], self._discs.radii[disc_indices]
+        offsets = self._discs.offsets[disc_indices]
+        radii = self._discs.radii[disc_indices]
         prisms = self._prisms.select(prism_indices)
         x, y, z = (tcps[..., i] + offsets * axes[..., i] for i in range(3))
         sine_of_tilt = np.sqrt(np.maximum(0.0, 1 - axes[..., 2] ** 2))
@@ -249,7 +249,8 @@ class ClearanceModel:
         dx = np.maximum(np.maximum(prisms.min_x - x, x - prisms.max_x), 0.0)
         dy = np.maximum(np.maximum(prisms.min_y - y, y - prisms.max_y), 0.0)
         horizontal = np.sqrt(dx * dx + dy * dy) - (prisms.radii + radii)
-        outside_h, outside_v = np.maximum(horizontal, 0.0), np.maximum(vertical, 0.0)
+        outside_h = np.maximum(horizontal, 0.0)
+        outside_v = np.maximum(vertical, 0.0)
         outside = np.sqrt(outside_h * outside_h + outside_v * outside_v)
         return np.where(outside > 0, outside, np.maximum(horizontal, vertical))
 
@@ -274,13 +275,17 @@ def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:
         ((-2.0, -2.0), (2.0, 2.0), 0.0, 0.0, False, True, "the table"),
     ]  # fmt: skip
     for name, bin in config.bins.items():
-        (x, y, bottom), (length, width, height) = bin.position, bin.size
-        left, right, front, back = x - length / 2, x + length / 2, y - width / 2, y + width / 2
-        outer_left, outer_right = left - BIN_THICKNESS, right + BIN_THICKNESS
-        outer_front, outer_back = front - BIN_THICKNESS, back + BIN_THICKNESS
+        x, y, bottom = bin.position
+        length, width, height = bin.size
+        left = x - length / 2
+        right = x + length / 2
+        front = y - width / 2
+        back = y + width / 2
+        outer_front = front - BIN_THICKNESS
+        outer_back = back + BIN_THICKNESS
         for wall in (
-            ((outer_left, outer_front), (left, outer_back)),
-            ((right, outer_front), (outer_right, outer_back)),
+            ((left - BIN_THICKNESS, outer_front), (left, outer_back)),
+            ((right, outer_front), (right + BIN_THICKNESS, outer_back)),
             ((left, outer_front), (right, front)),
             ((left, back), (right, outer_back)),
         ):
@@ -288,7 +293,8 @@ def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:
         floor = ((left, front), (right, back), 0.0, bottom + BIN_THICKNESS)
         rows.append((*floor, False, True, f"the floor of {name}"))
     for obstacle in obstacles:
-        centre, radius = (obstacle.x, obstacle.y), obstacle.radius + POSITION_TOLERANCE
+        centre = (obstacle.x, obstacle.y)
+        radius = obstacle.radius + POSITION_TOLERANCE
         rows.append((centre, centre, radius, obstacle.top, False, False, obstacle.name))
     min_corners, max_corners, *columns, names = zip(*rows, strict=True)
     corners = np.hstack([min_corners, max_corners])

@@ -12,7 +12,7 @@ The limits of `v`, `a` and `j` keep every joint within its limits on the whole l
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,137 +22,7 @@ from ruckig import Trajectory as Profile
 from executive.cell.arm import Goal
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose, make_tool_down_pose
-from executive.motion.joints import (
-    BranchKey,
-    JointLimits,
-    JointRange,
-    JointState,
-    Kinematics,
-    Solutions,
-    compute_min_time,
-    wrap_angles,
-)
-
-MAX_CURVATURE_FRACTION = 0.5
-"""Maximum fraction of a joint's acceleration and jerk limits that the terms with q_ss and q_sss may use."""
-_CHECKED_FRACTIONS = np.linspace(0.0, 1.0, 33)  # fractions of the length at which joint limits are evaluated
-_MIN_DIVISOR = 1e-9  # [rad/m], [rad/m²], [rad/m³]: avoids a division by 0 for a joint that does not move
-
-
-class CartesianLine:
-    """A straight motion of the tool; implements `executive.motion.trajectory.MotionPiece`.
-
-    At an end where the tool moves, its speed is the highest from which the tool could stop on the line, or
-    to which it can accelerate from rest on the line.
-
-    Args:
-        waypoints: Joint positions `(N, n)` [rad] at `N` evenly spaced points of the line; the degree of the
-            polynomial is `N` - 1.
-        length: Length of the line [m].
-        limits: Joint limits.
-        max_speed: Maximum speed of the tool [m/s].
-        max_acceleration: Maximum acceleration of the tool [m/s²].
-        starts_in_motion: True if the tool moves at the start; excludes `ends_in_motion`.
-        ends_in_motion: True if the tool moves at the end; excludes `starts_in_motion`.
-
-    Attributes:
-        max_acceleration: Maximum acceleration of the tool [m/s²], also limited by the joints.
-    """
-
-    def __init__(
-        self,
-        waypoints: Array,
-        length: float,
-        limits: JointLimits,
-        max_speed: float = math.inf,
-        max_acceleration: float = math.inf,
-        *,
-        starts_in_motion: bool = False,
-        ends_in_motion: bool = False,
-    ) -> None:
-        distances = np.linspace(0.0, length, len(waypoints))
-        coefficients = np.linalg.solve(np.vander(distances, increasing=True), waypoints)
-        self._coefficients = [coefficients]
-        """Coefficients `(N - k, n)` of the `k`-th derivative of the joint path, those of low powers first."""
-        for _ in range(3):
-            coefficients = coefficients[1:] * np.arange(1, len(coefficients))[:, None]
-            self._coefficients.append(coefficients)
-        speed, acceleration, jerk = self._compute_tool_limits(limits, max_speed, length)
-        self.max_acceleration = acceleration = min(max_acceleration, acceleration)
-        end_speed = _find_max_end_speed(length, speed, acceleration, jerk)
-        inputs = InputParameter(1)
-        inputs.current_position, inputs.target_position = [0.0], [length]
-        inputs.current_velocity = [end_speed if starts_in_motion else 0.0]
-        inputs.target_velocity = [end_speed if ends_in_motion else 0.0]
-        inputs.max_velocity, inputs.max_acceleration, inputs.max_jerk = [speed], [acceleration], [jerk]
-        self._profile = Profile(1)
-        Ruckig(1).calculate(inputs, self._profile)
-        self.duration: float = self._profile.duration
-
-    def state_at(self, time: float) -> JointState:
-        """Return the state at `time`, 0 to `duration` [s]."""
-        (distance,), (speed,), (acceleration,) = self._profile.at_time(time)
-        q, q_s, q_ss = (self._compute_derivatives(distance, order) for order in range(3))
-        return JointState(q, q_s * speed, q_s * acceleration + q_ss * speed**2)
-
-    def sample(self, times: Array) -> JointState:
-        """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
-        samples = np.array([self._profile.at_time(time) for time in times.tolist()])[:, :, 0].T
-        distance, (speed, acceleration) = samples[0], samples[1:, :, None]
-        q, q_s, q_ss = (self._compute_derivatives(distance, order) for order in range(3))
-        return JointState(q, q_s * speed, q_s * acceleration + q_ss * speed**2)
-
-    def _compute_derivatives(self, distances: Array | float, order: int) -> Array:
-        """Return a derivative of the joint path, of order 0 to 3, at `(M,)` distances [m] as `(M, n)`."""
-        coefficients = self._coefficients[order]
-        return np.asarray(distances)[..., None] ** np.arange(len(coefficients)) @ coefficients
-
-    def _compute_tool_limits(
-        self, limits: JointLimits, max_speed: float, length: float
-    ) -> tuple[float, float, float]:
-        """Return the maximum speed [m/s], acceleration [m/s²] and jerk [m/s³] of the tool on the line.
-
-        The chain rule in the module docstring is solved for `v`, then for `a`, then for `j`.
-        """
-        distances = _CHECKED_FRACTIONS * length
-        q_s, q_ss, q_sss = (
-            np.abs(self._compute_derivatives(distances, order)).max(axis=0) for order in (1, 2, 3)
-        )
-        max_speeds = (
-            limits.velocity / (q_s + _MIN_DIVISOR),
-            # Speed that the tool reaches with its maximum acceleration on the whole line.
-            math.sqrt(2 * length * np.min(limits.acceleration / (q_s + _MIN_DIVISOR))),
-            np.sqrt(MAX_CURVATURE_FRACTION * limits.acceleration / (q_ss + _MIN_DIVISOR)),
-            np.cbrt(MAX_CURVATURE_FRACTION / 2 * limits.jerk / (q_sss + _MIN_DIVISOR)),
-        )
-        speed = min(max_speed, *(float(np.min(values)) for values in max_speeds))
-        max_accelerations = (
-            (limits.acceleration - q_ss * speed**2) / (q_s + _MIN_DIVISOR),
-            MAX_CURVATURE_FRACTION / 2 * limits.jerk / (3 * q_ss * speed + _MIN_DIVISOR),
-        )
-        acceleration = float(np.min(max_accelerations))
-        remaining_jerks = limits.jerk - 3 * q_ss * speed * acceleration - q_sss * speed**3
-        return speed, acceleration, float(np.min(remaining_jerks / (q_s + _MIN_DIVISOR)))
-
-
-def _find_max_end_speed(length: float, max_speed: float, acceleration: float, jerk: float) -> float:
-    """Return the largest speed [m/s], up to `max_speed`, from which the tool can stop within `length` [m]."""
-
-    def compute_stopping_distance(speed: float) -> float:
-        if speed >= acceleration**2 / jerk:
-            stopping_time = speed / acceleration + acceleration / jerk
-        else:  # The deceleration does not reach its maximum.
-            stopping_time = 2 * math.sqrt(speed / jerk)
-        return speed / 2 * stopping_time
-
-    lower, upper = 0.0, max_speed
-    if compute_stopping_distance(upper) <= length:
-        return upper
-    for _ in range(40):
-        middle = (lower + upper) / 2
-        lower, upper = (middle, upper) if compute_stopping_distance(middle) <= length else (lower, middle)
-    return lower
-
+from executive.motion.joints import BranchKey, JointLimits, JointRange, JointState, Kinematics, wrap_angles
 
 PREFERRED_LIMIT_DISTANCE = math.radians(1.0)
 """Preferred minimum distance of joint positions from their limits [rad]."""
@@ -165,6 +35,12 @@ WAYPOINT_COUNT = 4
 MIN_COSINE_ON_LINE = 0.9998
 """Minimum cosine between the tool axis and straight down at the start of a vertical line."""
 _MAX_SOLUTION_ERROR = 1e-6  # [rad]
+MIN_JOINT_DIFFERENCE = 0.2
+"""Minimum difference between two candidates in the joint that differs most [rad]."""
+MAX_CURVATURE_FRACTION = 0.5
+"""Maximum fraction of a joint's acceleration and jerk limits that the terms with q_ss and q_sss may use."""
+_CHECKED_FRACTIONS = np.linspace(0.0, 1.0, 33)  # fractions of the length at which joint limits are evaluated
+_MIN_DIVISOR = 1e-9  # [rad/m], [rad/m²], [rad/m³]: avoids a division by 0 for a joint that does not move
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +77,7 @@ def find_configuration_pairs(
         if is_inside.any():
             branches = tuple(lower.branches[index] for index in np.flatnonzero(is_inside))
             return ConfigurationPairs(upper.qs[is_inside], lower.qs[is_inside], branches)
-    raise _make_unreachable_error(kinematics, poses, (upper, lower))
+    raise _make_unreachable_error(kinematics, poses, (upper.qs, lower.qs))
 
 
 def find_vertical_waypoints(kinematics: Kinematics, q: Array, length: float) -> Array | None:
@@ -260,37 +136,154 @@ def _turn_last_joint(
 
 
 def _make_unreachable_error(
-    kinematics: Kinematics, poses: list[Pose], end_solutions: tuple[Solutions, Solutions]
+    kinematics: Kinematics, poses: list[Pose], qs_by_pose: Sequence[Array]
 ) -> Unreachable:
-    """Return the error for the first pose without a solution in the joint range.
+    """Return the error for the first pose whose solutions all exceed the joint range.
 
     If each pose has a solution, the error states that no branch contains solutions of both poses.
     """
-    for pose, solutions in zip(poses, end_solutions, strict=True):
-        if not np.any(kinematics.joint_range.contains(solutions.qs)):
-            return _make_range_error(kinematics, pose, solutions.qs)
-    (x, y, top), bottom = poses[0].position, poses[1].position[2]
+    for pose, qs in zip(poses, qs_by_pose, strict=True):
+        x, y, z = pose.position
+        if not np.any(kinematics.joint_range.contains(qs)):
+            excess = kinematics.joint_range.compute_excess(qs)
+            min_excess = excess[np.nanargmin(np.max(excess, axis=1))]
+            joint = int(np.argmax(min_excess))
+            return Unreachable(
+                f"the tool cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m: no configuration of the arm keeps "
+                f"every joint inside its limits; the best configuration leaves joint {joint + 1} "
+                f"{math.degrees(min_excess[joint]):.1f}° outside {kinematics.joint_range.describe(joint)}"
+            )
+    top = poses[0].position[2]
     return Unreachable(
-        f"the tool can reach the heights {top:.3f} and {bottom:.3f} m above ({x:.3f}, {y:.3f}) m, but not "
-        f"without a change of the configuration of the arm in between"
+        f"the tool can reach the heights {top:.3f} and {z:.3f} m above ({x:.3f}, {y:.3f}) m, but not without "
+        f"a change of the configuration of the arm in between"
     )
 
 
-def _make_range_error(kinematics: Kinematics, X_WT: Pose, qs: Array) -> Unreachable:
-    """Return the error for a pose whose solutions `(N, n)` [rad] all exceed the joint range."""
-    excess = kinematics.joint_range.compute_excess(qs)
-    min_excess = excess[np.nanargmin(np.max(excess, axis=1))]
-    joint = int(np.argmax(min_excess))
-    x, y, z = X_WT.position
-    return Unreachable(
-        f"the tool cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m: no configuration of the arm keeps every joint "
-        f"inside its limits; the best configuration leaves joint {joint + 1} "
-        f"{math.degrees(min_excess[joint]):.1f}° outside {kinematics.joint_range.describe(joint)}"
-    )
+class CartesianLine:
+    """A straight motion of the tool; implements `executive.motion.trajectory.MotionPiece`.
+
+    At an end where the tool moves, its speed is the highest from which the tool could stop on the line, or
+    to which it can accelerate from rest on the line.
+
+    Args:
+        waypoints: Joint positions `(N, n)` [rad] at `N` evenly spaced points of the line; the degree of the
+            polynomial is `N` - 1.
+        length: Length of the line [m].
+        limits: Joint limits.
+        max_speed: Maximum speed of the tool [m/s].
+        max_acceleration: Maximum acceleration of the tool [m/s²].
+        starts_in_motion: True if the tool moves at the start; excludes `ends_in_motion`.
+        ends_in_motion: True if the tool moves at the end; excludes `starts_in_motion`.
+
+    Attributes:
+        max_acceleration: Maximum acceleration of the tool [m/s²], also limited by the joints.
+    """
+
+    def __init__(
+        self,
+        waypoints: Array,
+        length: float,
+        limits: JointLimits,
+        max_speed: float = math.inf,
+        max_acceleration: float = math.inf,
+        *,
+        starts_in_motion: bool = False,
+        ends_in_motion: bool = False,
+    ) -> None:
+        distances = np.linspace(0.0, length, len(waypoints))
+        coefficients = np.linalg.solve(np.vander(distances, increasing=True), waypoints)
+        self._coefficients = [coefficients]
+        """Coefficients `(N - k, n)` of the `k`-th derivative of the joint path, those of low powers first."""
+        for _ in range(3):
+            coefficients = coefficients[1:] * np.arange(1, len(coefficients))[:, None]
+            self._coefficients.append(coefficients)
+        speed, acceleration, jerk = self._compute_tool_limits(limits, max_speed, length)
+        self.max_acceleration = acceleration = min(max_acceleration, acceleration)
+        end_speed = _find_max_end_speed(length, speed, acceleration, jerk)
+        inputs = InputParameter(1)
+        inputs.current_position = [0.0]
+        inputs.target_position = [length]
+        inputs.current_velocity = [end_speed if starts_in_motion else 0.0]
+        inputs.target_velocity = [end_speed if ends_in_motion else 0.0]
+        inputs.max_velocity = [speed]
+        inputs.max_acceleration = [acceleration]
+        inputs.max_jerk = [jerk]
+        self._profile = Profile(1)
+        Ruckig(1).calculate(inputs, self._profile)
+        self.duration: float = self._profile.duration
+
+    def state_at(self, time: float) -> JointState:
+        """Return the state at `time`."""
+        (distance,), (speed,), (acceleration,) = self._profile.at_time(time)
+        return self._compute_state(distance, speed, acceleration)
+
+    def sample(self, times: Array) -> JointState:
+        """Return the states at `times`."""
+        samples = np.array([self._profile.at_time(time) for time in times.tolist()])[:, :, 0].T
+        return self._compute_state(samples[0], *samples[1:, :, None])
+
+    def _compute_state(
+        self, distance: Array | float, speed: Array | float, acceleration: Array | float
+    ) -> JointState:
+        """Apply the chain rule in the module docstring."""
+        q, q_s, q_ss = (self._compute_derivatives(distance, order) for order in range(3))
+        return JointState(q, q_s * speed, q_s * acceleration + q_ss * speed**2)
+
+    def _compute_derivatives(self, distances: Array | float, order: int) -> Array:
+        """Return a derivative of the joint path, of order 0 to 3, at `(M,)` distances [m] as `(M, n)`."""
+        coefficients = self._coefficients[order]
+        return np.asarray(distances)[..., None] ** np.arange(len(coefficients)) @ coefficients
+
+    def _compute_tool_limits(
+        self, limits: JointLimits, max_speed: float, length: float
+    ) -> tuple[float, float, float]:
+        """Return the maximum speed [m/s], acceleration [m/s²] and jerk [m/s³] of the tool on the line.
+
+        The chain rule in the module docstring is solved for `v`, then for `a`, then for `j`.
+        """
+        distances = _CHECKED_FRACTIONS * length
+        q_s, q_ss, q_sss = (
+            np.abs(self._compute_derivatives(distances, order)).max(axis=0) for order in (1, 2, 3)
+        )
+        max_speeds = (
+            limits.velocity / (q_s + _MIN_DIVISOR),
+            # Speed that the tool reaches with its maximum acceleration on the whole line.
+            math.sqrt(2 * length * np.min(limits.acceleration / (q_s + _MIN_DIVISOR))),
+            np.sqrt(MAX_CURVATURE_FRACTION * limits.acceleration / (q_ss + _MIN_DIVISOR)),
+            np.cbrt(MAX_CURVATURE_FRACTION / 2 * limits.jerk / (q_sss + _MIN_DIVISOR)),
+        )
+        speed = min(max_speed, *(float(np.min(values)) for values in max_speeds))
+        max_accelerations = (
+            (limits.acceleration - q_ss * speed**2) / (q_s + _MIN_DIVISOR),
+            MAX_CURVATURE_FRACTION / 2 * limits.jerk / (3 * q_ss * speed + _MIN_DIVISOR),
+        )
+        acceleration = float(np.min(max_accelerations))
+        remaining_jerks = limits.jerk - 3 * q_ss * speed * acceleration - q_sss * speed**3
+        return speed, acceleration, float(np.min(remaining_jerks / (q_s + _MIN_DIVISOR)))
 
 
-MIN_JOINT_DIFFERENCE = 0.2
-"""Minimum difference between two candidates in the joint that differs most [rad]."""
+def _find_max_end_speed(length: float, max_speed: float, acceleration: float, jerk: float) -> float:
+    """Return the largest speed [m/s], up to `max_speed`, from which the tool can stop within `length` [m]."""
+
+    def compute_stopping_distance(speed: float) -> float:
+        if speed >= acceleration**2 / jerk:
+            stopping_time = speed / acceleration + acceleration / jerk
+        else:  # The deceleration does not reach its maximum.
+            stopping_time = 2 * math.sqrt(speed / jerk)
+        return speed / 2 * stopping_time
+
+    if compute_stopping_distance(max_speed) <= length:
+        return max_speed
+    lower = 0.0
+    upper = max_speed
+    for _ in range(40):
+        middle = (lower + upper) / 2
+        if compute_stopping_distance(middle) <= length:
+            lower = middle
+        else:
+            upper = middle
+    return lower
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,14 +319,16 @@ def find_candidates(
         Unreachable: No joint configuration reaches the goal.
     """
     pairs = find_configuration_pairs(kinematics, goal, length, start.q)
-    durations = compute_min_time(pairs.upper_qs - start.q, limits)
+    durations = limits.compute_min_time(pairs.upper_qs - start.q)
     previous_qs: list[Array] = []
     for index in np.argsort(durations, kind="stable"):
-        goal_q, branch = pairs.lower_qs[index], pairs.branches[index]
+        goal_q = pairs.lower_qs[index]
+        branch = pairs.branches[index]
         if any(np.max(np.abs(goal_q - q)) <= MIN_JOINT_DIFFERENCE for q in previous_qs):
             continue
         previous_qs.append(goal_q)
-        arrival, free_part_end = None, JointState.at_rest(goal_q)
+        arrival = None
+        free_part_end = JointState.at_rest(goal_q)
         if length > 0:
             waypoints = solve_vertical_waypoints(kinematics, goal_q, length, branch)[::-1]
             arrival = CartesianLine(waypoints, length, limits, goal.guarded_speed, starts_in_motion=True)

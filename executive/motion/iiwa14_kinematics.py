@@ -29,14 +29,17 @@ IIWA14_JOINT_COUNT = 7
 FLANGE_OFFSET = 0.045
 """Distance from the origin of link 7 to the outer face of the flange, along the z axis of the link [m]."""
 
-SHOULDER_HEIGHT, UPPER_ARM, FOREARM, WRIST_TO_FLANGE = 0.36, 0.42, 0.40, 0.081 + FLANGE_OFFSET
-"""Lengths between base, shoulder, elbow, wrist and flange [m], from pybullet_data kuka_iiwa/model.urdf."""
+# Lengths between base, shoulder, elbow, wrist and flange [m], from pybullet_data kuka_iiwa/model.urdf.
+SHOULDER_HEIGHT = 0.36
+UPPER_ARM = 0.42
+FOREARM = 0.40
+WRIST_TO_FLANGE = 0.081 + FLANGE_OFFSET
 
 FLIPS = np.array([[s, e, w] for s in (1, -1) for e in (1, -1) for w in (1, -1)])
 """Signs of joints 2, 4 and 6 in the eight solutions of one redundancy angle `(8, 3)`."""
 
-_JOINT_6_ANGLES = 120.0, 115.0, 110.0, 105.0, 100.0, 95.0, 90.0  # [degree]
-_LINK_DISTANCES = -0.0132, -0.0059, 0.0012, 0.0079, 0.0141, 0.0195, 0.0237
+_JOINT_6_ANGLES = (120.0, 115.0, 110.0, 105.0, 100.0, 95.0, 90.0)  # [degree]
+_LINK_DISTANCES = (-0.0132, -0.0059, 0.0012, 0.0079, 0.0141, 0.0195, 0.0237)
 """Distances between links 5 and 7 at `_JOINT_6_ANGLES` [m], negative if the links overlap."""
 
 # A flip changes the unflipped joint positions `q` to `_FLIP_SIGNS * q + _FLIP_OFFSETS`.
@@ -71,10 +74,12 @@ class Iiwa14:
     def __init__(
         self, tool_length: float, joint_range: JointRange, min_link_distance: float | None = None
     ) -> None:
-        lower, upper = joint_range.lower.copy(), joint_range.upper.copy()
+        lower = joint_range.lower.copy()
+        upper = joint_range.upper.copy()
         if min_link_distance is not None:
             max_angle = interpolate_max_joint_6_angle(min_link_distance)
-            lower[5], upper[5] = max(lower[5], -max_angle), min(upper[5], max_angle)
+            lower[5] = max(lower[5], -max_angle)
+            upper[5] = min(upper[5], max_angle)
         self.joint_range = JointRange(lower, upper)
         self._wrist_to_tool = WRIST_TO_FLANGE + tool_length
         cos4 = math.cos(max(-lower[3], upper[3]))
@@ -83,24 +88,28 @@ class Iiwa14:
         self._max_wrist_distance = UPPER_ARM + FOREARM
 
     def compute_tool_pose(self, q: ArrayLike) -> Pose:
-        """Return the tool pose `X_WT` at the joint positions `q` `(7,)` [rad]."""
+        """Return the tool pose."""
         return self._compute_frames(q)[-1]
 
     def compute_joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
-        """Return the frame of each joint at `q` `(7,)` [rad]: origin in the joint, z along the next link."""
+        """Return the frames of the protocol; z of each frame points along the next link."""
         return tuple(self._compute_frames(q)[:-1])
 
     def compute_tcps_and_axes(self, qs: Array) -> tuple[Array, Array]:
-        """Return tool centre points `(N, 3)` [m] and tool axes `(N, 3)` at joint positions `(N, 7)` [rad].
+        """Return tool centre points and tool axes.
 
-        The function transforms both vectors joint by joint from the wrist to the base, which takes a fifth of
-        the time of complete frames. Joint 7 has no effect, because its axis is the tool axis.
+        Both vectors are transformed joint by joint from the wrist to the base, which takes a fifth of the
+        time of complete frames. Joint 7 has no effect, because its axis is the tool axis.
         """
         angles = np.ascontiguousarray(qs.T[:6])  # Operations on contiguous rows are faster.
-        cosines, sines = np.cos(angles), np.sin(angles)
+        cosines = np.cos(angles)
+        sines = np.sin(angles)
         vectors = np.empty((3, 2, len(qs)))
-        tcp, axis = vectors[:, 0], vectors[:, 1]
-        axis[0], axis[1], axis[2] = cosines[4] * sines[5], sines[4] * sines[5], cosines[5]
+        tcp = vectors[:, 0]
+        axis = vectors[:, 1]
+        axis[0] = cosines[4] * sines[5]
+        axis[1] = sines[4] * sines[5]
+        axis[2] = cosines[5]
         tcp[:] = self._wrist_to_tool * axis
         tcp[2] += FOREARM
         _rotate(vectors, cosines[3], -sines[3], 3)
@@ -111,29 +120,23 @@ class Iiwa14:
         return tcp.T, axis.T
 
     def find_branch(self, q: ArrayLike) -> BranchKey:
-        """Return the branch of `q` `(7,)` [rad]: the index of the flip, and the redundancy angle [rad]."""
+        """Return the index of the flip, and the redundancy angle [rad]; 0: elbow up."""
         is_flipped = np.asarray(q, dtype=float)[[1, 3, 5]] < 0  # shoulder, elbow, wrist
-        return int(is_flipped @ [4, 2, 1]), self.compute_redundancy_angle(q)
-
-    def compute_redundancy_angle(self, q: ArrayLike) -> float:
-        """Return the angle of the elbow about the line from shoulder to wrist [rad]; 0: elbow up."""
         frames = self.compute_joint_frames(q)
         shoulder, elbow, wrist = (frames[i].position for i in (1, 3, 5))
         _, up, side = _compute_elbow_frame(wrist - shoulder)
-        return math.atan2(float((elbow - shoulder) @ side), float((elbow - shoulder) @ up))
+        angle = math.atan2(float((elbow - shoulder) @ side), float((elbow - shoulder) @ up))
+        return int(is_flipped @ [4, 2, 1]), angle
 
     def solve(self, poses: Sequence[Pose], branch: BranchKey) -> Array:
-        """Return the joint positions `(N, 7)` [rad] of tool poses in one branch, or raise Unreachable."""
+        """Return the joint positions in one branch."""
         flip, angle = branch
         return self._solve_angles(poses, np.array([angle]))[:, int(flip), 0]
 
     def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
-        """Return the solutions of a tool pose for all flips and evenly spaced redundancy angles.
-
-        The first redundancy angle is that of `q_seed` `(7,)` [rad]. If no solution exists, raise Unreachable.
-        """
+        """Return the solutions for all flips and evenly spaced redundancy angles, that of `q_seed` first."""
         offsets = np.radians(np.arange(0.0, 360.0, math.degrees(angle_step)))
-        angles = self.compute_redundancy_angle(q_seed) + offsets
+        angles = self.find_branch(q_seed)[1] + offsets
         solutions = self._solve_angles([X_WT], angles).reshape(-1, IIWA14_JOINT_COUNT)
         return Solutions(solutions, list(product(range(len(FLIPS)), angles.tolist())))
 
@@ -149,7 +152,8 @@ class Iiwa14:
         # The vectors have the shape (N, 1, 3), the angles of the triangles have the shape (N, 1, 1).
         wrist_direction, up, side = np.array(elbow_frames).swapaxes(0, 1)[:, :, None]
         upper_arm_angle, q4 = np.array(triangle_angles).T[:, :, None, None]
-        cosines, sines = np.cos(angles)[:, None], np.sin(angles)[:, None]
+        cosines = np.cos(angles)[:, None]
+        sines = np.sin(angles)[:, None]
         elbow_direction = cosines * up + sines * side
         # Frame 3: z along the upper arm, y normal to the triangle of shoulder, elbow and wrist.
         z3 = np.cos(upper_arm_angle) * wrist_direction + np.sin(upper_arm_angle) * elbow_direction
@@ -173,15 +177,15 @@ class Iiwa14:
         """
         wrist = X_WT.position - self._wrist_to_tool * X_WT.rotation[:, 2]
         shoulder_to_wrist = wrist - (0.0, 0.0, SHOULDER_HEIGHT)
-        distance = self._require_reachable_wrist(X_WT, shoulder_to_wrist)
+        distance = float(np.linalg.norm(shoulder_to_wrist))
+        self._require_reachable_wrist(X_WT, distance)
         cos4 = (distance**2 - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
         cos_upper_arm_angle = (UPPER_ARM**2 + distance**2 - FOREARM**2) / (2 * UPPER_ARM * distance)
         upper_arm_angle, q4 = (math.acos(min(1.0, max(-1.0, c))) for c in (cos_upper_arm_angle, cos4))
         return _compute_elbow_frame(shoulder_to_wrist), (upper_arm_angle, q4)
 
-    def _require_reachable_wrist(self, X_WT: Pose, shoulder_to_wrist: Array) -> float:
-        """Return the length of the vector from shoulder to wrist `(3,)` [m], or raise Unreachable."""
-        distance = float(np.linalg.norm(shoulder_to_wrist))
+    def _require_reachable_wrist(self, X_WT: Pose, distance: float) -> None:
+        """Raise Unreachable if the distance from shoulder to wrist [m] is too large or too small."""
         if distance > self._max_wrist_distance + _ROUNDING_ERROR:
             excess = distance - self._max_wrist_distance
             cause = f"{excess:.3f} m beyond the reach of the arm ({self._max_wrist_distance:.2f} m)"
@@ -189,7 +193,7 @@ class Iiwa14:
             shortfall = self._min_wrist_distance - distance
             cause = f"{shortfall:.3f} m nearer than joint 4 permits ({self._min_wrist_distance:.2f} m)"
         else:
-            return distance
+            return
         x, y, z = X_WT.position
         raise Unreachable(
             f"the tool cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m: its wrist would be {distance:.3f} m from "
@@ -199,15 +203,16 @@ class Iiwa14:
     def _compute_frames(self, q: ArrayLike) -> list[Pose]:
         """Return the frames of joints 1 to 7 at `q` `(7,)` [rad], followed by the frame of the tool."""
         frames = []
-        R, p = np.eye(3), np.array([0.0, 0.0, SHOULDER_HEIGHT])
+        R = np.eye(3)
+        p = np.array([0.0, 0.0, SHOULDER_HEIGHT])
         lengths = {3: UPPER_ARM, 5: FOREARM}  # [m] before the joint with this index
         angles = np.asarray(q, dtype=float) * (1, 1, 1, -1, 1, 1, 1)
-        cosines, sines = np.cos(angles), np.sin(angles)
+        cosines = np.cos(angles)
+        sines = np.sin(angles)
         joint_rotations = np.tile(np.eye(3), (len(angles), 1, 1))
         for parity in (0, 1):
-            _rotate(
-                joint_rotations[parity::2].transpose(1, 2, 0), cosines[parity::2], sines[parity::2], parity
-            )
+            joints = slice(parity, None, 2)
+            _rotate(joint_rotations[joints].transpose(1, 2, 0), cosines[joints], sines[joints], parity)
         for joint, R_joint in enumerate(joint_rotations):
             p = p + lengths.get(joint, 0.0) * R[:, 2]
             R = R @ R_joint
@@ -218,7 +223,8 @@ class Iiwa14:
 def _rotate(vectors: Array, cosines: Array, sines: Array, joint: int) -> None:
     """Rotate vectors `(3, ...)` in place about z, if the index of the joint is even, or about y."""
     turned = vectors[:2] if joint % 2 == 0 else vectors[::-2]  # x and y, or z and x
-    c_turned, s_turned = cosines * turned, sines * turned
+    c_turned = cosines * turned
+    s_turned = sines * turned
     turned[0] = c_turned[0] - s_turned[1]
     turned[1] = s_turned[0] + c_turned[1]
 
@@ -239,5 +245,6 @@ def _compute_elbow_frame(shoulder_to_wrist: Array) -> tuple[Array, Array, Array]
     up = np.array([0.0, 0.0, 1.0]) if abs(direction[2]) < 0.9999 else np.array([1.0, 0.0, 0.0])
     up = up - (up @ direction) * direction
     up /= np.linalg.norm(up)
-    (x, y, z), (u, v, w) = direction.tolist(), up.tolist()
+    x, y, z = direction.tolist()
+    u, v, w = up.tolist()
     return direction, up, np.array([y * w - z * v, z * u - x * w, x * v - y * u])  # faster than np.cross

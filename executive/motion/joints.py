@@ -1,4 +1,4 @@
-"""Joints of an arm: state, range, limits, the minimum time of a motion, and the protocol of kinematics."""
+"""Joints of an arm: state, range, limits, and the protocol of kinematics."""
 
 from __future__ import annotations
 
@@ -12,6 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from executive.cell.device_config import LimitsConfig
 from executive.geometry import Array, Pose
+
+BranchKey = tuple[float, ...]
+"""Key of a branch of the inverse kinematics; the meaning of the numbers depends on the arm.
+
+In each branch, a tool pose has at most one solution, and a short path of the tool has continuous solutions.
+"""
 
 
 class JointState(NamedTuple):
@@ -47,7 +53,8 @@ class JointRange(NamedTuple):
 
     def describe(self, joint: int) -> str:
         """Return the range of the joint with the index `joint` as text: `±170°` or `-30° to 120°`."""
-        lower, upper = math.degrees(self.lower[joint]), math.degrees(self.upper[joint])
+        lower = math.degrees(self.lower[joint])
+        upper = math.degrees(self.upper[joint])
         return f"±{upper:.0f}°" if lower == -upper else f"{lower:.0f}° to {upper:.0f}°"
 
 
@@ -74,9 +81,8 @@ class JointLimits:
     @staticmethod
     def from_config(config: LimitsConfig) -> JointLimits:
         """Return the limits of a cell file."""
-        lower, upper = np.radians(config.position_ranges_deg).T
         return JointLimits(
-            position=JointRange(lower, upper),
+            position=JointRange(*np.radians(config.position_ranges_deg).T),
             velocity=np.radians(config.velocity_deg),
             acceleration=np.array(config.acceleration),
             jerk=np.array(config.jerk),
@@ -89,28 +95,24 @@ class JointLimits:
         """Number of joints, `n`."""
         return len(self.velocity)
 
+    def compute_min_time(self, displacement: Array) -> Array:
+        """Return the minimum time `(...)` [s] from rest to rest for a `displacement` `(..., n)` [rad].
 
-def compute_min_time(displacement: Array, limits: JointLimits) -> Array:
-    """Return the minimum time `(...)` [s] of a motion from rest to rest by `displacement` `(..., n)` [rad].
-
-    Each joint has the symmetric seven-phase profile of limited jerk, and the slowest joint determines the
-    time. A long profile reaches the maximum velocity `v`; a medium profile reaches only the maximum
-    acceleration `a`; a short profile reaches only the maximum jerk `j`.
-    """
-    d, v, a, j = np.abs(displacement), limits.velocity, limits.acceleration, limits.jerk
-    jerk_time = a / j  # [s] from zero to the maximum acceleration
-    ramp_time = np.where(v >= a * jerk_time, v / a + jerk_time, 2 * np.sqrt(v / j))  # [s] to maximum velocity
-    medium_time = jerk_time + np.sqrt(jerk_time**2 + 4 * d / a)
-    short_time = 4 * np.cbrt(d / 2 / j)
-    time_below_max_velocity = np.where(d >= 2 * a * jerk_time**2, medium_time, short_time)
-    return np.max(np.where(d >= v * ramp_time, d / v + ramp_time, time_below_max_velocity), axis=-1)
-
-
-BranchKey = tuple[float, ...]
-"""Key of a branch of the inverse kinematics; the meaning of the numbers depends on the arm.
-
-In each branch, a tool pose has at most one solution, and a short path of the tool has continuous solutions.
-"""
+        Each joint has the symmetric seven-phase profile of limited jerk, and the slowest joint determines the
+        time. A long profile reaches the maximum velocity `v`; a medium profile reaches only the maximum
+        acceleration `a`; a short profile reaches only the maximum jerk `j`.
+        """
+        d = np.abs(displacement)
+        v = self.velocity
+        a = self.acceleration
+        j = self.jerk
+        # [s] from zero to the maximum acceleration, and to the maximum velocity
+        jerk_time = a / j
+        ramp_time = np.where(v >= a * jerk_time, v / a + jerk_time, 2 * np.sqrt(v / j))
+        medium_time = jerk_time + np.sqrt(jerk_time**2 + 4 * d / a)
+        short_time = 4 * np.cbrt(d / 2 / j)
+        time_below_max_velocity = np.where(d >= 2 * a * jerk_time**2, medium_time, short_time)
+        return np.max(np.where(d >= v * ramp_time, d / v + ramp_time, time_below_max_velocity), axis=-1)
 
 
 class Solutions(NamedTuple):

@@ -16,11 +16,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from executive.cell.objects import Load
+from executive.cell.objects import MIN_LIFT_ACCELERATION, SAFETY_FACTOR, Load
 from executive.cell.protocols import STEP
 from executive.geometry import GRAVITY, Array
 from executive.motion.clearance_model import ClearanceModel, NearestPairs
-from executive.motion.joints import JointLimits, JointState, Kinematics
+from executive.motion.configurations import Candidate
+from executive.motion.joints import JointState, Kinematics
 from executive.motion.trajectory import Connector, JointLimitError, PointToPoint, Trajectory
 from executive.motion.transcription import (
     SAMPLES_PER_STEP,
@@ -31,18 +32,28 @@ from executive.motion.transcription import (
     Transcription,
 )
 
-SAFETY_FACTOR = 2.0
-"""Ratio of the maximum force that a seal withstands to the largest force on the seal during a motion."""
 DISTANCE_PER_ACCELERATION = 0.02
 """Factor that converts accelerations to distances in the constraints of the optimizer [m per m/s²]."""
 SAMPLE_STRIDE = 4
 """Every `SAMPLE_STRIDE`-th sample has a constraint; a divisor of `SAMPLES_PER_STEP`."""
 _SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])  # Product with three samples: acceleration * sample_time²
 _FINITE_DIFFERENCE_STEP = 1e-4  # [rad]
-MIN_LIFT_ACCELERATION = 0.5
-"""Lower limit of the maximum acceleration of a lift, even if the seal withstands less [m/s²]."""
 MIN_ACCELERATION_FRACTION = 0.2
 """Minimum fraction of the planned accelerations after a slowdown, even if the seal withstands less."""
+MAX_SLACK = 0.03
+"""Constraints with a larger slack are left out of a quadratic program [m]."""
+INITIAL_TRUST_RADIUS = 0.3
+"""Maximum change of the accelerations in the first optimization step, as a fraction of their limits."""
+TRUST_RADIUS_FACTOR = 0.9
+"""Factor on the maximum change of the accelerations after each optimization step."""
+INITIAL_DURATION_FRACTIONS = (0.8, 1.0, 1.2)
+"""Durations of the initial motion, as fractions of the duration of the motion that stops at via points.
+
+The first one with a solution is used."""
+JOINT_RANGE_MARGIN = 0.01
+"""Minimum distance from the position limits of the joints [rad]."""
+CONVERGENCE_TOLERANCE = 2e-3
+"""Change of the cost in an optimization step below which the optimization has converged [s]."""
 
 
 class PayloadLimit:
@@ -50,18 +61,17 @@ class PayloadLimit:
 
     The force on the seal is `m |a + g|`, with the mass `m` of the load, the acceleration `a` of its centre,
     and `g` = 9.81 m/s² upwards.
+
+    Attributes:
+        max_lift_acceleration: Maximum upward acceleration [m/s²].
     """
 
     def __init__(self, load: Load, kinematics: Kinematics) -> None:
         # Maximum of |a + g| [m/s²].
         self._max_specific_force = load.holding_force / SAFETY_FACTOR / load.object_class.mass
+        self.max_lift_acceleration = max(self._max_specific_force - GRAVITY, MIN_LIFT_ACCELERATION)
         self._centre_offset = load.object_class.height / 2
         self._kinematics = kinematics
-
-    @property
-    def max_lift_acceleration(self) -> float:
-        """Maximum upward acceleration [m/s²]."""
-        return max(self._max_specific_force - GRAVITY, MIN_LIFT_ACCELERATION)
 
     def find_acceleration_fraction(self, trajectory: Trajectory) -> float:
         """Return the largest factor, 0 to 1, on the accelerations with which the safety factor holds."""
@@ -69,8 +79,14 @@ class PayloadLimit:
         if len(centres) < 4:
             return 1.0
         # The interval before the last sample is shorter than a control step.
-        acceleration = np.diff(centres[:-1], n=2, axis=0) / STEP**2
-        return float(np.min(_find_acceleration_fractions(acceleration, self._max_specific_force)))
+        accelerations = np.diff(centres[:-1], n=2, axis=0) / STEP**2
+        # With the acceleration `a` and the maximum `f` of `|k a + g|`, the factor `k` of each interval solves
+        # `k² (a a) + 2 k (a g) + g g - f² = 0`.
+        a_a = np.sum(accelerations**2, axis=1) + 1e-12
+        a_g = GRAVITY * accelerations[:, 2]
+        discriminant = a_g**2 - a_a * (GRAVITY**2 - self._max_specific_force**2)
+        fractions = (np.sqrt(np.maximum(discriminant, 0.0)) - a_g) / a_a
+        return float(np.min(np.clip(np.where(discriminant < 0, 0.0, fractions), 0.0, 1.0)))
 
     def make_safe_motion(self, trajectory: Trajectory) -> Trajectory:
         """Return the motion, slowed down so that it keeps the safety factor if possible."""
@@ -96,7 +112,9 @@ class PayloadLimit:
         magnitude = np.linalg.norm(specific_force, axis=1)
         slack = DISTANCE_PER_ACCELERATION * (self._max_specific_force - magnitude)
         is_close = slack < max_slack
-        slack, samples, acceleration = slack[is_close], samples[is_close], acceleration[is_close]
+        slack = slack[is_close]
+        samples = samples[is_close]
+        acceleration = acceleration[is_close]
         force_direction = specific_force[is_close] / magnitude[is_close, None]
         displaced_qs = qs[samples][:, :, None] + _FINITE_DIFFERENCE_STEP * np.eye(qs.shape[1])
         displaced_centres = self._locate_load(displaced_qs.reshape(-1, qs.shape[1]))
@@ -116,44 +134,16 @@ class PayloadLimit:
         return np.asarray(tcps + self._centre_offset * axes)
 
 
-def _find_acceleration_fractions(accelerations: Array, max_specific_force: float) -> Array:
-    """Return the largest factors `k` `(N,)`, 0 to 1, that keep `|k a + g|` within its maximum [m/s²].
-
-    With accelerations `a` `(N, 3)` and maximum `f`, `k` solves `k² (a a) + 2 k (a g) + g g - f² = 0`.
-    """
-    a_a = np.sum(accelerations**2, axis=1) + 1e-12
-    a_g = GRAVITY * accelerations[:, 2]
-    discriminant = a_g**2 - a_a * (GRAVITY**2 - max_specific_force**2)
-    fractions = (np.sqrt(np.maximum(discriminant, 0.0)) - a_g) / a_a
-    return np.clip(np.where(discriminant < 0, 0.0, fractions), 0.0, 1.0)
-
-
-MAX_SLACK = 0.03
-"""Constraints with a larger slack are left out of a quadratic program [m]."""
-INITIAL_TRUST_RADIUS = 0.3
-"""Maximum change of the accelerations in the first optimization step, as a fraction of their limits."""
-TRUST_RADIUS_FACTOR = 0.9
-"""Factor on the maximum change of the accelerations after each optimization step."""
-INITIAL_DURATION_FRACTIONS = (0.8, 1.0, 1.2)
-"""Durations of the initial motion, as fractions of the duration of the motion that stops at via points.
-
-The first one with a solution is used."""
-JOINT_RANGE_MARGIN = 0.01
-"""Minimum distance from the position limits of the joints [rad]."""
-CONVERGENCE_TOLERANCE = 2e-3
-"""Change of the cost in an optimization step below which the optimization has converged [s]."""
-
-
 @dataclass(frozen=True, eq=False)
-class OptimizationProblem:
-    """The optimization problem between two states.
+class MotionProblem:
+    """Start and constraints of all motions of a search.
 
     The slack of a state is the smallest of these margins: each clearance minus the required clearance [m],
     the maximum tilt of the tool minus its tilt as an equivalent distance [m], and the distance of each joint
     from its range limits [rad].
 
     Attributes:
-        start, end: States at the start and at the end of the motion.
+        start: State at the start of the free part.
         connector: Planner of motions between two states within the joint limits.
         kinematics: Kinematics of the arm.
         clearance: Model of the distances from the obstacles.
@@ -161,11 +151,18 @@ class OptimizationProblem:
     """
 
     start: JointState
-    end: JointState
     connector: Connector
     kinematics: Kinematics
     clearance: ClearanceModel
     payload: PayloadLimit | None = None
+
+    def require_clearance(self, qs: Array) -> None:
+        """Check that joint positions `(N, n)` [rad] keep the required distances from obstacles.
+
+        Raises:
+            Blocked: A distance is too small.
+        """
+        self.clearance.require_clearance(*self.kinematics.compute_tcps_and_axes(qs))
 
     def compute_slack(self, qs: Array) -> Array:
         """Return the slack `(N,)` of joint positions `(N, n)` [rad]; it is negative for a violation."""
@@ -211,27 +208,32 @@ class Optimizer:
     """Optimizer of the motion between two states.
 
     Args:
-        problem: The optimization problem.
-        initial_qs: Samples `(M, n)` [rad] of a motion that stops at via points, at `SAMPLE_FRACTIONS`.
+        problem: Start and constraints of the motion.
+        candidate: End of the motion.
+        qs: Samples `(M, n)` [rad] of a motion that stops at via points, at `SAMPLE_FRACTIONS`.
         duration: Duration of the motion that stops at via points [s].
 
     Attributes:
+        candidate: End of the motion.
         cost: Duration of the best motion, plus the cost of its violated constraints [s].
 
     Raises:
         JointLimitError: The initial motion cannot be approximated within the joint limits.
     """
 
-    def __init__(self, problem: OptimizationProblem, initial_qs: Array, duration: float) -> None:
+    def __init__(self, problem: MotionProblem, candidate: Candidate, qs: Array, duration: float) -> None:
+        self.candidate = candidate
         self._problem = problem
-        self._transcription = Transcription(problem.start, problem.end, problem.connector.limits)
+        limits = problem.connector.limits
+        self._transcription = Transcription(problem.start, candidate.free_part_end, limits)
         for fraction in INITIAL_DURATION_FRACTIONS:
-            motion = self._transcription.fit(fraction * duration / STEP_COUNT, initial_qs)
+            motion = self._transcription.fit(fraction * duration / STEP_COUNT, qs)
             if motion is not None:
                 break
         else:
             raise JointLimitError("no motion inside the limits approximates the motion with via points")
-        self._best_motion, self._trust_radius = motion, INITIAL_TRUST_RADIUS
+        self._best_motion = motion
+        self._trust_radius = INITIAL_TRUST_RADIUS
         self.cost = self._last_cost = math.inf
         self._has_converged = False
         self._payload_constraints: list[LinearizedConstraints] = []
@@ -256,8 +258,8 @@ class Optimizer:
             self._set_iterate(motion)
 
     def _set_iterate(self, motion: DiscreteMotion) -> None:
-        """Make `motion` the current iterate, and also the best motion if its cost is the lowest."""
-        self._iterate, self._nearest_pairs = motion, self._problem.find_nearest_pairs(motion.qs)
+        self._iterate = motion
+        self._nearest_pairs = self._problem.find_nearest_pairs(motion.qs)
         violations = [-float(self._nearest_pairs.slack.min())]
         if self._problem.payload is not None:
             sample_time = motion.step_duration / SAMPLES_PER_STEP
@@ -268,7 +270,8 @@ class Optimizer:
         self._has_converged = abs(cost - self._last_cost) < CONVERGENCE_TOLERANCE
         self._last_cost = cost
         if cost < self.cost:
-            self._best_motion, self.cost = motion, cost
+            self._best_motion = motion
+            self.cost = cost
 
     def connect_states(self, *, keeps_timing: bool) -> tuple[PointToPoint, ...]:
         """Return the best motion as point-to-point motions between its states.
@@ -281,18 +284,12 @@ class Optimizer:
         Raises:
             JointLimitError: No motion connects two of the states.
         """
+        connector = self._problem.connector
+        states = []
+        for state in self._transcription.compute_states(self._best_motion)[:: 1 if keeps_timing else 2]:
+            # While an acceleration `a` falls to 0 with the maximum jerk `j`, it changes the velocity by
+            # `a² / (2 j)`. The velocity is clipped, so that a motion through the state keeps the limits.
+            max_velocity = connector.limits.velocity - state.qdd**2 / (2 * connector.limits.jerk)
+            states.append(state._replace(qd=np.clip(state.qd, -max_velocity, max_velocity)))
         min_duration = self._best_motion.step_duration / 2 if keeps_timing else None
-        states = [
-            _limit_velocity(state, self._problem.connector.limits)
-            for state in self._transcription.compute_states(self._best_motion)[:: 1 if keeps_timing else 2]
-        ]
-        return tuple(self._problem.connector.connect(*ends, min_duration) for ends in pairwise(states))
-
-
-def _limit_velocity(state: JointState, limits: JointLimits) -> JointState:
-    """Return the state with its velocity clipped, so that a motion through it keeps the velocity limits.
-
-    While an acceleration `a` falls to 0 with the maximum jerk `j`, it changes the velocity by `a² / (2 j)`.
-    """
-    max_velocity = limits.velocity - state.qdd**2 / (2 * limits.jerk)
-    return state._replace(qd=np.clip(state.qd, -max_velocity, max_velocity))
+        return tuple(connector.connect(*ends, min_duration) for ends in pairwise(states))

@@ -3,7 +3,8 @@
 The planner chooses the branch of the inverse kinematics and, if the yaw of the goal is free, the final yaw.
 The planner prefers the direct motion, and optimizes a detour if an obstacle blocks the direct motion. Each
 motion is checked for collisions, optionally in a more exact model. The search has a maximum number of steps
-instead of a timeout, so that equal queries have equal results. An arm plans in a worker thread.
+instead of a timeout, so that equal queries have equal results. An arm has its motions planned in a thread,
+and keeps one plan for a later request.
 """
 
 from __future__ import annotations
@@ -19,14 +20,14 @@ from numpy.typing import ArrayLike
 
 from executive.cell.arm import Goal, Motion, Task, reject_generator
 from executive.cell.config import CellConfig
-from executive.cell.layout import compute_travel_height
 from executive.cell.protocols import STEP, Clock
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit, MotionPlanned
 from executive.geometry import Array, Pose
+from executive.motion.arms import build_planning_kinematics
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import JointLimits, Kinematics
-from executive.motion.optimizer import PayloadLimit
+from executive.motion.optimizer import MotionProblem
 from executive.motion.search import MotionSearch
 from executive.motion.trajectory import JointLimitError, Trajectory, downsample_path
 from executive.processes import wait_until_done
@@ -53,12 +54,12 @@ class Planner:
         self.kinematics = kinematics
         self._config = config
         self._check_collision = check_collision
-        self._reach_problems: dict[Goal, str] = {}
 
     def plan(self, q_start: ArrayLike, goal: Goal | ArrayLike, task: Task = Task()) -> Trajectory:
         """Return a fast motion from rest at `q_start` `(n,)` [rad] to a goal or to joint positions `(n,)`.
 
-        With a load, the motion is slowed down until the seal of the load holds.
+        The motion is the first one of the search that passes all checks. With a load, it is then slowed down
+        until the seal of the load holds.
 
         Raises:
             Unreachable: The goal has no joint solution inside the limits.
@@ -66,50 +67,23 @@ class Planner:
         """
         start = np.asarray(q_start, dtype=float)
         end = goal if isinstance(goal, Goal) else np.asarray(goal, dtype=float)
-        motion = self._find_motion(start, end, task)
-        return PayloadLimit(task.load, self.kinematics).make_safe_motion(motion) if task.load else motion
-
-    def require_reachable(self, goal: Goal) -> None:
-        """Check that the arm reaches both a goal and the travel height above the goal in the same branch.
-
-        Raises:
-            Unreachable: The arm cannot reach both; the message states the joint limit or the distance.
-        """
-        approach_height = max(0.0, compute_travel_height(self._config) - goal.position[2])
-        find_configuration_pairs(self.kinematics, goal, approach_height, np.zeros(self.limits.joint_count))
-
-    def describe_unreachable(self, goal: Goal) -> str:
-        """Return a sentence if no configuration reaches a goal and the start of its descent, else "".
-
-        The answer is computed once per goal, because a `guard` of the tree may ask in every control step.
-        """
-        if goal not in self._reach_problems:
-            try:
-                q_start = np.zeros(self.limits.joint_count)
-                find_configuration_pairs(self.kinematics, goal, goal.guarded_length, q_start)
-                self._reach_problems[goal] = ""
-            except Unreachable as error:
-                self._reach_problems[goal] = str(error)
-        return self._reach_problems[goal]
-
-    def _find_motion(self, start: Array, end: Goal | Array, task: Task) -> Trajectory:
-        """Return the first motion of the search that passes all checks."""
         task_before_contact = _treat_target_as_obstacle(task)
         search = MotionSearch(self._config, self.kinematics, self.limits, start, end, task_before_contact)
         errors: list[str] = []
         for motion in search.plan_motions():
             try:
-                self._check_motion(motion, search, task)
+                self._check_motion(motion, search.problem, task)
             except (Blocked, Unreachable, JointLimitError) as error:
                 errors.append(str(error))
             else:
-                return motion
+                payload = search.problem.payload
+                return payload.make_safe_motion(motion) if payload else motion
         if not errors:
             raise Blocked("no motion inside the joint limits leads to the goal")
         summary = f"; all {len(errors)} motions that were tried are blocked" if len(errors) > 1 else ""
         raise Blocked(f"{errors[0]}{summary}")
 
-    def _check_motion(self, motion: Trajectory, search: MotionSearch, task: Task) -> None:
+    def _check_motion(self, motion: Trajectory, problem: MotionProblem, task: Task) -> None:
         """Check joint limits and collisions of a motion.
 
         Raises:
@@ -120,7 +94,7 @@ class Planner:
         has_guarded_part = motion.guarded_start_time < math.inf
         # The first state always belongs to the free part, which therefore is never empty.
         free_qs = qs[: max(1, math.ceil(motion.guarded_start_time / STEP))] if has_guarded_part else qs
-        search.require_clearance(free_qs)
+        problem.require_clearance(free_qs)
         if self._check_collision is not None:
             free_path = downsample_path(free_qs, MAX_CHECK_SPACING)
             self._check_collision(free_path, _treat_target_as_obstacle(task))
@@ -132,6 +106,11 @@ def _treat_target_as_obstacle(task: Task) -> Task:
     """Return the task of the part before the guarded part, in which the target counts as an obstacle."""
     targets = () if task.target is None else (task.target,)
     return replace(task, obstacles=(*task.obstacles, *targets), target=None)
+
+
+def build_planner(config: CellConfig, check_collision: CollisionCheck | None = None) -> Planner:
+    """Return the planner for the arm of a cell file, optionally with an additional collision check."""
+    return Planner(config, build_planning_kinematics(config), check_collision)
 
 
 M = TypeVar("M", bound=Motion)
@@ -159,24 +138,19 @@ class Plan(Generic[M]):
         """True if the time `ready_time` has come.
 
         This property waits for the worker at `ready_time`, so that the time at which a motion becomes
-        available does not depend on the speed of the computer. If the plan is ready, the first read of the
-        property calls `report`.
+        available does not depend on the speed of the computer.
         """
         if self.clock.now < self.ready_time - self.clock.step / 2:
             return False
         wait_until_done(self.future)
-        if self.report is not None:
-            report, self.report = self.report, None
+        report = self.report
+        self.report = None
+        if report is not None:
             report()
         return True
 
     def result(self) -> M:
-        """Return the motion.
-
-        Raises:
-            Unreachable: The goal has no joint solution inside the limits.
-            Blocked: Every candidate comes too close to an obstacle.
-        """
+        """Return the motion, or raise the error of the planner."""
         return self.future.result()
 
 
@@ -185,14 +159,14 @@ class PlanningArm(Generic[M]):
 
     Args:
         config: The cell file.
-        planner: Motion planner with the kinematics of the arm.
+        kinematics: Kinematics of the arm.
         plan_motion: Function that plans a motion from rest at joint positions to a goal or to other joint
             positions, `(n,)` each [rad]; called in the worker thread.
         clock: Clock of the run.
         emit: Function that receives an event for each requested plan when the plan is ready.
 
     Attributes:
-        planner: Motion planner with the kinematics of the arm.
+        kinematics: Kinematics of the arm.
         poses: Joint positions `(n,)` [rad] of each named pose of the cell file.
         collision: Description of the collision that ended the last motion, or None.
         contact_point: Point of the collision in the world `(x, y, z)` [m]; None: unknown, or no collision.
@@ -201,19 +175,20 @@ class PlanningArm(Generic[M]):
     def __init__(
         self,
         config: CellConfig,
-        planner: Planner,
+        kinematics: Kinematics,
         plan_motion: Callable[[Array, Goal | Array, Task], M],
         clock: Clock,
         emit: Emit,
     ) -> None:
-        self.planner = planner
-        self._plan_motion = plan_motion
+        self.kinematics = kinematics
         self.poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
         self.collision: str | None = None
         self.contact_point: Sequence[float] | None = None
+        self._plan_motion = plan_motion
         self._clock = clock
         self._planning_time = config.motion.planning_time
         self._emit = emit
+        self._reach_problems: dict[Goal, str] = {}
         self._worker = ThreadPoolExecutor(1, "planner")
         self._stored_query: tuple[bytes, Goal | str, Task] | None = None
         self._stored_plan: Plan[M] | None = None
@@ -236,21 +211,27 @@ class PlanningArm(Generic[M]):
     @property
     def tool_pose(self) -> Pose:
         """Pose of the tool centre point in the world."""
-        return self.planner.kinematics.compute_tool_pose(self.q)
+        return self.kinematics.compute_tool_pose(self.q)
 
     @property
     def destination(self) -> Array:
         """Position of the tool `(3,)` [m] at the end of the running motion, or now if the arm is at rest."""
-        return self.planner.kinematics.compute_tool_pose(self._end_q).position
+        return self.kinematics.compute_tool_pose(self._end_q).position
 
     def describe_unreachable(self, goal: Goal) -> str:
-        """Return a sentence if no joint configuration within the limits reaches a goal, else ""."""
-        return self.planner.describe_unreachable(goal)
+        """Return a sentence if no configuration reaches a goal and the start of its descent, else ""."""
+        # The answer is computed once per goal, because a `guard` of the tree may ask in every control step.
+        if goal not in self._reach_problems:
+            try:
+                q_start = np.zeros_like(self.kinematics.joint_range.lower)
+                find_configuration_pairs(self.kinematics, goal, goal.guarded_length, q_start)
+                self._reach_problems[goal] = ""
+            except Unreachable as error:
+                self._reach_problems[goal] = str(error)
+        return self._reach_problems[goal]
 
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[M]:
-        """Begin to plan a motion from the current position to a goal, or to a named pose of the cell file.
-
-        A plan that `plan_ahead` began is continued.
+        """Begin to plan a motion, or continue a plan that `plan_ahead` began.
 
         Raises:
             Fault: The arm is moving, or the cell file has no such pose.
@@ -270,11 +251,7 @@ class PlanningArm(Generic[M]):
         return plan
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
-        """Plan the next motion, from the end of the running motion, before `plan` requests it.
-
-        Raises:
-            Fault: The cell file has no such pose.
-        """
+        """Begin to plan the next motion; raise Fault if the cell file has no such pose."""
         self._store_plan(goal, task)
 
     def close(self) -> None:
@@ -286,7 +263,7 @@ class PlanningArm(Generic[M]):
         if isinstance(goal, str) and goal not in self.poses:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self.poses))}')
         start = self._end_q.copy()
-        query = start.tobytes(), goal, task
+        query = (start.tobytes(), goal, task)
         if self._stored_plan is None or query != self._stored_query:
             if self._stored_plan is not None:
                 # A plan that the worker has already started cannot be cancelled, but nobody reads its result.

@@ -13,7 +13,7 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.layout import compute_travel_height
+from executive.cell.layout import Vector3, compute_travel_height
 from executive.cell.protocols import STEP
 from executive.errors import Unreachable
 from executive.geometry import Array, make_tool_down_pose
@@ -26,7 +26,7 @@ from executive.motion.configurations import (
     solve_vertical_waypoints,
 )
 from executive.motion.joints import BranchKey, JointLimits, JointState, Kinematics
-from executive.motion.optimizer import OptimizationProblem, Optimizer, PayloadLimit
+from executive.motion.optimizer import MotionProblem, Optimizer, PayloadLimit
 from executive.motion.trajectory import Connector, JointLimitError, MotionPiece, Trajectory, sample_pieces
 from executive.motion.transcription import SAMPLE_FRACTIONS
 
@@ -62,6 +62,9 @@ class MotionSearch:
         start: Joint positions at the start `(n,)` [rad].
         end: A goal, or joint positions at the end `(n,)` [rad].
         task: Load and obstacles of the free part; `task.obstacles` includes the target.
+
+    Attributes:
+        problem: Start and constraints of the free part.
     """
 
     def __init__(
@@ -75,27 +78,39 @@ class MotionSearch:
     ) -> None:
         self._kinematics = kinematics
         self._limits = limits
-        self._connector = Connector(limits)
         self._travel_height = compute_travel_height(config)
         self._end = end
         self._straight_part_length = config.motion.straight
         discs = make_tool_discs(config, task.load)
-        if not isinstance(end, Goal) and task.load is None:
-            # A motion to joint positions, i.e. to a named pose, must be possible from any configuration.
-            discs = discs._replace(min_cosine=-1.0)
-        self._payload = PayloadLimit(task.load, kinematics) if task.load else None
         start_tcp_and_axis = kinematics.compute_tcps_and_axes(start[None])
-        tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, self._locate_free_part_end(), strict=True))
-        self._clearance = ClearanceModel(config, task.obstacles, tcps[:, :2], discs)
-        self._clearance.relax_end_margins(tcps, axes)
+        if isinstance(end, Goal):
+            x, y, z = end.position
+            end_tcp_and_axis = (np.array([[x, y, z + end.slow_length]]), np.array([[0.0, 0.0, -1.0]]))
+        else:
+            end_tcp_and_axis = kinematics.compute_tcps_and_axes(end[None])
+            if task.load is None:
+                # A motion to joint positions, i.e. to a named pose, must be possible from any configuration.
+                discs = discs._replace(min_cosine=-1.0)
+        tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, end_tcp_and_axis, strict=True))
+        clearance = ClearanceModel(config, task.obstacles, tcps[:, :2], discs)
+        clearance.relax_end_margins(tcps, axes)
+        payload = PayloadLimit(task.load, kinematics) if task.load else None
+        self._departure = departure = self._plan_departure(start, float(tcps[0, 2]), payload)
+        free_start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
+        self.problem = MotionProblem(free_start, Connector(limits), kinematics, clearance, payload)
         # The motion up to a via point is the same for all candidates, and is planned once per height.
         self._get_rise = functools.cache(self._plan_rise)
-        self._departure = departure = self._plan_departure(start, float(tcps[0, 2]))
-        self._start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
 
     def plan_motions(self) -> Iterator[Trajectory]:
         """Plan and yield motions, the best first; motions that stop at via points are last."""
-        remaining_candidates = islice(self._list_candidates(), MAX_CANDIDATES)
+        if isinstance(self._end, Goal):
+            length = self._end.slow_length or self._straight_part_length
+            all_candidates = find_candidates(
+                self._kinematics, self._limits, self.problem.start, self._end, length
+            )
+        else:
+            all_candidates = iter([Candidate(0.0, JointState.at_rest(self._end), None, None)])
+        remaining_candidates = islice(all_candidates, MAX_CANDIDATES)
         candidates: list[Candidate] = []
         while group := list(islice(remaining_candidates, COMPARED_CANDIDATES)):
             yield from self._plan_direct_motions_and_detours(group)
@@ -106,53 +121,63 @@ class MotionSearch:
                     free_part = self._connect_by_via_points(candidate, extra_height, prefers_lines=True)
                     yield self._build_motion(candidate, *free_part)
 
-    def require_clearance(self, qs: Array) -> None:
-        """Check that joint positions `(N, n)` [rad] keep the required distances from obstacles.
-
-        Raises:
-            Blocked: A distance is too small.
-        """
-        self._clearance.require_clearance(*self._kinematics.compute_tcps_and_axes(qs))
-
-    def _locate_free_part_end(self) -> tuple[Array, Array]:
-        """Return tool centre point [m] and tool axis, `(1, 3)` each, at the end of the free part."""
-        if not isinstance(self._end, Goal):
-            return self._kinematics.compute_tcps_and_axes(self._end[None])
-        x, y, z = self._end.position
-        return np.array([[x, y, z + self._end.slow_length]]), np.array([[0.0, 0.0, -1.0]])
-
-    def _list_candidates(self) -> Iterator[Candidate]:
-        """Return an iterator of candidates for the end of the motion, the fastest first."""
-        if not isinstance(self._end, Goal):
-            return iter([Candidate(0.0, JointState.at_rest(self._end), None, None)])
-        arrival_length = self._end.slow_length or self._straight_part_length
-        return find_candidates(self._kinematics, self._limits, self._start, self._end, arrival_length)
-
     def _plan_direct_motions_and_detours(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
         """Plan and yield refined detours and collision-free direct motions, the fastest first."""
         motions, optimizers = self._evaluate_candidates(candidates)
-        next_costs = [*(self._compute_total_cost(*pair) for pair in optimizers), math.inf][1:]
-        deferred_optimizers: list[tuple[Candidate, Optimizer]] = []
-        for (candidate, optimizer), next_cost in zip(optimizers, next_costs, strict=True):
+        next_costs = [*map(self._compute_total_cost, optimizers), math.inf][1:]
+        deferred_optimizers: list[Optimizer] = []
+        for optimizer, next_cost in zip(optimizers, next_costs, strict=True):
             optimizer.improve(REFINEMENT_STEP_COUNT)
-            cost = self._compute_total_cost(candidate, optimizer)
+            cost = self._compute_total_cost(optimizer)
             while motions and motions[0][0] <= cost:
                 yield motions.pop(0)[1]
-            detours = list(self._build_detour(candidate, optimizer, keeps_timing=False))
+            detours = list(self._build_detour(optimizer, keeps_timing=False))
             if not detours or detours[0][0] > cost:
-                detours += self._build_detour(candidate, optimizer, keeps_timing=True)
+                detours += self._build_detour(optimizer, keeps_timing=True)
             else:
-                deferred_optimizers.append((candidate, optimizer))
+                deferred_optimizers.append(optimizer)
             motions = sorted([*motions, *detours], key=itemgetter(0))
             # A detour may take longer than estimated by its optimizer; then the next detour is refined first.
             while motions and motions[0][0] <= MAX_DURATION_FACTOR * next_cost:
                 yield motions.pop(0)[1]
         yield from (motion for _, motion in motions)
-        for candidate, optimizer in deferred_optimizers:
-            yield from (motion for _, motion in self._build_detour(candidate, optimizer, keeps_timing=True))
+        for optimizer in deferred_optimizers:
+            yield from (motion for _, motion in self._build_detour(optimizer, keeps_timing=True))
+
+    def _evaluate_candidates(
+        self, candidates: Sequence[Candidate]
+    ) -> tuple[list[tuple[float, Trajectory]], list[Optimizer]]:
+        """Return pairs `(duration [s], direct motion)` without collision, and optimizers for the others.
+
+        Both lists begin with the fastest motion.
+        """
+        direct_motions: list[tuple[float, Trajectory]] = []
+        optimizers: list[Optimizer] = []
+        for candidate in candidates:
+            costs = [duration for duration, _ in direct_motions]
+            costs += map(self._compute_total_cost, optimizers)
+            min_duration = self._compute_straight_duration(candidate) + candidate.min_duration
+            if min(costs, default=math.inf) <= min_duration:
+                break
+            with contextlib.suppress(JointLimitError, Unreachable):
+                free_part = self.problem.connector.connect(self.problem.start, candidate.free_part_end)
+                qs = free_part.sample(SAMPLE_FRACTIONS * free_part.duration).q
+                if self.problem.compute_slack(qs).min() >= 0:
+                    motion = self._build_motion(candidate, free_part)
+                    direct_motions.append((motion.duration, motion))
+                    continue
+                initial_guess = self._connect_by_via_points(candidate, EXTRA_HEIGHTS[0], prefers_lines=False)
+                duration = sum(piece.duration for piece in initial_guess)
+                qs = sample_pieces(initial_guess, SAMPLE_FRACTIONS * duration).q
+                optimizer = Optimizer(self.problem, candidate, qs, duration)
+                optimizer.improve(INITIAL_STEP_COUNT)
+                optimizers.append(optimizer)
+        direct_motions.sort(key=itemgetter(0))
+        optimizers.sort(key=self._compute_total_cost)
+        return direct_motions, optimizers
 
     def _build_detour(
-        self, candidate: Candidate, optimizer: Optimizer, *, keeps_timing: bool
+        self, optimizer: Optimizer, *, keeps_timing: bool
     ) -> Iterator[tuple[float, Trajectory]]:
         """Yield a detour as a pair `(duration [s], motion)`, unless it exceeds a joint limit.
 
@@ -161,51 +186,14 @@ class MotionSearch:
         the motion after its slowdown for the load; the returned motion is not slowed down yet.
         """
         with contextlib.suppress(JointLimitError):
-            motion = self._build_motion(candidate, *optimizer.connect_states(keeps_timing=keeps_timing))
-            yield (self._payload.make_safe_motion(motion) if self._payload else motion).duration, motion
+            free_part = optimizer.connect_states(keeps_timing=keeps_timing)
+            motion = self._build_motion(optimizer.candidate, *free_part)
+            payload = self.problem.payload
+            yield (payload.make_safe_motion(motion) if payload else motion).duration, motion
 
-    def _evaluate_candidates(
-        self, candidates: Sequence[Candidate]
-    ) -> tuple[list[tuple[float, Trajectory]], list[tuple[Candidate, Optimizer]]]:
-        """Return pairs `(duration [s], direct motion)` and pairs `(candidate, optimizer)`.
-
-        The direct motions are free of collision; the optimizers plan detours to the other candidates. Both
-        lists begin with the fastest motion.
-        """
-        direct_motions: list[tuple[float, Trajectory]] = []
-        optimizers: list[tuple[Candidate, Optimizer]] = []
-        for candidate in candidates:
-            costs = [duration for duration, _ in direct_motions]
-            costs += [self._compute_total_cost(*pair) for pair in optimizers]
-            if (
-                min(costs, default=math.inf)
-                <= self._compute_straight_duration(candidate) + candidate.min_duration
-            ):
-                break
-            problem = OptimizationProblem(
-                self._start, candidate.free_part_end, self._connector, self._kinematics, self._clearance,
-                self._payload,
-            )  # fmt: skip
-            with contextlib.suppress(JointLimitError, Unreachable):
-                free_part = self._connector.connect(self._start, candidate.free_part_end)
-                qs = free_part.sample(SAMPLE_FRACTIONS * free_part.duration).q
-                if problem.compute_slack(qs).min() >= 0:
-                    motion = self._build_motion(candidate, free_part)
-                    direct_motions.append((motion.duration, motion))
-                    continue
-                initial_guess = self._connect_by_via_points(candidate, EXTRA_HEIGHTS[0], prefers_lines=False)
-                duration = sum(piece.duration for piece in initial_guess)
-                qs = sample_pieces(initial_guess, SAMPLE_FRACTIONS * duration).q
-                optimizer = Optimizer(problem, qs, duration)
-                optimizer.improve(INITIAL_STEP_COUNT)
-                optimizers.append((candidate, optimizer))
-        direct_motions.sort(key=itemgetter(0))
-        optimizers.sort(key=lambda pair: self._compute_total_cost(*pair))
-        return direct_motions, optimizers
-
-    def _compute_total_cost(self, candidate: Candidate, optimizer: Optimizer) -> float:
+    def _compute_total_cost(self, optimizer: Optimizer) -> float:
         """Return the cost of a detour plus the duration of departure and arrival [s]."""
-        return optimizer.cost + self._compute_straight_duration(candidate)
+        return optimizer.cost + self._compute_straight_duration(optimizer.candidate)
 
     def _compute_straight_duration(self, candidate: Candidate) -> float:
         """Return the duration of departure and arrival [s]."""
@@ -238,8 +226,9 @@ class MotionSearch:
             Unreachable: A via point is out of reach in the branch of the candidate.
             JointLimitError: No motion connects two of the states.
         """
-        height, end = self._travel_height + extra_height, candidate.free_part_end
-        connect = self._connector.connect
+        height = self._travel_height + extra_height
+        end = candidate.free_part_end
+        connect = self.problem.connector.connect
         rise, start_via_point = self._get_rise(height, prefers_lines)
         (x, y, z), _ = self._locate_tool(end.q)
         if candidate.branch is None or z >= height:
@@ -256,44 +245,44 @@ class MotionSearch:
 
         If the tool starts above `height` or does not point down, the via point is the start itself.
         """
-        q = self._start.q
+        q = self.problem.start.q
         (x, y, z), is_pointing_down = self._locate_tool(q)
         if not is_pointing_down or z >= height:
-            return [], self._start
+            return [], self.problem.start
         if prefers_lines and self._departure is None:
             waypoints = find_vertical_waypoints(self._kinematics, q, height - z)
             if waypoints is not None:
                 line = CartesianLine(waypoints, height - z, self._limits)
                 return [line], JointState.at_rest(waypoints[-1])
         via_point = self._solve_via_point((x, y, height), self._kinematics.find_branch(q), q)
-        return [self._connector.connect(self._start, via_point)], via_point
+        return [self.problem.connector.connect(self.problem.start, via_point)], via_point
 
     def _locate_tool(self, q: Array) -> tuple[Array, bool]:
         """Return the tool centre point `(3,)` [m] at `q` `(n,)` [rad], and True if the tool points down."""
         tcps, axes = self._kinematics.compute_tcps_and_axes(q[None])
         return tcps[0], bool(-axes[0, 2] > MIN_RISE_COSINE)
 
-    def _solve_via_point(
-        self, position: tuple[float, float, float], branch: BranchKey, q_seed: Array
-    ) -> JointState:
+    def _solve_via_point(self, position: Vector3, branch: BranchKey, q_seed: Array) -> JointState:
         """Return the state of rest at a via point [m], with the last joint as in `q_seed` `(n,)` [rad]."""
         (q,) = self._kinematics.solve([make_tool_down_pose(position)], branch)
         q[-1] = q_seed[-1]
         return JointState.at_rest(q)
 
-    def _plan_departure(self, start: Array, height: float) -> CartesianLine | None:
+    def _plan_departure(
+        self, start: Array, height: float, payload: PayloadLimit | None
+    ) -> CartesianLine | None:
         """Return the straight motion upwards from the start, or None if the free part begins at the start.
 
         The cell file may require a straight departure. If the seal of a load permits less acceleration than
         the joints, the load also departs straight, because contact with the support could break the seal.
         """
-        length = self._straight_part_length or (LIFT_OFF_DISTANCE if self._payload else 0.0)
+        length = self._straight_part_length or (LIFT_OFF_DISTANCE if payload else 0.0)
         if not length or height + length > self._travel_height:
             return None
         waypoints = find_vertical_waypoints(self._kinematics, start, length)
         if waypoints is None:
             return None
-        acceleration = self._payload.max_lift_acceleration if self._payload else math.inf
+        acceleration = payload.max_lift_acceleration if payload else math.inf
         line = CartesianLine(
             waypoints, length, self._limits, max_acceleration=acceleration, ends_in_motion=True
         )

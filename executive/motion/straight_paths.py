@@ -38,60 +38,56 @@ class StraightMotion:
         return len(self.qs) * STEP
 
 
-class StraightPlanner:
-    """Plans motions that rise to the travel height, cross, and descend.
+def plan_straight_motion(
+    config: CellConfig, kinematics: Kinematics, start: Array, goal: Goal | Array, task: Task
+) -> StraightMotion:
+    """Return a motion from `start` `(n,)` [rad] to a goal or to joint positions `(n,)` [rad].
 
-    A motion is blocked if tool or load would come nearer to an obstacle than the cell file permits. The links
-    of the arm are not checked.
+    The motion rises to the travel height, crosses, and descends. It is blocked if tool or load would come
+    nearer to an obstacle than the cell file permits; the links of the arm are not checked.
+
+    Raises:
+        Blocked, Unreachable: The error of the first attempt, if no attempt finds a motion.
     """
+    errors: list[Exception] = []
+    travel_height = compute_travel_height(config)
+    rise = max(0.0, travel_height - float(kinematics.compute_tool_pose(start).position[2]))
+    attempts = [(rise + extra_height, travel_height + extra_height) for extra_height in EXTRA_HEIGHTS]
+    for attempt in attempts if isinstance(goal, Goal) else [(0.0, 0.0), *attempts]:
+        try:
+            qs = _find_path(kinematics, start, goal, *attempt)
+            _require_clearance(config, kinematics, np.vstack([start, qs]), task)
+            return StraightMotion(qs)
+        except (Blocked, Unreachable) as error:
+            errors.append(error)
+    raise errors[0]
 
-    def __init__(self, config: CellConfig, kinematics: Kinematics) -> None:
-        self._config = config
-        self._kinematics = kinematics
 
-    def plan(self, start: Array, goal: Goal | Array, task: Task) -> StraightMotion:
-        """Return a motion from `start` `(n,)` [rad] to a goal or to joint positions `(n,)` [rad].
+def _find_path(kinematics: Kinematics, start: Array, goal: Goal | Array, rise: float, height: float) -> Array:
+    """Return joint positions `(N, n)` [rad] of a path up by `rise` [m], and down from `height` [m]."""
+    waypoints = find_vertical_waypoints(kinematics, start, rise)
+    corners = start[None] if waypoints is None else waypoints
+    if not isinstance(goal, Goal):
+        return _interpolate(np.vstack([corners, goal]), 0.0)
+    pairs = find_configuration_pairs(kinematics, goal, goal.guarded_length, start)
+    # The largest change of a joint would be smaller with another norm, but the tool would sink more.
+    nearest = np.argmin(np.linalg.norm(pairs.upper_qs - corners[-1], axis=1))
+    length = max(0.0, height - goal.position[2] - goal.guarded_length)
+    branch = pairs.branches[nearest]
+    descent = solve_vertical_waypoints(kinematics, pairs.upper_qs[nearest], length, branch)
+    corners = np.vstack([corners, descent[::-1], pairs.lower_qs[nearest]])
+    return _interpolate(corners, goal.guarded_length / goal.guarded_speed)
 
-        Raises:
-            Blocked, Unreachable: The error of the first attempt, if no attempt finds a motion.
-        """
-        errors: list[Exception] = []
-        travel_height = compute_travel_height(self._config)
-        rise = max(0.0, travel_height - float(self._kinematics.compute_tool_pose(start).position[2]))
-        attempts = [(rise + extra_height, travel_height + extra_height) for extra_height in EXTRA_HEIGHTS]
-        for attempt in attempts if isinstance(goal, Goal) else [(0.0, 0.0), *attempts]:
-            try:
-                qs = self._find_path(start, goal, *attempt)
-                self._require_clearance(np.vstack([start, qs]), task)
-                return StraightMotion(qs)
-            except (Blocked, Unreachable) as error:
-                errors.append(error)
-        raise errors[0]
 
-    def _find_path(self, start: Array, goal: Goal | Array, rise: float, height: float) -> Array:
-        """Return joint positions `(N, n)` [rad] of a path up by `rise` [m], and down from `height` [m]."""
-        waypoints = find_vertical_waypoints(self._kinematics, start, rise)
-        corners = start[None] if waypoints is None else waypoints
-        if not isinstance(goal, Goal):
-            return _interpolate(np.vstack([corners, goal]), 0.0)
-        pairs = find_configuration_pairs(self._kinematics, goal, goal.guarded_length, start)
-        # The largest change of a joint would be smaller with another norm, but the tool would sink more.
-        nearest = np.argmin(np.linalg.norm(pairs.upper_qs - corners[-1], axis=1))
-        length = max(0.0, height - goal.position[2] - goal.guarded_length)
-        branch = pairs.branches[nearest]
-        descent = solve_vertical_waypoints(self._kinematics, pairs.upper_qs[nearest], length, branch)
-        corners = np.vstack([corners, descent[::-1], pairs.lower_qs[nearest]])
-        return _interpolate(corners, goal.guarded_length / goal.guarded_speed)
-
-    def _require_clearance(self, qs: Array, task: Task) -> None:
-        """Raise Blocked if tool or load come too near to an obstacle at joint positions `(N, n)` [rad]."""
-        tcps, axes = self._kinematics.compute_tcps_and_axes(qs)
-        discs = make_tool_discs(self._config, task.load)._replace(min_cosine=-1.0)
-        # Only other objects may be as near as they are at the ends: the goal may not be inside table or bins.
-        for obstacles, min_margin in (((), 0.0), (task.obstacles, -math.inf)):
-            clearance = ClearanceModel(self._config, obstacles, tcps[[0, -1], :2], discs)
-            clearance.relax_end_margins(tcps[[0, -1]], axes[[0, -1]], min_margin)
-            clearance.require_clearance(tcps, axes)
+def _require_clearance(config: CellConfig, kinematics: Kinematics, qs: Array, task: Task) -> None:
+    """Raise Blocked if tool or load come too near to an obstacle at joint positions `(N, n)` [rad]."""
+    tcps, axes = kinematics.compute_tcps_and_axes(qs)
+    discs = make_tool_discs(config, task.load)._replace(min_cosine=-1.0)
+    # Only other objects may be as near as they are at the ends: the goal may not be inside table or bins.
+    for obstacles, min_margin in (((), 0.0), (task.obstacles, -math.inf)):
+        clearance = ClearanceModel(config, obstacles, tcps[[0, -1], :2], discs)
+        clearance.relax_end_margins(tcps[[0, -1]], axes[[0, -1]], min_margin)
+        clearance.require_clearance(tcps, axes)
 
 
 def _interpolate(corners: Array, min_last_time: float) -> Array:

@@ -30,10 +30,39 @@ from executive.geometry import Array
 from executive.motion.joints import JointLimits, JointState
 
 _RELATIVE_TOLERANCE = 1e-9  # fraction of a limit
+_MAX_STATE_DIFFERENCE = 1e-6
+"""Maximum difference of joint states that count as equal [rad, rad/s, rad/s²]."""
+MIN_BRAKING_TIME = 0.02
+"""Shortest time from full speed to rest [s]."""
+MAX_BRAKING_TIME = 0.5
+"""Longest time from full speed to rest [s]."""
+RETREAT_TIME = 0.15
+"""Path time before a collision to which the arm moves back after the collision [s]."""
+MAX_RETREAT_RATE = 0.75
+"""Largest rate at which the arm moves back, as a fraction of the speed of the planned motion."""
+_STEP_COUNT_ROUNDING = 1e-9  # fraction of a control period
+_BRAKING_TIMES = np.geomspace(MIN_BRAKING_TIME, MAX_BRAKING_TIME, 18)
+"""Candidates for the time from full speed to rest, the shortest first [s]."""
+_RAMP_FRACTIONS = (1 / 2, 1 / 3)
+"""Candidates for the duration of each ramp of the deceleration, as fractions of the braking time."""
 
 
 class JointLimitError(ValueError):
     """No motion within the joint limits exists, or a motion exceeds a limit."""
+
+
+class MotionPiece(Protocol):
+    """A piece of a motion, from time 0 to its duration."""
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+
+    def state_at(self, time: float) -> JointState:
+        """Return the state at `time`, 0 to `duration` [s]."""
+
+    def sample(self, times: Array) -> JointState:
+        """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
 
 
 class PointToPoint:
@@ -44,11 +73,11 @@ class PointToPoint:
         self.duration: float = profile.duration
 
     def state_at(self, time: float) -> JointState:
-        """Return the state at `time`, 0 to `duration` [s]."""
+        """Return the state at `time`."""
         return JointState(*map(np.array, self._profile.at_time(time)))
 
     def sample(self, times: Array) -> JointState:
-        """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
+        """Return the states at `times`."""
         return JointState(*np.array([self._profile.at_time(time) for time in times.tolist()]).swapaxes(0, 1))
 
 
@@ -77,11 +106,11 @@ class Connector:
         for vector in vectors:
             if len(vector) != joint_count or not math.isfinite(sum(vector)):
                 raise Fault(f"a motion needs states of {joint_count} finite numbers, not {vector}")
-        inputs, profile = self._inputs, Profile(joint_count)
+        inputs = self._inputs
         inputs.current_position, inputs.current_velocity, inputs.current_acceleration = vectors[:3]
         inputs.target_position, inputs.target_velocity, inputs.target_acceleration = vectors[3:]
         inputs.minimum_duration = min_duration
-        cause: str | None = None
+        profile = Profile(joint_count)
         try:
             result = self._ruckig.calculate(inputs, profile)
         except (RuckigError, ValueError) as error:
@@ -91,10 +120,10 @@ class Connector:
                 cause = str(result)
             elif np.any(_find_max_speeds(profile) > (1 + _RELATIVE_TOLERANCE) * self.limits.velocity):
                 cause = "the profile exceeds a velocity limit"
-        if cause is not None:
-            states = f"from {start.q.round(4)} to {end.q.round(4)} rad"
-            raise JointLimitError(f"ruckig finds no valid profile {states}: {cause}")
-        return PointToPoint(profile)
+            else:
+                return PointToPoint(profile)
+        states = f"from {start.q.round(4)} to {end.q.round(4)} rad"
+        raise JointLimitError(f"ruckig finds no valid profile {states}: {cause}")
 
 
 def _find_max_speeds(profile: Profile) -> Array:
@@ -109,24 +138,6 @@ def _find_max_speeds(profile: Profile) -> Array:
         extreme_speeds = [v - a * a / (2 * j) for v, a, next_a, j in phases if a * next_a < 0]
         max_speeds.append(max(map(abs, [*joint.v, *extreme_speeds])))
     return np.array(max_speeds)
-
-
-_MAX_STATE_DIFFERENCE = 1e-6
-"""Maximum difference of joint states that count as equal [rad, rad/s, rad/s²]."""
-
-
-class MotionPiece(Protocol):
-    """A piece of a motion, from time 0 to its duration."""
-
-    @property
-    def duration(self) -> float:
-        """Duration [s]."""
-
-    def state_at(self, time: float) -> JointState:
-        """Return the state at `time`, 0 to `duration` [s]."""
-
-    def sample(self, times: Array) -> JointState:
-        """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
 
 
 class Trajectory:
@@ -150,18 +161,19 @@ class Trajectory:
         self.duration = self._end_times[-1]
         starts = [piece.state_at(0.0) for piece in pieces]
         ends = [piece.state_at(piece.duration) for piece in pieces]
-        self.start, self.end, self._end_state = starts[0].q, ends[-1].q, ends[-1]
-        rest_at_start, rest_at_end = JointState.at_rest(self.start), JointState.at_rest(self.end)
+        self.start = starts[0].q
+        self.end = ends[-1].q
+        self._end_state = ends[-1]
         # One operation for all pairs of states that must be equal: each piece starts where the last one ends.
-        differences = np.abs(np.subtract([rest_at_start, *ends], [*starts, rest_at_end])).max(axis=2)
+        states_before = [JointState.at_rest(self.start), *ends]
+        states_after = [*starts, JointState.at_rest(self.end)]
+        differences = np.abs(np.subtract(states_before, states_after)).max(axis=2)
         pair, quantity = np.unravel_index(np.argmax(differences), differences.shape)
         if not differences[pair, quantity] <= _MAX_STATE_DIFFERENCE:  # Also true for NaN.
             problems = {0: "the start is not at rest", len(pieces): "the end is not at rest"}
             problem = problems.get(int(pair), f"pieces {pair} and {pair + 1} do not meet")
-            difference = (
-                f"{('position', 'velocity', 'acceleration')[quantity]} differs by {differences.max():.2g}"
-            )
-            raise Fault(f"invalid trajectory: {problem}; the joint {difference}")
+            name = ("position", "velocity", "acceleration")[quantity]
+            raise Fault(f"invalid trajectory: {problem}; the joint {name} differs by {differences.max():.2g}")
 
     def make_slower_copy(self, speed_factor: float) -> Trajectory:
         """Return a copy of the motion whose velocities are multiplied by `speed_factor`, 0 to 1."""
@@ -207,20 +219,23 @@ class Trajectory:
         for name, peaks in zip(("velocity", "acceleration", "jerk"), peak_fractions, strict=True):
             joint = np.argmax(peaks)
             if peaks[joint] > 1 + _MAX_STATE_DIFFERENCE:
-                factor = f"{peaks[joint]:.3f} times"
-                raise JointLimitError(f"the {name} of joint {joint + 1} would be {factor} its limit")
+                raise JointLimitError(
+                    f"the {name} of joint {joint + 1} would be {peaks[joint]:.3f} times its limit"
+                )
         return states
 
 
-def compute_peak_fractions(states: JointState, limits: JointLimits) -> Array:
-    """Return the largest velocity, acceleration and jerk of each joint as fractions of the limits `(3, n)`.
-
-    `states` are the samples of a motion. The jerk before the last sample is ignored, because the last
-    interval is shorter than a control period.
-    """
-    jerk = np.diff(states.qdd, axis=0)[:-1] / STEP
-    fractions = (states.qd / limits.velocity, states.qdd / limits.acceleration, jerk / limits.jerk)
-    return np.array([np.abs(values).max(axis=0, initial=0.0) for values in fractions])
+def sample_pieces(pieces: Sequence[MotionPiece], times: Array) -> JointState:
+    """Return the states of consecutive pieces, each array `(N, n)`, at increasing `times` `(N,)` [s]."""
+    end_times = [*accumulate(piece.duration for piece in pieces[:-1]), math.inf]
+    states = [JointState(*np.empty((3, 0, len(pieces[0].state_at(0.0).q))))]
+    start_time = 0.0
+    for piece, end_time in zip(pieces, end_times, strict=True):
+        piece_times = times[(start_time <= times) & (times < end_time)] - start_time
+        if len(piece_times):
+            states.append(piece.sample(piece_times))
+        start_time = end_time
+    return JointState(*map(np.concatenate, zip(*states, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,6 +259,17 @@ class _SlowPiece:
         return JointState(state.q, self.speed_factor * state.qd, self.speed_factor**2 * state.qdd)
 
 
+def compute_peak_fractions(states: JointState, limits: JointLimits) -> Array:
+    """Return the largest velocity, acceleration and jerk of each joint as fractions of the limits `(3, n)`.
+
+    `states` are the samples of a motion. The jerk before the last sample is ignored, because the last
+    interval is shorter than a control period.
+    """
+    jerk = np.diff(states.qdd, axis=0)[:-1] / STEP
+    fractions = (states.qd / limits.velocity, states.qdd / limits.acceleration, jerk / limits.jerk)
+    return np.array([np.abs(values).max(axis=0, initial=0.0) for values in fractions])
+
+
 def downsample_path(qs: Array, max_spacing: float) -> Array:
     """Return points of a path `(N, n)` [rad], between which joints move by up to `max_spacing` [rad]."""
     indices = [0]
@@ -252,33 +278,6 @@ def downsample_path(qs: Array, max_spacing: float) -> Array:
         if max(abs(a - b) for a, b in zip(points[index + 1], points[indices[-1]], strict=True)) > max_spacing:
             indices.append(index)
     return qs[[*indices, len(qs) - 1]]
-
-
-def sample_pieces(pieces: Sequence[MotionPiece], times: Array) -> JointState:
-    """Return the states of consecutive pieces, each array `(N, n)`, at increasing `times` `(N,)` [s]."""
-    end_times = [*accumulate(piece.duration for piece in pieces[:-1]), math.inf]
-    states, start_time = [JointState(*np.empty((3, 0, len(pieces[0].state_at(0.0).q))))], 0.0
-    for piece, end_time in zip(pieces, end_times, strict=True):
-        piece_times = times[(start_time <= times) & (times < end_time)] - start_time
-        if len(piece_times):
-            states.append(piece.sample(piece_times))
-        start_time = end_time
-    return JointState(*map(np.concatenate, zip(*states, strict=True)))
-
-
-MIN_BRAKING_TIME = 0.02
-"""Shortest time from full speed to rest [s]."""
-MAX_BRAKING_TIME = 0.5
-"""Longest time from full speed to rest [s]."""
-RETREAT_TIME = 0.15
-"""Path time before a collision to which the arm moves back after the collision [s]."""
-MAX_RETREAT_RATE = 0.75
-"""Largest rate at which the arm moves back, as a fraction of the speed of the planned motion."""
-_STEP_COUNT_ROUNDING = 1e-9  # fraction of a control period
-_BRAKING_TIMES = np.geomspace(MIN_BRAKING_TIME, MAX_BRAKING_TIME, 18)
-"""Candidates for the time from full speed to rest, the shortest first [s]."""
-_RAMP_FRACTIONS = (1 / 2, 1 / 3)
-"""Candidates for the duration of each ramp of the deceleration, as fractions of the braking time."""
 
 
 class _BrakingProfile(NamedTuple):
@@ -296,13 +295,15 @@ def plan_braking(trajectory: Trajectory, start_time: float, limits: JointLimits)
     the stop limits of joint acceleration and jerk; if no candidate is within the limits, the candidate with
     the smallest excess. The braking begins at path time `start_time` [s].
     """
-    best_path_times, min_peak_fraction = np.array([start_time]), math.inf
+    best_path_times = np.array([start_time])
+    min_peak_fraction = math.inf
     for profile in _list_profiles(trajectory, start_time):
         peak_fraction = _compute_peak_fraction(trajectory, start_time, profile, limits)
         if peak_fraction <= 1.0:
             return profile.path_times
         if peak_fraction < min_peak_fraction:
-            best_path_times, min_peak_fraction = profile.path_times, peak_fraction
+            best_path_times = profile.path_times
+            min_peak_fraction = peak_fraction
     return best_path_times
 
 
@@ -342,9 +343,12 @@ def _make_profile(start_time: float, braking_time: float, ramp_fraction: float) 
     """Return the profile that brakes from full speed at `start_time` to rest within `braking_time` [s]."""
     inputs = InputParameter(1)
     inputs.control_interface = ControlInterface.Velocity
-    inputs.current_position, inputs.current_velocity, inputs.target_velocity = [start_time], [1.0], [0.0]
+    inputs.current_position = [start_time]
+    inputs.current_velocity = [1.0]
+    inputs.target_velocity = [0.0]
     deceleration = 1.0 / (braking_time * (1 - ramp_fraction))
-    inputs.max_acceleration, inputs.max_jerk = [deceleration], [deceleration / (braking_time * ramp_fraction)]
+    inputs.max_acceleration = [deceleration]
+    inputs.max_jerk = [deceleration / (braking_time * ramp_fraction)]
     profile = Profile(1)
     Ruckig(1).calculate(inputs, profile)
     times = (step * STEP for step in range(1, _count_steps(profile.duration) + 1))
@@ -362,5 +366,5 @@ def _compute_peak_fraction(
         accelerations.append(acceleration * rate**2 + velocity * rate_derivative)
     accelerations.append(np.zeros_like(accelerations[0]))
     jerks = np.diff(accelerations, axis=0) / STEP
-    fractions = np.abs(accelerations) / limits.stop_acceleration, np.abs(jerks) / limits.stop_jerk
+    fractions = (np.abs(accelerations) / limits.stop_acceleration, np.abs(jerks) / limits.stop_jerk)
     return float(max(map(np.max, fractions)))

@@ -34,7 +34,7 @@ SAMPLES_PER_STEP = 12
 """Number of joint positions per time step at which distances are evaluated."""
 SAMPLE_FRACTIONS = np.arange(1, STEP_COUNT * SAMPLES_PER_STEP) / (STEP_COUNT * SAMPLES_PER_STEP)
 """Times of the samples as fractions of the duration `(M,)`, without start and end."""
-USED_LIMIT_FRACTIONS = 0.98, 0.995, 0.995
+USED_LIMIT_FRACTIONS = (0.98, 0.995, 0.995)
 """Used fractions of the velocity, acceleration and jerk limits.
 
 Velocities are limited at the half steps; between half steps, a velocity may rise by up to `j (h / 2)² / 8`.
@@ -51,7 +51,8 @@ MAX_DURATION_FACTOR = 1.6
 """Maximum factor on the duration of the motion in one quadratic program."""
 _VIOLATION_UNIT = 0.01  # [m]
 _UNBOUNDED = 1e30  # bound that daqp treats as infinite
-_STATUS_SOLVED, _EQUALITY_CONSTRAINT = 1, 5  # constants of daqp
+_STATUS_SOLVED = 1  # of daqp
+_EQUALITY_CONSTRAINT = 5  # of daqp
 
 
 class DiscreteMotion(NamedTuple):
@@ -103,10 +104,10 @@ class Transcription:
     """
 
     def __init__(self, start: JointState, end: JointState, limits: JointLimits) -> None:
-        self._start, self._end = start, end
+        self._start = start
+        self._end = end
         self._matrices = matrices = _build_matrices(limits.joint_count)
         velocity_fraction, acceleration_fraction, jerk_fraction = USED_LIMIT_FRACTIONS
-        max_velocity, max_jerk = velocity_fraction * limits.velocity, jerk_fraction * limits.jerk
         self._max_acceleration = acceleration_fraction * limits.acceleration
         self._max_inner_accelerations = np.repeat(self._max_acceleration, STEP_COUNT - 1)
         self._inner_count = len(self._max_inner_accelerations)
@@ -114,20 +115,23 @@ class Transcription:
         # Each constraint limits `row y + linear h + quadratic h²` to `bound @ (1, h, h², h³)`. The first rows
         # limit accelerations, velocities and jerks, the next rows limit their negatives, and the last rows
         # fix the final state.
-        half_step_map, velocity_count = matrices.half_step_map, len(matrices.half_step_map)
-        acceleration_count, jerk_count = self._inner_count, limits.joint_count * STEP_COUNT
+        half_step_map = matrices.half_step_map
+        velocity_count = len(half_step_map)
+        jerk_count = limits.joint_count * STEP_COUNT
         jerk_ends = np.zeros((limits.joint_count, STEP_COUNT))
-        jerk_ends[:, 0], jerk_ends[:, -1] = -start.qdd, end.qdd
+        jerk_ends[:, 0] = -start.qdd
+        jerk_ends[:, -1] = end.qdd
         velocity_ends = np.outer(start.qdd, half_step_map[:, 0]) + np.outer(end.qdd, half_step_map[:, -1])
-        linear = np.pad(np.repeat(start.qd, velocity_count), (acceleration_count, jerk_count))
-        quadratic = np.pad(np.append(velocity_ends, jerk_ends), (acceleration_count, 0))
+        linear = np.pad(np.repeat(start.qd, velocity_count), (self._inner_count, jerk_count))
+        quadratic = np.pad(np.append(velocity_ends, jerk_ends), (self._inner_count, 0))
         bound = np.zeros((4, len(linear)))
-        bound[2, :acceleration_count] = self._max_inner_accelerations
-        bound[1, acceleration_count:-jerk_count] = np.repeat(max_velocity, velocity_count)
-        bound[3, -jerk_count:] = np.repeat(max_jerk, STEP_COUNT)
+        bound[2, : self._inner_count] = self._max_inner_accelerations
+        max_velocity = velocity_fraction * limits.velocity
+        bound[1, self._inner_count : -jerk_count] = np.repeat(max_velocity, velocity_count)
+        bound[3, -jerk_count:] = np.repeat(jerk_fraction * limits.jerk, STEP_COUNT)
         final_bound = np.zeros((4, 2 * limits.joint_count))
         final_bound[0, limits.joint_count :] = end.q - start.q
-        last_rows = matrices.velocity_map[-1], matrices.position_map[-1]
+        last_rows = (matrices.velocity_map[-1], matrices.position_map[-1])
         final_quadratic = [(row[[0, -1], None] * self._boundary_qdd).sum(axis=0) for row in last_rows]
         self._linear_terms = np.concatenate([linear, -linear, start.qd - end.qd, STEP_COUNT * start.qd])
         self._quadratic_terms = np.concatenate([quadratic, -quadratic, *final_quadratic])
@@ -135,26 +139,32 @@ class Transcription:
 
     def compute_states(self, motion: DiscreteMotion) -> list[JointState]:
         """Return the states of a motion at all half steps, including the start and the end."""
-        h, start = motion.step_duration, self._start
+        h = motion.step_duration
         y = motion.accelerations * h**2
-        qd = start.qd + (self._matrices.half_step_map @ y.T) / h
+        qd = self._start.qd + (self._matrices.half_step_map @ y.T) / h
         qdd = np.empty((2 * STEP_COUNT - 1, len(y)))
         qdd[::2] = ((y[:, :-1] + y[:, 1:]) / 2).T / h**2  # middle of the steps
         qdd[1::2] = motion.accelerations[:, 1:-1].T
         half_steps = slice(SAMPLES_PER_STEP // 2 - 1, None, SAMPLES_PER_STEP // 2)
-        return [start, *map(JointState, motion.qs[half_steps], qd, qdd), self._end]
+        return [self._start, *map(JointState, motion.qs[half_steps], qd, qdd), self._end]
 
     def fit(self, step: float, qs: Array) -> DiscreteMotion | None:
         """Return the motion with time steps of `step` [s] that is nearest to `qs` `(M, n)` [rad], or None."""
-        hessian, inner_count = self._matrices.hessian.copy(), self._inner_count
-        position_map = self._matrices.sample_map[:, 1:-1]
-        residual = qs - self._start.q - self._compute_boundary_terms(step)
+        start = self._start
+        inner_count = self._inner_count
+        sample_map = self._matrices.sample_map
+        position_map = sample_map[:, 1:-1]
+        quadratic = np.outer(sample_map[:, 0], start.qdd) + np.outer(sample_map[:, -1], self._end.qdd)
+        boundary_terms = np.outer(self._matrices.sample_times, start.qd * step) + step**2 * quadratic
+        residual = qs - start.q - boundary_terms
+        hessian = self._matrices.hessian.copy()
         scale = self._max_inner_accelerations * step**2
         squares = np.kron(np.eye(len(self._max_acceleration)), position_map.T @ position_map)
         hessian[:inner_count, :inner_count] += scale[:, None] * squares * scale
         gradient = np.append(-(position_map.T @ residual).T.ravel() * scale, [0.0, 0.0])
         bounds = np.tile([[-_UNBOUNDED], [_UNBOUNDED]], inner_count + 2)
-        bounds[:, inner_count], bounds[0, -1] = 1.0, 0.0
+        bounds[:, inner_count] = 1.0
+        bounds[0, -1] = 0.0
         return self._solve(step, hessian, gradient, bounds, [])
 
     def solve_subproblem(
@@ -169,7 +179,9 @@ class Transcription:
             constraints: Groups of constraints.
             trust_radius: Maximum change of an acceleration as a fraction of its limit.
         """
-        step, start, inner_count = iterate.step_duration, self._start, self._inner_count
+        step = iterate.step_duration
+        start = self._start
+        inner_count = self._inner_count
         gradient = np.append(np.zeros(inner_count), [STEP_COUNT * step, VIOLATION_COST * _VIOLATION_UNIT])
         last_values = (iterate.accelerations[:, 1:-1] / self._max_acceleration[:, None]).ravel()
         bounds = np.empty((2, inner_count + 2))
@@ -178,7 +190,8 @@ class Transcription:
         extra_constraints = []
         # Axes of the arrays: r constraint, k sample, j joint, i inner value, e start or end.
         for group in constraints:
-            position_map, gradients = self._matrices.sample_map[group.samples], group.gradients
+            position_map = self._matrices.sample_map[group.samples]
+            gradients = group.gradients
             quadratic = np.einsum("rke,rkj,ej->r", position_map[:, :, [0, -1]], gradients, self._boundary_qdd)
             linear = np.einsum("rkj,j,rk->r", gradients, start.qd, self._matrices.sample_times[group.samples])
             rows = np.empty((len(gradients), inner_count + 2))
@@ -190,12 +203,6 @@ class Transcription:
             slack = group.slack - EXTRA_DISTANCE + offset
             extra_constraints.append((rows, slack - step**2 * quadratic - step * group.step_derivatives))
         return self._solve(step, self._matrices.hessian, gradient, bounds, extra_constraints)
-
-    def _compute_boundary_terms(self, step: float) -> Array:
-        """Return the contribution of the boundary conditions to the sampled positions `(M, n)` [rad]."""
-        position_map, start, end = self._matrices.sample_map, self._start, self._end
-        quadratic = np.outer(position_map[:, 0], start.qdd) + np.outer(position_map[:, -1], end.qdd)
-        return np.outer(self._matrices.sample_times, start.qd * step) + step**2 * quadratic
 
     def _solve(
         self,
@@ -227,10 +234,12 @@ class Transcription:
         rows *= scale
         row_upper = step**2 * self._quadratic_terms + offsets @ self._bound
         upper = np.concatenate([bounds[1], *(extra_upper for _, extra_upper in extra_constraints), row_upper])
-        lower, constraint_types = np.full(len(upper), -_UNBOUNDED), np.zeros(len(upper), dtype=np.int32)
+        lower = np.full(len(upper), -_UNBOUNDED)
         lower[: len(scale)] = bounds[0]
         equality_rows = slice(-2 * len(self._max_acceleration), None)
-        lower[equality_rows], constraint_types[equality_rows] = upper[equality_rows], _EQUALITY_CONSTRAINT
+        lower[equality_rows] = upper[equality_rows]
+        constraint_types = np.zeros(len(upper), dtype=np.int32)
+        constraint_types[equality_rows] = _EQUALITY_CONSTRAINT
         solution, _, status, _ = daqp.solve(hessian, gradient, rows, upper, lower, constraint_types)
         if status != _STATUS_SOLVED:
             return None
@@ -275,7 +284,8 @@ def _build_matrices(joint_count: int) -> _DiscretizationMatrices:
     """
     velocity, position = np.zeros((2, STEP_COUNT + 1, STEP_COUNT + 1))
     for k in range(STEP_COUNT):
-        velocity[k + 1], position[k + 1] = velocity[k], position[k] + velocity[k]
+        velocity[k + 1] = velocity[k]
+        position[k + 1] = position[k] + velocity[k]
         velocity[k + 1, k : k + 2] += 1 / 2
         position[k + 1, k : k + 2] += 1 / 3, 1 / 6
     sample_times = np.asarray(STEP_COUNT * SAMPLE_FRACTIONS)
@@ -291,7 +301,8 @@ def _build_matrices(joint_count: int) -> _DiscretizationMatrices:
     for k in range(STEP_COUNT):
         half_step_map[2 * k, k : k + 2] += 3 / 8, 1 / 8
     joints = np.eye(joint_count)
-    accelerations, jerks = np.eye(STEP_COUNT + 1)[1:-1], np.diff(np.eye(STEP_COUNT + 1), axis=0)
+    accelerations = np.eye(STEP_COUNT + 1)[1:-1]
+    jerks = np.diff(np.eye(STEP_COUNT + 1), axis=0)
     limits = [np.kron(joints, rows[:, 1:-1]) for rows in (accelerations, half_step_map, jerks)]
     final_state = [np.kron(joints, row[-1, 1:-1]) for row in (velocity, position)]
     rows = np.concatenate([*limits, *(-limit for limit in limits), *final_state])

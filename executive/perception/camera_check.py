@@ -67,14 +67,16 @@ PRIOR_STD = np.full(6, 0.1)
 """Prior standard deviations of the rotation vector [rad] and the translation [m]."""
 REWEIGHTING_ITERATIONS = 8
 """Number of iterations of iteratively reweighted least squares."""
-TILTS_DEG, ROLLS_DEG = np.arange(-10.0, 11.0), np.arange(-8.0, 9.0, 4.0)
-"""Rotations of the search grid about the axes x and y of the camera, and about the optical axis [degree]."""
+TILTS_DEG = np.arange(-10.0, 11.0)
+"""Rotations of the search grid about the axes x and y of the camera [degree]."""
+ROLLS_DEG = np.arange(-8.0, 9.0, 4.0)
+"""Rotations of the search grid about the optical axis [degree]."""
 AXIAL_SHIFTS = np.linspace(-0.21, 0.21, 7)
 """Translations of the search grid along the optical axis, as fractions of the mean distance of the bins."""
 MAX_REFINED_POSES = 6
 """Maximum number of poses of the search grid that are refined."""
-IMAGE_REDUCTION, SAMPLE_REDUCTION = 4, 4
-"""Factors that reduce the size of the image and the number of samples for the search grid."""
+REDUCTION = 4
+"""Factor that reduces the size of the image and the number of samples for the search grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +128,6 @@ def estimate_offset(frame: Frame, bins: Sequence[Bin]) -> CameraOffset | None:
 
 
 def _make_camera_offset(fit: PoseFit, frame: Frame, bins: Sequence[Bin]) -> CameraOffset:
-    """Return the camera offset that corresponds to a fitted pose."""
     samples = fit.samples
     expected_pixels = project(frame.matrix, frame.X_WC, samples.world_points)
     distances = np.linalg.norm(samples.pixels - expected_pixels, axis=1)
@@ -174,7 +175,8 @@ class OutlineFitter:
     """Fits camera poses to the edges of one frame."""
 
     def __init__(self, frame: Frame, bins: Sequence[Bin]) -> None:
-        self._frame, self._bins = frame, bins
+        self._frame = frame
+        self._bins = bins
         self._image = cv2.GaussianBlur(frame.image, (0, 0), SMOOTHING_STD)
 
     def refine(self, offset: Array, max_distances: Sequence[int] = FIT_EDGE_DISTANCES) -> PoseFit | None:
@@ -201,18 +203,19 @@ class OutlineFitter:
 
     def search(self) -> Iterator[PoseFit]:
         """Yield fits that start at the poses of the search grid with the strongest edges at the outlines."""
-        scale = 1 / IMAGE_REDUCTION
+        scale = 1 / REDUCTION
         small_image = cv2.resize(self._image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
         small_image = cv2.GaussianBlur(small_image, (0, 0), SMOOTHING_STD).astype(np.float32)
         derivatives = [cv2.Sobel(small_image, cv2.CV_32F, *orders) for orders in ((1, 0), (0, 1))]
         gradients = np.stack(derivatives, axis=-1)
-        matrix, X_CW = self._frame.matrix, self._frame.X_WC.inverse()
+        matrix = self._frame.matrix
         last_pixel = np.array(small_image.shape[1::-1]) - 1
         samples = self._find_visible_samples(np.zeros(6))
         if not _is_sufficient(samples) or np.abs(gradients).max() < MIN_CONTRAST:
             return
         *world_points, _ = _sample_outlines(self._bins, self._frame.X_WC, matrix)
-        points, next_points = (X_CW.apply(values[::SAMPLE_REDUCTION]) for values in world_points)
+        X_CW = self._frame.X_WC.inverse()
+        points, next_points = (X_CW.apply(values[::REDUCTION]) for values in world_points)
         scored_offsets: list[tuple[float, Array]] = []
         for roll, axial_shift in itertools.product(ROLLS_DEG, AXIAL_SHIFTS):
             shift = np.array([0.0, 0.0, axial_shift * points[:, 2].mean()])
@@ -220,7 +223,7 @@ class OutlineFitter:
             rotations = np.stack([cv2.Rodrigues(vector)[0] for vector in rotation_vectors])
             pixels = _project((points - shift) @ rotations, matrix)
             normals = _compute_normals(_project((next_points - shift) @ rotations, matrix) - pixels)
-            small_pixels = np.floor(pixels / IMAGE_REDUCTION).astype(int)
+            small_pixels = np.floor(pixels / REDUCTION).astype(int)
             is_inside = ((small_pixels >= 0) & (small_pixels <= last_pixel)).all(axis=-1)
             columns, rows = np.moveaxis(small_pixels.clip(0, last_pixel), -1, 0)
             contrast = np.abs((gradients[rows, columns] * normals[:, :, None]).sum(axis=-1)).sum(axis=-1)
@@ -236,15 +239,15 @@ class OutlineFitter:
     def _find_visible_samples(self, offset: Array) -> EdgeSamples:
         """Return the samples of the outlines that are visible from the pose with the given offset."""
         rotation = np.asarray(cv2.Rodrigues(offset[:3])[0], dtype=float)
-        X_WC, is_unoccluded = self._frame.X_WC @ Pose(rotation, offset[3:]), self._frame.visible
+        X_WC = self._frame.X_WC @ Pose(rotation, offset[3:])
         world_points, next_points, bin_indices = _sample_outlines(self._bins, X_WC, self._frame.matrix)
         camera_points = X_WC.inverse().apply(world_points)
         pixels = _project(camera_points, self._frame.matrix)
         normals = _compute_normals(_project(X_WC.inverse().apply(next_points), self._frame.matrix) - pixels)
-        size = np.array(is_unoccluded.shape[::-1])
+        size = np.array(self._frame.visible.shape[::-1])
         is_visible = ((pixels >= BORDER_WIDTH) & (pixels < size - BORDER_WIDTH)).all(axis=1)
         columns, rows = pixels.clip(0, size - 1).astype(int).T
-        is_visible &= is_unoccluded[rows, columns]
+        is_visible &= self._frame.visible[rows, columns]
         samples = EdgeSamples(world_points, camera_points, pixels, normals, bin_indices)
         return EdgeSamples(*(values[is_visible] for values in samples))
 
@@ -262,10 +265,12 @@ class OutlineFitter:
         colours = cv2.remap(self._image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         profiles = colours.reshape(count, length, width, 3).astype(float).mean(axis=2)
         contrast = np.linalg.norm(np.diff(profiles, axis=1), axis=2)
-        previous, current, following = contrast[:, :-2], contrast[:, 1:-1], contrast[:, 2:]
+        previous = contrast[:, :-2]
+        current = contrast[:, 1:-1]
+        following = contrast[:, 2:]
         is_edge = (current >= previous) & (current > following) & (current > MIN_CONTRAST)
         strongest = np.where(is_edge, current, 0.0).argmax(axis=1)
-        edge_index = np.arange(count), strongest
+        edge_index = (np.arange(count), strongest)
         # The vertex of the parabola through three contrasts is the edge position with subpixel accuracy.
         curvature = np.minimum(previous - 2 * current + following, -1e-6)[edge_index]
         vertex = 0.5 * (previous - following)[edge_index] / curvature
@@ -274,7 +279,9 @@ class OutlineFitter:
 
 def _sample_outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Array, Array, NDArray[np.intp]]:
     """Return points `(N, 3)` [m] on the outlines, neighbouring points for the tangents, and bin indices."""
-    points, next_points, bin_indices = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, dtype=np.intp)]
+    points = [np.zeros((0, 3))]
+    next_points = [np.zeros((0, 3))]
+    bin_indices = [np.zeros(0, dtype=np.intp)]
     for index, bin in enumerate(bins):
         half_size = np.array([*(bin.size[:2] / 2 + BIN_THICKNESS), bin.size[2] / 2])
         # The first four corners belong to the rim.

@@ -17,8 +17,8 @@ import cv2
 import numpy as np
 from pydantic import Field, ValidationError
 
-from executive.cell.config import CellConfig, DetectorConfig
-from executive.cell.device_config import CameraConfig, Section
+from executive.cell.config import CellConfig
+from executive.cell.device_config import Section
 from executive.cell.frame import ErrorRates, Frame, assume_rates
 from executive.cell.protocols import Clock
 from executive.errors import InputError
@@ -35,14 +35,10 @@ ABSOLUTE_TOLERANCE = 6.0
 """Minimum tolerance below and above the measured range of a statistic [grey level]."""
 RELATIVE_TOLERANCE = 0.08
 """Minimum tolerance below and above the measured range of a statistic, as a fraction of the range limit."""
-
-
 MEASUREMENT_SUFFIX = ".measured.json"
 """Suffix of a measurement file, after the name of the cell."""
 MAX_FILE_SIZE = 1_000_000
 """Maximum size of a measurement file [byte]."""
-
-
 FAKE_KIND = "fake"
 """Kind of cell whose detectors are not measured, because they read the true positions of the objects."""
 MEASUREMENT_MINUTES = 2
@@ -80,7 +76,9 @@ class FrameRange(Section):
         differences = []
         for name, value in statistics.items():
             lower, upper = getattr(self, name)
-            if not lower - _compute_tolerance(lower) <= value <= upper + _compute_tolerance(upper):
+            lower_tolerance = max(ABSOLUTE_TOLERANCE, RELATIVE_TOLERANCE * lower)
+            upper_tolerance = max(ABSOLUTE_TOLERANCE, RELATIVE_TOLERANCE * upper)
+            if not lower - lower_tolerance <= value <= upper + upper_tolerance:
                 differences.append(f"{name} {value:.0f}, measured {lower:.0f} to {upper:.0f}")
         return "; ".join(differences)
 
@@ -103,12 +101,8 @@ def compute_frame_statistics(frame: Frame, cell: CellConfig) -> Mapping[str, flo
     grey = colours.mean(axis=1)
     brightness = float(np.median(grey))
     contrast = float(np.median(np.abs(grey - brightness)))
-    values = brightness, contrast, *np.median(colours, axis=0).tolist()
+    values = (brightness, contrast, *np.median(colours, axis=0).tolist())
     return dict(zip(FrameRange.model_fields, values, strict=True))
-
-
-def _compute_tolerance(range_limit: float) -> float:
-    return max(ABSOLUTE_TOLERANCE, RELATIVE_TOLERANCE * range_limit)
 
 
 class StoredErrorRates(Section):
@@ -221,9 +215,14 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Mappin
     """
     section = config.detectors[detector]
     options = {key: value for key, value in section.options.items() if key != "threads"}
+    find_weights = getattr(find_detector_kinds()[section.kind].load(), "weights", None)
+    weights = find_weights(section, base) if find_weights else None
+    camera = next(iter(config.cameras.values()))
+    matrix, X_MC = compute_calibration(camera)
+    poses = {name: config.arm.poses_deg[name] for name in camera.scan_poses if camera.mount == "wrist"}
     return {
         "detector": f"{section.kind} {json.dumps(options, sort_keys=True)}",
-        "weights": _digest_weights(section, base),
+        "weights": _digest(weights) if weights and weights.is_file() else "",
         "threshold": f"{section.threshold:g}",
         "localization": config.localization,
         **{
@@ -231,31 +230,15 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Mappin
             for label, kind in config.objects.items()
             if not kind.looks_like
         },
-        **_describe_camera(next(iter(config.cameras.values())), config),
-    }
-
-
-def _digest_weights(section: DetectorConfig, base: Path) -> str:
-    """Return a digest of the model file of a detector; "" for a detector without a model file."""
-    find_weights = getattr(find_detector_kinds()[section.kind].load(), "weights", None)
-    path = find_weights(section, base) if find_weights else None
-    return _digest(path) if path and path.is_file() else ""
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
-
-
-def _describe_camera(camera: CameraConfig, config: CellConfig) -> dict[str, str]:
-    """Return the properties of a camera that affect error rates."""
-    matrix, X_MC = compute_calibration(camera)
-    poses = {name: config.arm.poses_deg[name] for name in camera.scan_poses if camera.mount == "wrist"}
-    return {
         "camera pose": f"{camera.mount} {X_MC.to_rounded_list(4)} {json.dumps(poses)}",
         "camera lens": f"{matrix.round(2).tolist()}",
         "camera image": f"{camera.width} x {camera.height}, searched {list(camera.table_view)}",
         "camera depth": "" if camera.depth is None else camera.depth.model_dump_json(),
     }
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
 Envelope: TypeAlias = tuple[ErrorRates, FrameRange | None]
@@ -329,13 +312,14 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
     """
     names = list(find_measurable_detectors(config))
     measurements, problems = read_folders(folders) if names else ([], [])
-    envelopes, advice = {}, describe_measurement_command(config)
+    envelopes = {}
+    advice = describe_measurement_command(config)
     for name in names:
         threshold = config.detectors[name].threshold
         fingerprint = compute_fingerprint(config, name, base)
         match = next((entry for _, entry in measurements if entry.fingerprint == fingerprint), None)
         if match is not None:
-            envelopes[name] = match.rates.build_error_rates(threshold), match.frames
+            envelopes[name] = (match.rates.build_error_rates(threshold), match.frames)
             continue
         own_entries = (entry for cell, entry in measurements if (cell, entry.detector) == (config.cell, name))
         cause = "was never measured in this cell"
@@ -343,7 +327,7 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
             changes = dict(outdated.fingerprint.items() ^ fingerprint.items())
             cause = f"was measured before a change of {', '.join(sorted(changes))}"
         cause = f"detector {name} {cause}, so high error rates are assumed"
-        envelopes[name] = assume_rates(threshold, "; ".join([cause, advice, *problems])), None
+        envelopes[name] = (assume_rates(threshold, "; ".join([cause, advice, *problems])), None)
     return envelopes
 
 

@@ -166,7 +166,13 @@ def describe_size_contradiction(
         object_class: The detected class.
     """
     left, top, right, bottom = detection.box
-    projected_length = _compute_projected_length(position, frame, object_class)
+    angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
+    x = object_class.radius * np.cos(angles)
+    y = object_class.radius * np.sin(angles)
+    half = object_class.height / 2
+    circles = [np.stack((x, y, np.full(16, z)), axis=1) for z in (-half, half)]
+    cylinder = project(frame.matrix, frame.X_WC, position + np.concatenate(circles))
+    projected_length = float(np.ptp(cylinder, axis=0).max())
     scale = float(frame.matrix[0, 0]) / frame.compute_depth(position)
     min_length = math.sqrt(2) * object_class.radius * scale * (1 - SIZE_TOLERANCE) - SIZE_TOLERANCE_PX
     max_length = projected_length * (1 + SIZE_TOLERANCE) + SIZE_TOLERANCE_PX
@@ -184,12 +190,3 @@ def is_completely_visible(detection: Detection, frame: Frame, region: Box) -> bo
     left, top, right, bottom = detection.box
     border_distance = min(left - region[0], top - region[1], region[2] - right, region[3] - bottom)
     return border_distance >= MIN_BORDER_DISTANCE and frame.compute_visible_fraction(detection.box) >= 1.0
-
-
-def _compute_projected_length(position: Array, frame: Frame, object_class: ObjectClass) -> float:
-    """Return the longer side [pixel] of the image of the cylinder that encloses an object."""
-    angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
-    x, y = object_class.radius * np.cos(angles), object_class.radius * np.sin(angles)
-    half = object_class.height / 2
-    circles = [np.stack((x, y, np.full(16, z)), axis=1) for z in (-half, half)]
-    return float(np.ptp(project(frame.matrix, frame.X_WC, position + np.concatenate(circles)), axis=0).max())

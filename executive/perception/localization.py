@@ -44,11 +44,7 @@ class CellLocalizer:
     cast_ray: RayTest | None = None
 
     def locate(self, detection: Detection, frame: Frame) -> Array:
-        """Return the centre of the detected object `(3,)` [m] in the world.
-
-        Raises:
-            NoDepth: The height is unknown, or the ray does not intersect the plane in front of the camera.
-        """
+        """Return the centre; NoDepth: unknown height, or no intersection in front of the camera."""
         height = self._find_height(detection, frame)
         try:
             return intersect_plane(frame.matrix, frame.X_WC, detection.centre, height)
@@ -64,9 +60,6 @@ class CellLocalizer:
 
         An unknown detection that cannot be localized is omitted, and a doubtful one if there is a confident
         detection.
-
-        Raises:
-            NoDepth: A detection cannot be localized and is not omitted.
         """
         confident = [self._observe(detections, detection) for detection in detections.confident]
         others = []
@@ -96,13 +89,15 @@ class CellLocalizer:
 
         The result is also "" for a truncated or occluded box, and for an object in a bin.
         """
-        frame, classes = detections.frame, self.classes
+        frame = detections.frame
         is_visible = evidence.is_completely_visible(detection, frame, detections.area)
         if not is_visible or any(bin.contains(position, BIN_THICKNESS) for bin in self.bins):
             return ""
-        object_class = classes[detection.label]
+        object_class = self.classes[detection.label]
         size_contradiction = evidence.describe_size_contradiction(detection, position, frame, object_class)
-        return size_contradiction or evidence.describe_top_contradiction(detection, position, frame, classes)
+        if size_contradiction:
+            return size_contradiction
+        return evidence.describe_top_contradiction(detection, position, frame, self.classes)
 
     def _find_height(self, detection: Detection, frame: Frame) -> float:
         """Return the height of the centre of a detected object [m].

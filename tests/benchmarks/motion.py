@@ -29,7 +29,7 @@ from executive.cell.protocols import STEP
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.configurations import find_configuration_pairs, find_vertical_waypoints
-from executive.motion.joints import JointLimits, JointState, Kinematics, compute_min_time
+from executive.motion.joints import JointLimits, JointState, Kinematics
 from executive.motion.planner import Planner
 from executive.motion.trajectory import Connector, Trajectory, compute_peak_fractions, plan_braking
 from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world
@@ -73,11 +73,10 @@ def find_waypoints(
     up = reach(kinematics, (x, y, height), start) if line is None else line[-1]
     fetch = find_configuration_pairs(kinematics, touch, height - touch.position[2], start)
     carry = find_configuration_pairs(kinematics, drop, height - drop.position[2], start)
-    fetching = compute_min_time(fetch.upper_qs - up, limits) + 2 * compute_min_time(
-        fetch.upper_qs - fetch.lower_qs, limits
-    )
-    carrying = compute_min_time(carry.upper_qs - fetch.upper_qs[:, None], limits)
-    carrying += compute_min_time(carry.lower_qs - carry.upper_qs, limits)
+    fetching = limits.compute_min_time(fetch.upper_qs - up)
+    fetching += 2 * limits.compute_min_time(fetch.upper_qs - fetch.lower_qs)
+    carrying = limits.compute_min_time(carry.upper_qs - fetch.upper_qs[:, None])
+    carrying += limits.compute_min_time(carry.lower_qs - carry.upper_qs)
     i, j = np.unravel_index(np.argmin(fetching[:, None] + carrying), carrying.shape)
     return (
         np.array([start, up, fetch.upper_qs[i], fetch.lower_qs[i]]),
@@ -126,8 +125,8 @@ def find_lower_bound(
     touching, dropping = (
         find_configuration_pairs(kinematics, goal, 0.0, start).lower_qs for goal in (touch, drop)
     )
-    there = compute_min_time(touching - start, limits)
-    back = compute_min_time(touching[:, None] - dropping, limits)
+    there = limits.compute_min_time(touching - start)
+    back = limits.compute_min_time(touching[:, None] - dropping)
     i, j = np.unravel_index(np.argmin(there[:, None] + back), back.shape)
     motions = [
         plan_with_stops(np.array(ends), limits) for ends in pairwise((start, touching[i], dropping[j]))

@@ -13,7 +13,7 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.layout import build_bin
+from executive.cell.layout import build_bin, compute_travel_height
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import build_simulated_class, load_mesh
@@ -23,8 +23,8 @@ from executive.cells.sim.world import World
 from executive.errors import InputError, Unreachable
 from executive.geometry import make_tool_down_pose
 from executive.manipulation.tool_goals import make_object_goal, make_slot_goal
-from executive.motion.arms import build_planner
-from executive.motion.planner import Planner
+from executive.motion.configurations import find_configuration_pairs
+from executive.motion.planner import Planner, build_planner
 
 MAX_TRIES = 50
 """Maximum number of scenes drawn to find one whose object can be held and reached."""
@@ -115,8 +115,9 @@ class SceneGenerator:
                 continue
             try:
                 scene = self._make_scene(bodies)
-                self._planner.require_reachable(scene.approach)
-                self._planner.require_reachable(scene.drop)
+                for goal in (scene.approach, scene.drop):
+                    length = max(0.0, compute_travel_height(self._cell) - goal.position[2])
+                    find_configuration_pairs(self._planner.kinematics, goal, length, np.zeros(7))
             except Unreachable:
                 continue
             return scene

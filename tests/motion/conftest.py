@@ -10,9 +10,9 @@ import yaml
 
 from executive.cell.config import CellConfig
 from executive.geometry import Array
-from executive.motion.arms import build_kinematics, build_planner
+from executive.motion.arms import build_kinematics
 from executive.motion.joints import JointLimits, Kinematics
-from executive.motion.planner import Planner
+from executive.motion.planner import Planner, build_planner
 from executive.motion.trajectory import Connector
 
 

@@ -13,11 +13,11 @@ from executive.cell.layout import TOOL_RADIUS
 from executive.cell.objects import BIN_THICKNESS, Load, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
+from executive.motion.arms import SAMPLING_MARGIN
 from executive.motion.clearance_model import (
     DISTANCE_PER_COSINE,
     OBSERVED_RADIUS,
     POSITION_TOLERANCE,
-    SAMPLING_MARGIN,
     ClearanceModel,
     Discs,
     make_tool_discs,

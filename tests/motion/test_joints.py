@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, shares
 
-from executive.motion.joints import JointLimits, JointState, compute_min_time
+from executive.motion.joints import JointLimits, JointState
 from executive.motion.trajectory import Connector
 
 CONNECTOR = Connector(LIMITS)
@@ -28,6 +28,6 @@ def test_the_closed_form_is_ruckigs_duration(share, power: float) -> None:
     change = share * 10**power
     found = CONNECTOR.connect(JointState.at_rest(np.zeros(7)), JointState.at_rest(change)).duration
     # Ruckig takes moves of less than a billionth of a radian for none.
-    assert compute_min_time(change, LIMITS) == pytest.approx(
+    assert LIMITS.compute_min_time(change) == pytest.approx(
         found, rel=1e-6, abs=5e-3 if found < 5e-3 else 1e-8
     )

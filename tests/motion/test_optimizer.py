@@ -10,7 +10,7 @@ from executive.cell.objects import Obstacle
 from executive.geometry import Array, make_tool_down_pose
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
 from executive.motion.joints import JointState
-from executive.motion.optimizer import OptimizationProblem
+from executive.motion.optimizer import MotionProblem
 
 POST = Obstacle(0.5, 0.0, 0.04, 0.22, "the post")
 LEFT = (0.5, -0.2, 0.12)
@@ -22,10 +22,10 @@ def over_the_post(config, kinematics, connector):
     """The gap between two places with a post between them."""
     branch, _ = kinematics.find_branch(np.radians(config.arm.poses_deg["home"]))
     poses = [make_tool_down_pose(place) for place in (LEFT, RIGHT)]
-    start, end = map(JointState.at_rest, kinematics.solve(poses, (branch, 0.0)))
+    start, _ = kinematics.solve(poses, (branch, 0.0))
     discs = make_tool_discs(config, None)
     clearance = ClearanceModel(config, (POST,), np.array([LEFT[:2], RIGHT[:2]]), discs)
-    return OptimizationProblem(start, end, connector, kinematics, clearance, None)
+    return MotionProblem(JointState.at_rest(start), connector, kinematics, clearance)
 
 
 @given(positions, st.floats(0, 1))

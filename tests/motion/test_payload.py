@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from executive.cell.objects import Load, ObjectClass
+from executive.cell.objects import SAFETY_FACTOR, Load, ObjectClass
 from executive.geometry import GRAVITY
 from executive.motion.joints import JointState
-from executive.motion.optimizer import DISTANCE_PER_ACCELERATION, SAFETY_FACTOR, SAMPLE_STRIDE, PayloadLimit
+from executive.motion.optimizer import DISTANCE_PER_ACCELERATION, SAMPLE_STRIDE, PayloadLimit
 from executive.motion.trajectory import Trajectory
 from executive.motion.transcription import SAMPLE_FRACTIONS, SAMPLES_PER_STEP, STEP_COUNT
 

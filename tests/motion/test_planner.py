@@ -14,9 +14,9 @@ from executive.cell.config import CellConfig
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
-from executive.motion.arms import build_planner
+from executive.motion.configurations import find_configuration_pairs
 from executive.motion.iiwa14_kinematics import interpolate_max_joint_6_angle
-from executive.motion.planner import MAX_CHECK_SPACING, Planner
+from executive.motion.planner import MAX_CHECK_SPACING, Planner, build_planner
 from executive.motion.trajectory import Trajectory
 
 CUBE = ObjectClass("cube", 0.05, 0.0354)
@@ -184,7 +184,7 @@ def test_the_wrist_folds_no_farther_than_links_5_and_7_keep_the_margin(planner, 
     motion = planner.plan(home, Goal((0.3, 0.0, 0.6)))
     assert math.radians(95) < np.abs(motion.samples.q[:, 5]).max() <= most < limits.position.upper[5]
     with pytest.raises(Unreachable, match=r"0\.900, 0\.000, 0\.160\) m: .* 0\.081 m beyond the reach"):
-        planner.require_reachable(Goal((0.9, 0.0, 0.114)))
+        find_configuration_pairs(planner.kinematics, Goal((0.9, 0.0, 0.114)), 0.046, home)
     with pytest.raises(Unreachable, match=r"leaves joint 6 \d\.\d° outside ±106°"):
         planner.plan(home, Goal((0.3, 0.0, 0.7)))
 

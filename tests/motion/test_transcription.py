@@ -11,7 +11,7 @@ from executive.geometry import Array
 from executive.motion.joints import JointState
 from executive.motion.trajectory import Connector
 from executive.motion.transcription import (
-    SAMPLES_PER_STEP,
+    SAMPLE_FRACTIONS,
     STEP_COUNT,
     DiscreteMotion,
     LinearizedConstraints,
@@ -19,7 +19,6 @@ from executive.motion.transcription import (
 )
 
 CONNECTOR = Connector(LIMITS)
-PLACES = np.arange(1, STEP_COUNT * SAMPLES_PER_STEP) / (STEP_COUNT * SAMPLES_PER_STEP)
 WIDE = 0.5
 FINE = 40
 
@@ -55,7 +54,7 @@ def moves(draw: st.DrawFn, passing: float = 0.0) -> tuple[JointState, JointState
 def direct(start: JointState, end: JointState) -> tuple[float, Array]:
     """How long the fastest motion takes, and its positions at the places looked at."""
     motion = CONNECTOR.connect(start, end)
-    return motion.duration, motion.sample(PLACES * motion.duration).q
+    return motion.duration, motion.sample(SAMPLE_FRACTIONS * motion.duration).q
 
 
 def fitted(start: JointState, end: JointState, slower: float = 1.6) -> tuple[Transcription, DiscreteMotion]:

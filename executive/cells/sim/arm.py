@@ -116,7 +116,8 @@ class SimArm(PlanningArm[Trajectory]):
         emit: Emit = discard_event,
         rebuilder: WorldRebuilder | None = None,
     ) -> None:
-        super().__init__(config, planner, planner.plan, clock, emit)
+        super().__init__(config, planner.kinematics, planner.plan, clock, emit)
+        self._limits = planner.limits
         self._world = world
         self._contact_monitor = ContactMonitor(world, get_held_body)
         self._motion: Trajectory | None = None
@@ -141,7 +142,7 @@ class SimArm(PlanningArm[Trajectory]):
         """Velocity of the tool centre point in the world `(3,)` [m/s], from the measured joint velocities."""
         states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
         q, q_change = np.array([(state[0], state[1] * DIFFERENTIATION_STEP) for state in states]).T
-        compute_pose = self.planner.kinematics.compute_tool_pose
+        compute_pose = self.kinematics.compute_tool_pose
         return (compute_pose(q + q_change).position - compute_pose(q).position) / DIFFERENTIATION_STEP
 
     @property
@@ -183,14 +184,13 @@ class SimArm(PlanningArm[Trajectory]):
     def stop(self) -> None:
         """Begin to brake along the path of the running motion, if any."""
         if self._motion is not None and self._braking_times is None:
-            limits = self.planner.limits
-            self._braking_times = list(plan_braking(self._motion, self._motion_time, limits))
+            self._braking_times = list(plan_braking(self._motion, self._motion_time, self._limits))
 
     def stop_after_collision(self, message: str) -> None:
         """Set `collision` to a message, brake, and move back; do nothing at rest or while the arm brakes."""
         if self._motion is not None and self._braking_times is None:
             self.collision = message
-            braking_times = plan_braking(self._motion, self._motion_time, self.planner.limits)
+            braking_times = plan_braking(self._motion, self._motion_time, self._limits)
             retreat_times = plan_retreat(self._motion_time, float(braking_times[-1]))
             self._braking_times = [*braking_times.tolist(), *retreat_times.tolist()]
 

@@ -25,7 +25,7 @@ from executive.cells.without_hardware import CellWithoutHardware, FinalObject
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.file_search import get_shipped_folder
-from executive.motion.arms import build_planner
+from executive.motion.planner import build_planner
 from executive.perception.detectors.requests import ClosableDetector
 from executive.perception.envelope import build_rated_detectors
 from executive.perception.localization import CellLocalizer

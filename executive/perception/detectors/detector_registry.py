@@ -57,15 +57,15 @@ class DetectorOptions(Section):
             raise InputError(message)
         return cls.model_validate(config.options)
 
-
-def find_class_map_errors(
-    config: DetectorConfig, class_map: Mapping[str, str], labels: Collection[str]
-) -> OptionErrors:
-    """Yield the option `class_map` with an error message if the model lacks a class of `class_map`."""
-    if unknown_classes := [name for name in class_map if name not in labels]:
-        problem = f"contains {', '.join(unknown_classes)}, which the model cannot find"
-        classes = f"the classes of the model are {', '.join(labels)}"
-        yield "class_map", f"class_map of a detector of kind {config.kind} {problem}; {classes}"
+    @staticmethod
+    def find_class_map_errors(
+        config: DetectorConfig, class_map: Mapping[str, str], labels: Collection[str]
+    ) -> OptionErrors:
+        """Yield the option `class_map` with an error message if the model lacks a class of `class_map`."""
+        if unknown_classes := [name for name in class_map if name not in labels]:
+            problem = f"contains {', '.join(unknown_classes)}, which the model cannot find"
+            classes = f"the classes of the model are {', '.join(labels)}"
+            yield "class_map", f"class_map of a detector of kind {config.kind} {problem}; {classes}"
 
 
 def find_detector_kinds() -> dict[str, PluginEntry]:

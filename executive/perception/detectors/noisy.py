@@ -10,7 +10,6 @@ import numpy as np
 
 from executive.cell.config import DetectorConfig
 from executive.cell.frame import Answer, Detection, Frame
-from executive.cell.protocols import Detector
 from executive.perception.detectors.detector_registry import DetectorOptions, OptionErrors
 from executive.perception.detectors.requests import ChangedRequest, DetectorContext
 
@@ -43,20 +42,16 @@ class NoisyDetector:
 
     is_fake = True
 
-    def __init__(self, config: DetectorConfig, options: NoisyOptions, context: DetectorContext) -> None:
+    def __init__(self, config: DetectorConfig, context: DetectorContext) -> None:
         self._config = config
-        self._options = options
+        self._options = NoisyOptions.read(config)
         self._context = context
-        self._base_detector: Detector = context.get_detector(options.of)
+        self._base_detector = context.get_detector(self._options.of)
 
     @classmethod
     def from_config(cls, config: DetectorConfig, context: DetectorContext) -> NoisyDetector:
-        """Return the noisy detector of a section of a cell file.
-
-        Raises:
-            InputError: An option is missing, unknown or wrong.
-        """
-        return cls(config, NoisyOptions.read(config), context)
+        """Return the detector of a section of a cell file; raise InputError for a wrong option."""
+        return cls(config, context)
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
@@ -91,11 +86,10 @@ class NoisyDetector:
         if rng.random() >= self._config.confusion_rate:
             return detection
         wrong_labels = [label for label in self._options.classes if label != detection.label]
-        label, confidence = str(rng.choice(wrong_labels)), self._draw_confidence(MAX_CONFUSED_CONFIDENCE, rng)
-        return replace(detection, label=label, confidence=confidence)
+        label = str(rng.choice(wrong_labels))
+        return replace(detection, label=label, confidence=self._draw_confidence(MAX_CONFUSED_CONFIDENCE, rng))
 
     def _shift_box(self, detection: Detection, rng: np.random.Generator) -> Detection:
-        """Return the detection with a randomly shifted box."""
         shift = rng.normal(0.0, self._config.jitter, 2)
         return replace(detection, box=tuple(np.add(detection.box, [*shift, *shift])))
 

@@ -28,6 +28,19 @@ from executive.processes import wait_until_done
 
 CLOCK_ROUNDING_ERROR = 1e-9
 """Maximum rounding error of a time on the clock [s]."""
+MIN_VISIBLE_FRACTION = 0.7
+"""Minimum unoccluded fraction of a box; boxes that the arm occludes more are ignored."""
+MAX_BOXES = 60
+"""Maximum number of boxes in one answer, including doubtful boxes and unknown labels. Shipped cells have at
+most 20 objects, and the time for the assignment of boxes to items grows more than linearly."""
+MIN_BOX_SIDE = 2.0
+"""Minimum longer side of a box [pixel]; a box in fractions of the image is smaller."""
+MAX_BOX_SIDE = 1e5
+"""Maximum longer side of a box [pixel]; all images are smaller, and squares of it do not overflow."""
+MAX_LABEL_LENGTH = 100
+"""Maximum number of characters of a label, which appears in messages and on the terminal."""
+MAX_SECOND_CLASS_RATIO = 0.5
+"""Maximum confidence of the second class of a confident detection, as a fraction of the first confidence."""
 
 
 class ClosableDetector(Detector, Protocol):
@@ -78,11 +91,7 @@ class ChangedRequest:
         return self.request.ready
 
     def result(self) -> Answer:
-        """Return the changed answer.
-
-        Raises:
-            Unavailable: The detector gave no usable answer.
-        """
+        """Return the changed answer."""
         try:
             answer = self.request.result()
         except Unavailable as error:
@@ -126,11 +135,7 @@ class PendingSearch:
         return not is_late or self.clock.now >= self.expiry_time - CLOCK_ROUNDING_ERROR
 
     def result(self) -> Answer:
-        """Return the answer of the detector.
-
-        Raises:
-            Unavailable: The detector gave no usable answer.
-        """
+        """Return the answer of the detector."""
         if not self.ready:
             problem = f"the answer is due at {self.due_time:.3f} s, and the time is {self.clock.now:.3f} s"
             raise RuntimeError(f"{problem}; wait until `ready` is true")
@@ -147,16 +152,20 @@ class ThreadedDetector:
     """
 
     def __init__(self, config: DetectorConfig, context: DetectorContext, timeout: float = -math.inf) -> None:
-        self._config, self._context, self._timeout = config, context, timeout
+        self._config = config
+        self._context = context
+        self._timeout = timeout
         self._thread = ThreadPoolExecutor(1, f"detector-{context.name}")
 
     def request(self, frame: Frame, view: str) -> PendingSearch:
-        """Start the detection in a view of a frame: `table` (the workspace) or `full` (the whole image)."""
+        """Start the detection in the thread."""
         regions = self._list_regions(view, frame.image.shape[1::-1])
         future = self._thread.submit(lambda: self._search(frame.image, regions))
-        clock, config = self._context.clock, self._config
-        due_time, expiry_time = clock.now + config.latency, clock.now + self._timeout
-        return PendingSearch(future, due_time, clock, self._context.name, config.error_rates, expiry_time)
+        clock = self._context.clock
+        due_time = clock.now + self._config.latency
+        expiry_time = clock.now + self._timeout
+        error_rates = self._config.error_rates
+        return PendingSearch(future, due_time, clock, self._context.name, error_rates, expiry_time)
 
     def close(self) -> None:
         """End the thread after the running search; cancel all searches that have not started."""
@@ -169,21 +178,6 @@ class ThreadedDetector:
     def _search(self, image: NDArray[np.uint8], regions: Sequence[Region]) -> list[Detection]:
         """Return the detections in the regions of an image, most confident first; runs in the thread."""
         raise NotImplementedError
-
-
-MIN_VISIBLE_FRACTION = 0.7
-"""Minimum unoccluded fraction of a box; boxes that the arm occludes more are ignored."""
-MAX_BOXES = 60
-"""Maximum number of boxes in one answer, including doubtful boxes and unknown labels. Shipped cells have at
-most 20 objects, and the time for the assignment of boxes to items grows more than linearly."""
-MIN_BOX_SIDE = 2.0
-"""Minimum longer side of a box [pixel]; a box in fractions of the image is smaller."""
-MAX_BOX_SIDE = 1e5
-"""Maximum longer side of a box [pixel]; all images are smaller, and squares of it do not overflow."""
-MAX_LABEL_LENGTH = 100
-"""Maximum number of characters of a label, which appears in messages and on the terminal."""
-MAX_SECOND_CLASS_RATIO = 0.5
-"""Maximum confidence of the second class of a confident detection, as a fraction of the first confidence."""
 
 
 def screen_answer(answer: Answer, frame: Frame, view: str, label_map: Mapping[str, str]) -> Answer:
@@ -218,12 +212,27 @@ def screen_answer(answer: Answer, frame: Frame, view: str, label_map: Mapping[st
         if frame.compute_visible_fraction(detection.box) < MIN_VISIBLE_FRACTION:
             continue
         label = label_map.get(detection.label)
-        is_confident = _is_confident(detection, threshold)
+        max_second_confidence = MAX_SECOND_CLASS_RATIO * detection.confidence
+        is_confident = (
+            detection.confidence >= threshold and detection.second_confidence <= max_second_confidence
+        )
         if label:
             (confident if is_confident else doubtful).append(replace(detection, label=label))
         elif is_confident:
             unknown.append(detection)
     return replace(answer, confident=tuple(confident), doubtful=tuple(doubtful), unknown=tuple(unknown))
+
+
+def _is_valid(detection: Detection, frame: Frame) -> bool:
+    """Return True if a detection has a valid confidence, a printable label, and a valid box in the image."""
+    left, top, right, bottom = detection.box
+    height, width = frame.visible.shape
+    # These comparisons also reject NaN.
+    sides = (right - left, bottom - top)
+    is_box = min(sides) >= 0 and MIN_BOX_SIDE <= max(sides) <= MAX_BOX_SIDE
+    is_in_image = right >= 0 and bottom >= 0 and left <= width and top <= height
+    is_printable = detection.label.isprintable() and len(detection.label) <= MAX_LABEL_LENGTH
+    return is_box and is_in_image and 0 <= detection.confidence <= 1 and is_printable
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +250,7 @@ class ScreenedDetector:
     label_map: Mapping[str, str]
 
     def request(self, frame: Frame, view: str) -> ChangedRequest:
-        """Start the detection in a view of a frame: `table` (the workspace) or `full` (the whole image)."""
+        """Start the detection."""
         request = self.detector.request(frame, view)
         return ChangedRequest(
             request, lambda answer: screen_answer(answer, frame, view, self.label_map), self.name
@@ -254,21 +263,3 @@ def screen_detectors(
     """Return detectors with screened answers, by name; `classes` are the classes of the cell by label."""
     label_map = {label: object_class.detected_label for label, object_class in classes.items()}
     return {name: ScreenedDetector(detector, name, label_map) for name, detector in detectors.items()}
-
-
-def _is_confident(detection: Detection, threshold: float) -> bool:
-    """Return True if a detection reaches the threshold and has a low confidence of its second class."""
-    confidence = detection.confidence
-    return confidence >= threshold and detection.second_confidence <= MAX_SECOND_CLASS_RATIO * confidence
-
-
-def _is_valid(detection: Detection, frame: Frame) -> bool:
-    """Return True if a detection has a valid confidence, a printable label, and a valid box in the image."""
-    left, top, right, bottom = detection.box
-    height, width = frame.visible.shape
-    # These comparisons also reject NaN.
-    sides = right - left, bottom - top
-    is_box = min(sides) >= 0 and MIN_BOX_SIDE <= max(sides) <= MAX_BOX_SIDE
-    is_in_image = right >= 0 and bottom >= 0 and left <= width and top <= height
-    is_printable = detection.label.isprintable() and len(detection.label) <= MAX_LABEL_LENGTH
-    return is_box and is_in_image and 0 <= detection.confidence <= 1 and is_printable

@@ -24,11 +24,7 @@ from pydantic import Field
 from executive.cell.config import DetectorConfig
 from executive.cell.frame import Box, Detection
 from executive.errors import InputError, Unavailable
-from executive.perception.detectors.detector_registry import (
-    DetectorOptions,
-    OptionErrors,
-    find_class_map_errors,
-)
+from executive.perception.detectors.detector_registry import DetectorOptions, OptionErrors
 from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
 from executive.perception.detectors.views import Region, remove_duplicates, search_regions
 from executive.perception.envelope import is_measured
@@ -43,6 +39,9 @@ INPUT_TYPES = {"tensor(float)": "float32", "tensor(float16)": "float16"}
 """Supported types of the input, by the name in onnxruntime."""
 TRIAL_TIMEOUT = 30.0
 """Maximum time to load a model and to run it once [s]."""
+MODEL_PATH = Path(__file__).parent.parent / "weights" / "embedded.onnx"
+"""Exported model with the shipped weights."""
+LABELS_PATH = MODEL_PATH.with_suffix(".labels.txt")
 
 
 class OnnxModel:
@@ -73,23 +72,13 @@ class OnnxModel:
         try:
             self._session = InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
         except Exception as error:
-            problem = "is not a model that onnxruntime can run"
-            raise InputError(f"{path} {problem}: {_explain_load_error(path, error)}") from error
+            cause = _explain_load_error(path, error)
+            raise InputError(f"{path} is not a model that onnxruntime can run: {cause}") from error
         self.labels = tuple(labels)
         self._check_signature(path)
         (self._input,) = self._session.get_inputs()
         self.input_size: tuple[int, int] = (self._input.shape[3], self._input.shape[2])
         """Width and height of the input image [pixel]."""
-
-    @staticmethod
-    def load(path: Path, labels: Sequence[str], threads: int = 2) -> OnnxModel:
-        """Return the model in a file, with the arguments of the class.
-
-        Unchanged models are loaded once per process, because a worker of a sweep runs a mission many times,
-        and loading takes 0.2 s.
-        """
-        change_time = path.stat().st_mtime_ns if path.is_file() else 0
-        return _load_model(path, tuple(labels), threads, change_time)
 
     def detect(self, image: NDArray[np.uint8], min_confidence: float) -> list[Detection]:
         """Return the detections of at least `min_confidence` in an RGB image `(H, W, 3)`, best first.
@@ -102,7 +91,7 @@ class OnnxModel:
         except Exception as error:
             raise Unavailable(f"onnxruntime failed: {_shorten(error)}") from error
         query_count = max(boxes.size // 4, 1)
-        shapes = (1, query_count, 4), (1, query_count, len(self.labels) + 1)
+        shapes = ((1, query_count, 4), (1, query_count, len(self.labels) + 1))
         if (boxes.shape, logits.shape) != shapes or np.isnan(boxes).any() or np.isnan(logits).any():
             returned = f"dets {boxes.shape} and labels {logits.shape}"
             raise Unavailable(f"the model returned NaN, or {returned} instead of {shapes[0]} and {shapes[1]}")
@@ -131,7 +120,8 @@ class OnnxModel:
 
     def _check_signature(self, path: Path) -> None:
         """Check names, types and shapes of inputs and outputs; a variable size is a name or None."""
-        inputs, outputs = self._session.get_inputs(), self._session.get_outputs()
+        inputs = self._session.get_inputs()
+        outputs = self._session.get_outputs()
         shapes = {node.name: node.shape for node in outputs}
         label_shape = shapes.get("labels", [])
         image_shapes = [node.shape for node in inputs if node.type in INPUT_TYPES and node.shape[1:-2] == [3]]
@@ -139,17 +129,18 @@ class OnnxModel:
         batch_sizes = [shape[0] if isinstance(shape[0], int) else 1 for shape in image_shapes]
         if len(inputs) != 1 or batch_sizes != [1] or "dets" not in shapes or len(label_shape) != 3:
             nodes = ", ".join(f"{node.name} {node.type} {node.shape}" for node in (*inputs, *outputs))
-            needed = (
-                "float or float16 [1, 3, H, W], dets [1, Q, 4], labels [1, Q, C+1]; export it with rfdetr"
+            raise InputError(
+                f"{path} is no RF-DETR for one RGB image: it has {nodes}, but needs float or float16 "
+                f"[1, 3, H, W], dets [1, Q, 4], labels [1, Q, C+1]; export it with rfdetr"
             )
-            raise InputError(f"{path} is no RF-DETR for one RGB image: it has {nodes}, but needs {needed}")
         if not all(isinstance(size, int) for size in (*inputs[0].shape[2:], label_shape[2])):
             raise InputError(f"{path} has an input or output of variable size; export it with fixed sizes")
         class_count = label_shape[2] - 1
         if class_count != len(self.labels):
-            labels = f"{len(self.labels)} labels: {', '.join(self.labels)}"
-            advice = "give one label per class, in the order of the model"
-            raise InputError(f"{path} has {class_count} classes, but there are {labels}; {advice}")
+            raise InputError(
+                f"{path} has {class_count} classes, but there are {len(self.labels)} labels: "
+                f"{', '.join(self.labels)}; give one label per class, in the order of the model"
+            )
 
 
 def _shorten(error: Exception) -> str:
@@ -158,13 +149,22 @@ def _shorten(error: Exception) -> str:
 
 
 def _explain_load_error(path: Path, error: Exception) -> str:
-    """Return why a file is no model, and what to do."""
     content = path.read_bytes() if path.is_file() else b""
     if content.startswith(b"version https://git-lfs"):
         return "it is a pointer of Git LFS; fetch the file with `git lfs pull`"
     if re.match(rb"\s*<(!doctype|html)", content, re.IGNORECASE):
         return "it is a web page; download the file itself"
     return f"{_shorten(error).rstrip('.')}; export or download it again"
+
+
+@functools.lru_cache(maxsize=4)
+def _load_model(path: Path, labels: tuple[str, ...], threads: int, _change_time: int) -> OnnxModel:
+    """Return the model in a file; `_change_time` distinguishes versions of a file.
+
+    Unchanged models are loaded once per process, because a worker of a sweep runs a mission many times, and
+    loading takes 0.2 s.
+    """
+    return OnnxModel(path, labels, threads)
 
 
 @functools.lru_cache(maxsize=4)
@@ -181,21 +181,6 @@ def find_model_errors(path: Path, labels: tuple[str, ...], _change_time: int) ->
     return trial.stdout.splitlines()
 
 
-def _try_model() -> None:
-    """Run the model of the command line on an empty image, and print the error message, if any."""
-    try:
-        model = OnnxModel(Path(sys.argv[1]), sys.argv[2:])
-        model.detect(np.zeros((*model.input_size, 3), np.uint8), min_confidence=1.0)
-    except (InputError, Unavailable) as error:
-        sys.stdout.write(str(error))
-
-
-@functools.lru_cache(maxsize=4)
-def _load_model(path: Path, labels: tuple[str, ...], threads: int, change_time: int) -> OnnxModel:
-    del change_time  # The argument only distinguishes versions of a file.
-    return OnnxModel(path, labels, threads)
-
-
 def describe_missing_model(path: Path) -> str:
     """Return the error message for a missing model file."""
     return f"there is no model file {path}; check the path, relative to the cell file"
@@ -208,8 +193,9 @@ def read_labels(path: Path) -> tuple[str, ...]:
         InputError: The file does not exist, is not a text file, or is empty.
     """
     if not path.is_file():
-        advice = "it needs one class name per line, in the order of the model"
-        raise InputError(f"there is no label file {path}; {advice}")
+        raise InputError(
+            f"there is no label file {path}; it needs one class name per line, in the order of the model"
+        )
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -218,10 +204,6 @@ def read_labels(path: Path) -> tuple[str, ...]:
     if not names:
         raise InputError(f"the label file {path} is empty; it needs one class name per line")
     return names
-
-
-if __name__ == "__main__":
-    _try_model()
 
 
 class RfdetrOptions(DetectorOptions):
@@ -259,7 +241,8 @@ class RfdetrDetector(ThreadedDetector):
         self, model: OnnxModel, config: DetectorConfig, context: DetectorContext, class_map: Mapping[str, str]
     ) -> None:
         super().__init__(config, context)
-        self._model, self._class_map = model, class_map
+        self._model = model
+        self._class_map = class_map
 
     @classmethod
     def from_config(cls, config: DetectorConfig, context: DetectorContext) -> RfdetrDetector:
@@ -272,7 +255,9 @@ class RfdetrDetector(ThreadedDetector):
         for _, message in cls.check(config, folder, {}):
             raise InputError(message)
         options = cls._read_options(config)
-        model = OnnxModel.load(folder / options.model_path, options.read_names(folder), options.threads)
+        path = folder / options.model_path
+        change_time = path.stat().st_mtime_ns if path.is_file() else 0
+        model = _load_model(path, options.read_names(folder), options.threads, change_time)
         return cls(model, config, context, options.class_map)
 
     @staticmethod
@@ -295,11 +280,11 @@ class RfdetrDetector(ThreadedDetector):
         except InputError as error:
             yield "labels", str(error)
             return
-        errors = list(find_class_map_errors(config, options.class_map, names))
-        if not errors and path.is_file() and not is_measured(path, base):
-            messages = find_model_errors(path, names, path.stat().st_mtime_ns)
-            errors = [("model_path", message) for message in messages]
+        errors = list(options.find_class_map_errors(config, options.class_map, names))
         yield from errors
+        if not errors and path.is_file() and not is_measured(path, base):
+            for message in find_model_errors(path, names, path.stat().st_mtime_ns):
+                yield "model_path", message
 
     @classmethod
     def labels(cls, config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
@@ -327,11 +312,6 @@ class RfdetrDetector(ThreadedDetector):
         return search_regions(image, regions, detect, self._class_map)
 
 
-MODEL_PATH = Path(__file__).parent.parent / "weights" / "embedded.onnx"
-"""Exported model with the shipped weights."""
-LABELS_PATH = MODEL_PATH.with_suffix(".labels.txt")
-
-
 class EmbeddedDetector(RfdetrDetector):
     """Detector of cubes, spheres and ducks with shipped weights (model card: `weights/embedded.card.md`)."""
 
@@ -345,3 +325,16 @@ class EmbeddedDetector(RfdetrDetector):
     def _read_options(config: DetectorConfig) -> RfdetrOptions:
         del config
         return RfdetrOptions(model_path=str(MODEL_PATH), labels=str(LABELS_PATH))
+
+
+def _try_model() -> None:
+    """Run the model of the command line on an empty image, and print the error message, if any."""
+    try:
+        model = OnnxModel(Path(sys.argv[1]), sys.argv[2:])
+        model.detect(np.zeros((*model.input_size, 3), np.uint8), min_confidence=1.0)
+    except (InputError, Unavailable) as error:
+        sys.stdout.write(str(error))
+
+
+if __name__ == "__main__":
+    _try_model()

@@ -43,7 +43,8 @@ def list_regions(view: str, table_view: Region, size: tuple[int, int]) -> list[R
         return [table_view]
     side = table_view[2] - table_view[0]
     width, height = size
-    lefts, tops = _list_tile_starts(width, side), _list_tile_starts(height, side)
+    lefts = _list_tile_starts(width, side)
+    tops = _list_tile_starts(height, side)
     return [(left, top, min(left + side, width), min(top + side, height)) for top in tops for left in lefts]
 
 
@@ -66,7 +67,7 @@ def search_regions(
         left, top, right, bottom = region
         for detection in detect(image[top:bottom, left:right]):
             box_left, box_top, box_right, box_bottom = detection.box
-            box = left + box_left, top + box_top, left + box_right, top + box_bottom
+            box = (left + box_left, top + box_top, left + box_right, top + box_bottom)
             label = class_map.get(detection.label, detection.label)
             detections.append((replace(detection, label=label, box=box), region))
     return merge_detections(detections, (image.shape[1], image.shape[0]))

@@ -13,7 +13,7 @@ from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
 from executive.events import Event
 from executive.geometry import Array, Pose
-from executive.motion.arms import build_planner
+from executive.motion.planner import build_planner
 from executive.motion.trajectory import Trajectory
 
 WHITE = (1.0, 1.0, 1.0)

@@ -13,7 +13,7 @@ from executive.cell.config import CellConfig
 from executive.cells.sim import command_log as log
 from executive.cells.sim.command_log import CommandLog, read_commands
 from executive.errors import InputError
-from executive.motion.arms import build_planner
+from executive.motion.planner import build_planner
 
 
 @pytest.fixture

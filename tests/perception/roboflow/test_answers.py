@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from executive.cell.frame import Detection
-from executive.perception.detectors.roboflow.answers import read_answer, read_output
 from executive.perception.detectors.roboflow.detector import (
     RoboflowOptions,
     describe_failure,
@@ -13,6 +12,7 @@ from executive.perception.detectors.roboflow.detector import (
     describe_missed_deadline,
     shorten_to_line,
 )
+from executive.perception.detectors.roboflow.inference_process import read_answer, read_output
 
 CUBE = {"x": 50.0, "y": 40.0, "width": 20, "height": 10.0, "confidence": 0.9, "class": "cube", "class_id": 0}
 

@@ -12,19 +12,18 @@ import json
 import logging
 import os
 import queue
+import socket
+import ssl
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from executive.perception.detectors.roboflow.inference_process import KEY_VARIABLE
-
-if TYPE_CHECKING:
-    from inference_sdk import InferenceHTTPClient
 
 MAX_ANSWER_LENGTH = 1 << 20
 """Maximum number of characters of an answer, about 20 times the length of 300 predictions."""
@@ -82,7 +81,7 @@ def _read_images(pipe: BinaryIO, images: queue.Queue[NDArray[np.uint8]]) -> None
 
 
 def _make_inference_function(settings: dict[str, Any]) -> InferenceFunction:
-    """Return the function for the model or the workflow in `settings`."""
+    # The import takes 2 s, and the executive reports its errors.
     from inference_sdk import InferenceConfiguration, InferenceHTTPClient
 
     key = os.environ.get(KEY_VARIABLE, "").strip() or None
@@ -94,19 +93,18 @@ def _make_inference_function(settings: dict[str, Any]) -> InferenceFunction:
         client.select_api_v0()
     elif settings["api"] == "v1":
         client.select_api_v1()
+
     # inference-sdk expects the channel order of OpenCV: BGR.
-    if settings["api"] == "workflow":
-        return lambda image: _run_workflow(client, settings, image[..., ::-1])
-    return lambda image: client.infer(image[..., ::-1], model_id=settings["model_id"])
+    def infer(image: NDArray[np.uint8]) -> Any:
+        if settings["api"] != "workflow":
+            return client.infer(image[..., ::-1], model_id=settings["model_id"])
+        images = {settings["workflow_input"]: image[..., ::-1]}
+        (outputs,) = client.run_workflow(settings["workspace"], settings["workflow_id"], images=images)
+        if settings["workflow_output"] not in outputs:
+            raise MissingOutput(f"the outputs are {', '.join(outputs)}")
+        return outputs[settings["workflow_output"]]
 
-
-def _run_workflow(client: InferenceHTTPClient, settings: dict[str, Any], image: NDArray[np.uint8]) -> Any:
-    """Run the workflow on a BGR image, and return the output with the predictions."""
-    images = {settings["workflow_input"]: image}
-    (outputs,) = client.run_workflow(settings["workspace"], settings["workflow_id"], images=images)
-    if settings["workflow_output"] not in outputs:
-        raise MissingOutput(f"the outputs are {', '.join(outputs)}")
-    return outputs[settings["workflow_output"]]
+    return infer
 
 
 def _process_image(infer: InferenceFunction, image: NDArray[np.uint8], write: WriteMessage) -> None:
@@ -127,9 +125,7 @@ def _process_image(infer: InferenceFunction, image: NDArray[np.uint8], write: Wr
 
 def _describe_error(error: Exception) -> dict[str, Any]:
     """Return the kind of failure and the message of an exception of inference-sdk."""
-    import socket
-    import ssl
-
+    # Both packages are installed with inference-sdk, whose import has succeeded.
     import requests
     from inference_sdk.http import errors as sdk_errors
 

@@ -19,18 +19,15 @@ from pydantic import Field
 from executive.cell.config import DetectorConfig
 from executive.cell.frame import Detection
 from executive.errors import DeadlinePassed, InputError, Unavailable
-from executive.perception.detectors.detector_registry import (
-    DetectorOptions,
-    OptionErrors,
-    find_class_map_errors,
-)
+from executive.perception.detectors.detector_registry import DetectorOptions, OptionErrors
 from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
-from executive.perception.detectors.roboflow.answers import read_answer, read_output
 from executive.perception.detectors.roboflow.inference_process import (
     KEY_VARIABLE,
     ApiKey,
     InferenceProcess,
     NoAnswer,
+    read_answer,
+    read_output,
 )
 from executive.perception.detectors.views import Region, remove_duplicates, search_regions
 
@@ -126,13 +123,6 @@ class RoboflowOptions(DetectorOptions):
         note = f", through the proxy in {parts.scheme.upper()}_PROXY or ALL_PROXY (see NO_PROXY),"
         return f"{origin}{note}" if select_proxy(self.url, get_environ_proxies(self.url)) else origin
 
-    @property
-    def model_or_workflow(self) -> str:
-        """Kind and name of the model or the workflow, for messages."""
-        if self.api == "workflow":
-            return f"workflow {self.workspace}/{self.workflow_id}"
-        return f"model {self.model_id}"
-
     @classmethod
     def find_errors(cls, config: DetectorConfig) -> OptionErrors:
         """Yield each invalid option in the section `config`, with an error message."""
@@ -148,12 +138,13 @@ class RoboflowOptions(DetectorOptions):
         yield from _check_url(options.url)
         yield from _check_workflow(options) if options.api == "workflow" else _check_model(options)
         if options.labels:
-            yield from find_class_map_errors(config, options.class_map, options.labels)
+            yield from cls.find_class_map_errors(config, options.class_map, options.labels)
 
 
 def _check_model(options: RoboflowOptions) -> OptionErrors:
-    """Yield the first invalid option for requests to a model, with a message."""
-    api, model_id, parts = options.api, options.model_id, options.model_id.split("/")
+    api = options.api
+    model_id = options.model_id
+    parts = model_id.split("/")
     if unused_options := [name for name in WORKFLOW_OPTIONS if name in options.model_fields_set]:
         names = ", ".join(unused_options)
         yield unused_options[0], f"api: {api} does not use {names}; write api: workflow, or delete {names}"
@@ -167,7 +158,6 @@ def _check_model(options: RoboflowOptions) -> OptionErrors:
 
 
 def _check_workflow(options: RoboflowOptions) -> OptionErrors:
-    """Yield each invalid option for requests to a workflow, with a message."""
     names = {"workspace": options.workspace, "workflow_id": options.workflow_id}
     for option, name in names.items():
         if not name:
@@ -228,9 +218,12 @@ def describe_invalid_answer(problem: str, options: RoboflowOptions) -> str:
 def _fill_in(template: tuple[str, str], options: RoboflowOptions) -> tuple[str, str]:
     """Return failure and advice of a template, with the names of model, workflow and options inserted."""
     problem, advice = template
-    problem = problem.format(model=options.model_or_workflow, output=options.workflow_output)
-    names = "workspace and workflow_id" if options.api == "workflow" else "model_id"
-    return problem, advice.format(options=names)
+    model = f"model {options.model_id}"
+    names = "model_id"
+    if options.api == "workflow":
+        model = f"workflow {options.workspace}/{options.workflow_id}"
+        names = "workspace and workflow_id"
+    return problem.format(model=model, output=options.workflow_output), advice.format(options=names)
 
 
 def shorten_to_line(text: str) -> str:
@@ -245,14 +238,12 @@ class RoboflowDetector(ThreadedDetector):
 
     Args:
         config: Section of the detector in the cell file.
-        options: Options of this kind of detector.
         context: Parts of the cell and of the run that the detector uses.
-        key: API key of the user.
     """
 
-    def __init__(self, config: DetectorConfig, options: RoboflowOptions, context: DetectorContext) -> None:
+    def __init__(self, config: DetectorConfig, context: DetectorContext) -> None:
+        self._options = options = RoboflowOptions.read(config)
         super().__init__(config, context, options.deadline)
-        self._options = options
         self._read_answer = read_output if options.api == "workflow" else read_answer
         server = options.model_dump(include={"url", "model_id", "api", *WORKFLOW_OPTIONS})
         # A proxy cannot reach a server on this computer.
@@ -261,12 +252,8 @@ class RoboflowDetector(ThreadedDetector):
 
     @classmethod
     def from_config(cls, config: DetectorConfig, context: DetectorContext) -> RoboflowDetector:
-        """Return the detector for a section of a cell file, without a request and without an API key.
-
-        Raises:
-            InputError: An option is missing, unknown or invalid.
-        """
-        return cls(config, RoboflowOptions.read(config), context)
+        """Return the detector of a section of a cell file; raise InputError for a wrong option."""
+        return cls(config, context)
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
