@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from executive.cell.frame import Detections
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.looks import LookingSkill
+from executive.manipulation.motions import LookingSkill, capture_and_detect
 from executive.manipulation.tool_goals import is_detection_in_bin
 from executive.skill import Out, param, port
 
@@ -31,7 +31,7 @@ class Detect(LookingSkill):
         camera = cell.camera
         if self.hidden == "fail" and not camera.sees_table():
             raise self.failure("hidden", f"the arm hides part of the workspace from camera {camera.name}")
-        look = yield from self.capture_and_detect(cell)
+        look = yield from capture_and_detect(cell, self.detector, self.view)
         on_table = (entry for entry in look.doubtful if not is_detection_in_bin(cell, entry, look.frame))
         if not look.confident and self.doubtful == "fail" and (best := next(on_table, None)):
             raise self.failure("unsure", look.describe_doubt(best))

@@ -79,7 +79,8 @@ class InputLog:
         self.interruptions: dict[int, Interruption] = {}
         self.halt: Halt | None = None
         for timed in self.events:
-            tick, event = timed.tick, timed.event
+            tick = timed.tick
+            event = timed.event
             match event:
                 case RunResumed(count, action):
                     restarts_tree = count - 1 in incomplete_end_ticks
@@ -274,7 +275,8 @@ class ReplayedCell(CellWrapper):
 
         If the inner cell has executed fewer control steps than the log contains, it executes the rest first.
         """
-        interruption, self.pending_interruption = self.pending_interruption, None
+        interruption = self.pending_interruption
+        self.pending_interruption = None
         assert interruption is not None, "only an interrupted run can be resumed"
         if interruption is not self.last_interruption:
             self._begin_step(interruption.resume_tick)

@@ -24,6 +24,7 @@ from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import CellOptions
 from executive.cells.fake import SHIPPED_ROUTES, FakeCell
 from executive.cells.without_hardware import SilentOperator
+from executive.manipulation.motions import capture_and_detect, complete, localize_and_observe
 from executive.mission.model.port_types import describe_type, find_element_type, is_assignable, is_union
 from executive.skill import ANY, EMPTY, HALT, HOLDING, Direction, Param, Port, Skill
 from executive.testing import faults
@@ -183,14 +184,10 @@ def _build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
 
 
 def _detect_targets(fake: FakeCell) -> tuple[Detections, list[Target]]:
-    """Capture an image; return the detections of the first detector on the table, and their targets."""
-    frame = fake.camera.capture()
-    request = next(iter(fake.cell.detectors.values())).request(frame, "table")
-    while not request.ready:
-        fake.advance()
-    area = fake.camera.get_view_box("table")
-    detections = Detections(**vars(request.result()), frame=frame, view="table", area=area)
-    return detections, list(fake.ledger.observe(detections, fake.cell.localizer.localize(detections)))
+    """Look at the table; return the detections of the first detector, and their targets."""
+    detections = complete(capture_and_detect(fake.cell, "", "table"), fake.advance)
+    _, targets = complete(localize_and_observe(fake.cell, detections))
+    return detections, targets
 
 
 @dataclass(frozen=True)
