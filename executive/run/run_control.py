@@ -47,7 +47,8 @@ class RunControl:
 
     def resume(self) -> None:
         """End the pause."""
-        self._is_paused, self._remaining_ticks = False, 0
+        self._is_paused = False
+        self._remaining_ticks = 0
         self._wake_up.set()
 
     def step(self, tick_count: int = 1) -> None:
