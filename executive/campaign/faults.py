@@ -26,7 +26,8 @@ from executive.record.result import is_confirmed_by_audit
 from executive.record.timeline import Timeline, group_by_node
 from executive.run.assembly import RunOptions, assemble
 from executive.skill import Skill
-from executive.testing.faults import FaultyCell, with_faults
+from executive.testing.faults import with_faults
+from executive.testing.faulty_cell import FaultyCell
 from executive.view.report import try_write_report
 from executive.view.terminal import describe_end
 

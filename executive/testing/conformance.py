@@ -28,6 +28,7 @@ from executive.manipulation.motions import capture_and_detect, complete, localiz
 from executive.mission.model.port_types import describe_type, find_element_type, is_assignable, is_union
 from executive.skill import ANY, EMPTY, HALT, HOLDING, Direction, Param, Port, Skill
 from executive.testing import faults
+from executive.testing.faulty_cell import FaultyCell, ScheduledFault
 from executive.testing.run_skill import SkillResult, run_skill
 
 MAX_TICKS = int(60.0 / STEP)
@@ -96,7 +97,7 @@ class Situation:
     name: str
     is_holding: bool
     params: Mapping[str, Any] = field(default_factory=dict)
-    script: Sequence[faults.ScheduledFault] = ()
+    script: Sequence[ScheduledFault] = ()
 
 
 def _list_situations(skill: type[Skill]) -> Iterator[Situation]:
@@ -247,7 +248,7 @@ class SkillRuns:
     def _run(self, situation: Situation, halt_at: int | None = None) -> SkillTestRun:
         scene, values = _prepare_scene(self.skill, situation, self.arrange)
         fake = scene.cell
-        workcell = faults.FaultyCell(fake, situation.script)
+        workcell = FaultyCell(fake, situation.script)
         calls: list[tuple[int, str]] = []
         first_step = fake.steps
 

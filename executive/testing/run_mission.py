@@ -28,7 +28,8 @@ from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.skill import Skill
-from executive.testing.faults import FaultyCell, ScheduledFault, with_faults
+from executive.testing.faults import with_faults
+from executive.testing.faulty_cell import FaultyCell, ScheduledFault
 from executive.tree.skill_leaf import SkillLeaf
 
 RunMethod = Callable[[Skill, Cell], Steps | None]
