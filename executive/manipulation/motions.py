@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from typing import ClassVar, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Crowded, NoDepth, Unavailable, Unreachable
 from executive.geometry import GRAVITY, Array
 from executive.manipulation.tool_goals import list_obstacles
-from executive.skill import Skill, SkillFailed, param
+from executive.skill import Skill, SkillFailed
 
 T = TypeVar("T")
 """Type of the result of a loop."""
@@ -23,16 +23,6 @@ MAX_PLANNING_ATTEMPTS = 3
 """Maximum number of planning attempts for one motion; an update of the ledger may change goal or task."""
 MAX_PREDICTABLE_SPEED = 0.2
 """Maximum tool speed at which the landing position of an item is predictable [m/s]; faster items roll."""
-
-
-class LookingSkill(Skill):
-    """Base class of skills that take a look with `capture_and_detect`."""
-
-    detector: str = param("", refers_to="detector", doc="a detector of the cell; empty: the first detector")
-    view: str = param("table", choices=("table", "full"), doc="`table`: the workspace; `full`: entire image")
-    reasons: ClassVar[tuple[str, ...]] = ("unavailable", "crowded", "camera_moved")
-    uses = ("camera",)
-    senses = True
 
 
 def capture_and_detect(cell: Cell, detector: str, view: str) -> Generator[None, None, Detections]:

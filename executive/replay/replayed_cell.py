@@ -12,15 +12,7 @@ from executive import errors
 from executive.cell.protocols import StepClock
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import CellWrapper, Workcell
-from executive.events import (
-    InputRead,
-    RunEnded,
-    RunHalted,
-    RunResumed,
-    RunStarted,
-    TimedEvent,
-    ToolCommanded,
-)
+from executive.events import InputRead, RunEnded, RunHalted, RunResumed, RunStarted, TimedEvent, ToolCommanded
 from executive.replay.recording_cell import IDENTITY, RECORDED_ROLES, Codec, find_input_format
 
 

@@ -183,7 +183,7 @@ def object_removed(choice: ObjectChoice = "node", fraction: float | None = None)
 def object_moved(
     displacement: tuple[float, float], choice: ObjectChoice = "node", fraction: float | None = None
 ) -> Effect:
-    """Return an effect: an object is displaced once [m]; a simulated object at its new place is pushed aside."""
+    """Return an effect: an object is displaced once [m]; a simulated object there is pushed aside."""
     arguments = (choice, WorldAccess.move, displacement)
     return Effect("object_moved", _change_object, arguments=arguments, fraction=fraction)
 

@@ -21,8 +21,7 @@ from executive.run.run import LookaheadPlanner, Run
 from executive.skill import Skill, SkillFailed
 from skills.approach import Approach
 from skills.grasp import Grasp
-from skills.put_down import PutDown
-from skills.release import Release
+from skills.release import PutDown, Release
 from skills.select_target import SelectTarget
 from skills.transit import Transit
 
