@@ -240,8 +240,8 @@ def run_trial(
             recorded_run = RecordedRun(run, loaded, directory, Recorder(directory))
             run_directory = recorded_run.execute(mission.seed, start_time).run
             try_write_report(run_directory)
-        items = run.count_items()
-        audit = run.count_ground_truth()
+        items = workcell.accounts.count_states()
+        audit = workcell.audit()
         is_arm_at_rest = workcell.cell.arm.at_rest
         is_holding = workcell.cell.tool.holding
     end = timeline.ended

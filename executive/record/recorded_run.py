@@ -240,4 +240,4 @@ class RecordedRun:
                 for timed in self.earlier_events:
                     observer(timed)
             run.add_recorder(self.recorder)
-            return run.execute(), run.count_ground_truth()
+            return run.execute(), run.workcell.audit()

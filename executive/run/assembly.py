@@ -23,7 +23,7 @@ from executive.run.operator import ScriptedOperator, TerminalOperator
 from executive.run.run import LookaheadPlanner, Run, brake_arm
 from executive.skill import Skill
 from executive.tree.skill_leaf import SkillLeaf
-from executive.tree.tree_node import Blackboard, TreeNode, halt
+from executive.tree.tree_node import Blackboard, halt
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,7 @@ def assemble(loaded: LoadedMission, options: RunOptions, observers: Sequence[Obs
     """
     run = Run(loaded.mission.name, observers, is_realtime=options.is_realtime)
     workcell = _build_workcell(loaded, options, run)
-    run.connect(workcell, LookaheadPlanner(workcell.cell))
-    run.set_tree(_build_tree(loaded, options, run))
+    _complete(run, loaded, options, workcell, workcell.cell)
     run.start_event = RunStarted(
         mission=loaded.mission.name,
         file=str(loaded.path),
@@ -116,8 +115,8 @@ def assemble_resumed(
         text = f"the journal ends in control step {log.last_tick}, and lacks later commands to arm or tool"
         raise InputError(f"{text}; somebody changed it, or a disk lost its end; run the mission again")
     interruption = log.make_final_interruption(workcell.steps, is_complete=is_complete)
-    run.replay(ReplayedCell(workcell, log, None if has_ended else interruption))
-    run.set_tree(_build_tree(loaded, options, run))
+    replayed_cell = ReplayedCell(workcell, log, None if has_ended else interruption)
+    _complete(run, loaded, options, replayed_cell, workcell.cell)
     return run
 
 
@@ -127,8 +126,8 @@ def assemble_replay(
     """Return a run that replays a recorded run without hardware or simulation."""
     options = RunOptions(seed, requests=(), make_cell=CellWithoutHardware)
     run = ResumedRun(loaded.mission.name, observers)
-    run.replay(ReplayedCell(_build_workcell(loaded, options, run), log))
-    run.set_tree(_build_tree(loaded, options, run))
+    inner = _build_workcell(loaded, options, run)
+    _complete(run, loaded, options, ReplayedCell(inner, log), inner.cell)
     return run
 
 
@@ -156,8 +155,12 @@ def _build_workcell(
     return make_cell(config, seed=options.seed, routes=loaded.routes, emit=run.emit, options=cell_options)
 
 
-def _build_tree(loaded: LoadedMission, options: RunOptions, run: Run) -> TreeNode:
-    return build_tree(loaded, loaded.skills, run.cell, Blackboard(), run.emit, options.substitutes)
+def _complete(
+    run: Run, loaded: LoadedMission, options: RunOptions, workcell: Workcell, real_cell: Cell
+) -> None:
+    """Give a run its work cell, its tree, and a planner that reads `real_cell` without a record."""
+    run.connect(workcell, LookaheadPlanner(real_cell))
+    run.set_tree(build_tree(loaded, loaded.skills, run.cell, Blackboard(), run.emit, options.substitutes))
 
 
 class ResumedRun(Run):
@@ -176,10 +179,6 @@ class ResumedRun(Run):
         self._is_realtime_after_replay = is_realtime
         self._recorders: list[Observer] = []
         self.control.call_between_ticks(self._stop_or_resume)
-
-    def replay(self, cell: ReplayedCell) -> None:
-        """Set the cell that replays the recorded run; plans ahead need its inner cell."""
-        self.connect(cell, LookaheadPlanner(cell.inner.cell))
 
     def add_recorder(self, recorder: Observer) -> None:
         """Register a recorder, which receives each event after the replay, before the observers."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from py_trees.common import Status
@@ -261,14 +261,6 @@ class Run:
         if problems := _catch_problems(lambda: self.emit(run_end)):
             run_end = replace(run_end, status="FAULT", reason="fault", message=problems[0], node="")
         return run_end
-
-    def count_items(self) -> dict[str, int]:
-        """Return the number of items by final state; `seen` is the number of all items except phantoms."""
-        return self.workcell.accounts.count_states()
-
-    def count_ground_truth(self) -> Mapping[str, int] | None:
-        """Return the true object counts (`AUDIT_KEYS`) after `execute`, or None if they are unknown."""
-        return self.workcell.audit()
 
     def close(self) -> None:
         """Release the work cell."""

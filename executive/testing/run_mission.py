@@ -206,9 +206,9 @@ def run_mission(
         return MissionResult(
             **asdict(run.execute()),
             events=events,
-            items=run.count_items(),
+            items=workcell.accounts.count_states(),
             accounts=workcell.accounts,
-            audit=run.count_ground_truth(),
+            audit=workcell.audit(),
             cell=find_innermost_cell(workcell),
         )
     finally:
