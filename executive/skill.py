@@ -14,12 +14,10 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, TypeVar, get_args, get_origin, get_type_hints
 
+from executive.cell.protocols import Cell
 from executive.errors import InputError
-
-if TYPE_CHECKING:
-    from executive.cell.protocols import Cell
 
 T = TypeVar("T")
 """Type of the value of a port."""
