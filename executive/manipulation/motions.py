@@ -45,10 +45,9 @@ def capture_and_detect(cell: Cell, detector: str, view: str) -> Generator[None, 
         yield
     try:
         answer = request.result()
-    except Crowded as error:
-        raise SkillFailed("crowded", str(error)) from error
     except Unavailable as error:
-        raise SkillFailed("unavailable", str(error)) from error
+        reason = "crowded" if isinstance(error, Crowded) else "unavailable"
+        raise SkillFailed(reason, str(error)) from error
     return Detections(**vars(answer), frame=frame, view=view, area=cell.camera.get_view_box(view))
 
 
@@ -119,10 +118,9 @@ def plan(
             break
     try:
         return planning.result()
-    except Unreachable as error:
-        raise skill.failure("unreachable", str(error)) from error
-    except Blocked as error:
-        raise skill.failure("blocked", str(error)) from error
+    except (Unreachable, Blocked) as error:
+        reason = "blocked" if isinstance(error, Blocked) else "unreachable"
+        raise skill.failure(reason, str(error)) from error
 
 
 def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] = lambda: False) -> Steps:

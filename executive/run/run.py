@@ -40,94 +40,10 @@ from executive.replay.recording_cell import InputRecorder, make_recording_cell
 from executive.run.run_control import RunControl, halt_on_signals
 from executive.tree.tree_node import TreeNode, halt
 
-
-class LookaheadPlanner:
-    """Lets the arm plan the motion that the mission will probably need next.
-
-    When the tool holds an item, the planner plans the transit of the item to its bin. During a transit, the
-    planner plans the approach to the first target of the shortest tour, which the skill `SelectTarget`
-    prefers by default.
-
-    The planner changes no decision, and its reads of the cell are not recorded: a replay needs no planner.
-
-    Args:
-        cell: The real cell, without the recorder of inputs.
-    """
-
-    def __init__(self, cell: Cell) -> None:
-        self._cell = cell
-        self._item_and_bin: tuple[Item, str] | None = None
-        """Last selected target and its bin."""
-        self._grip_tick: int | None = None
-        """Control step of the last command to close the tool; None after the plan of the transit."""
-        self._change_tick: int | None = None
-        """Control step of the last detections or motion; None if the approach has been planned since then."""
-
-    def on_event(self, timed: TimedEvent) -> None:
-        """Update the expected motions from an event of the run."""
-        event = timed.event
-        if isinstance(event, TargetSelected):
-            # The selection of an item or a bin that does not exist is ignored.
-            items = {target.item for target in self._cell.ledger.find_targets()}
-            exists = event.bin in self._cell.bins and event.item in items
-            self._item_and_bin = (event.item, event.bin) if exists else None
-        elif isinstance(event, ToolCommanded):
-            self._grip_tick = timed.tick if event.action == "close" else None
-        elif isinstance(event, FrameSearched | MotionPlanned):
-            self._change_tick = timed.tick
-
-    def plan_next_motion(self, tick: int) -> None:
-        """Plan the next motion if the events of the run make it predictable; called after each tick.
-
-        `tick` is the current control step. Nothing is planned in a control step with new detections, a new
-        motion or a command to grip, because such a control step already has a high computational load.
-        """
-        cell = self._cell
-        held_item = cell.ledger.find_held_item()
-        may_hold = self._grip_tick not in (None, tick) and held_item is None
-        if may_hold and self._item_and_bin and cell.tool.holding:
-            self._grip_tick = None
-            item, bin = self._item_and_bin
-            cell.arm.plan_ahead(make_bin_goal(cell, bin, item), make_transport_task(cell, item))
-        elif self._change_tick not in (None, tick) and held_item is not None and self._is_moving_to_bin():
-            self._change_tick = None
-            pickable_targets = sort_pickable_targets(cell, cell.ledger.find_targets())
-            if targets := sort_by_tour(cell, pickable_targets):
-                cell.arm.plan_ahead(*make_approach(cell, targets[0]))
-
-    def _is_moving_to_bin(self) -> bool:
-        destination = self._cell.arm.destination
-        return any(bin.contains(destination) for bin in self._cell.bins.values())
-
-
 MAX_BRAKING_TIME = 2.0
 """Maximum time from the command to brake until the arm is at rest [s]."""
 MAX_BRAKING_ATTEMPTS = 4
 """Maximum number of commands to brake; a command may fail, because an observer may raise an exception."""
-
-
-def brake_arm(cell: Cell, advance: Callable[[], None]) -> None:
-    """Brake the arm of a cell until it is at rest; `advance` executes one control step.
-
-    Raises:
-        Fault: The arm is not at rest, or a command to brake failed.
-    """
-    deadline = cell.clock.now + MAX_BRAKING_TIME
-    problems: list[str] = []
-    for _ in range(MAX_BRAKING_ATTEMPTS):
-        try:
-            cell.arm.stop()
-            while not (is_at_rest := cell.arm.at_rest) and cell.clock.now <= deadline:
-                advance()
-        except Exception as error:
-            problems.append(str(error))
-            continue
-        if not is_at_rest:
-            raise Fault(f"the arm is not at rest {MAX_BRAKING_TIME:.0f} s after the command to brake")
-        if problems:
-            raise Fault(problems[0])
-        return
-    raise Fault(f"the arm could not be braked: {problems[-1]}")
 
 
 @dataclass(frozen=True)
@@ -377,3 +293,86 @@ def _finalize_items(accounts: Accounts, has_tree_succeeded: bool) -> None:
         raise Fault(
             f"the item counts are inconsistent: {text}; seen must be placed + rejected + skipped + lost"
         )
+
+
+def brake_arm(cell: Cell, advance: Callable[[], None]) -> None:
+    """Brake the arm of a cell until it is at rest; `advance` executes one control step.
+
+    Raises:
+        Fault: The arm is not at rest, or a command to brake failed.
+    """
+    deadline = cell.clock.now + MAX_BRAKING_TIME
+    problems: list[str] = []
+    for _ in range(MAX_BRAKING_ATTEMPTS):
+        try:
+            cell.arm.stop()
+            while not (is_at_rest := cell.arm.at_rest) and cell.clock.now <= deadline:
+                advance()
+        except Exception as error:
+            problems.append(str(error))
+            continue
+        if not is_at_rest:
+            raise Fault(f"the arm is not at rest {MAX_BRAKING_TIME:.0f} s after the command to brake")
+        if problems:
+            raise Fault(problems[0])
+        return
+    raise Fault(f"the arm could not be braked: {problems[-1]}")
+
+
+class LookaheadPlanner:
+    """Lets the arm plan the motion that the mission will probably need next.
+
+    When the tool holds an item, the planner plans the transit of the item to its bin. During a transit, the
+    planner plans the approach to the first target of the shortest tour, which the skill `SelectTarget`
+    prefers by default.
+
+    The planner changes no decision, and its reads of the cell are not recorded: a replay needs no planner.
+
+    Args:
+        cell: The real cell, without the recorder of inputs.
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        self._cell = cell
+        self._item_and_bin: tuple[Item, str] | None = None
+        """Last selected target and its bin."""
+        self._grip_tick: int | None = None
+        """Control step of the last command to close the tool; None after the plan of the transit."""
+        self._change_tick: int | None = None
+        """Control step of the last detections or motion; None if the approach has been planned since then."""
+
+    def on_event(self, timed: TimedEvent) -> None:
+        """Update the expected motions from an event of the run."""
+        event = timed.event
+        if isinstance(event, TargetSelected):
+            # The selection of an item or a bin that does not exist is ignored.
+            items = {target.item for target in self._cell.ledger.find_targets()}
+            exists = event.bin in self._cell.bins and event.item in items
+            self._item_and_bin = (event.item, event.bin) if exists else None
+        elif isinstance(event, ToolCommanded):
+            self._grip_tick = timed.tick if event.action == "close" else None
+        elif isinstance(event, FrameSearched | MotionPlanned):
+            self._change_tick = timed.tick
+
+    def plan_next_motion(self, tick: int) -> None:
+        """Plan the next motion if the events of the run make it predictable; called after each tick.
+
+        `tick` is the current control step. Nothing is planned in a control step with new detections, a new
+        motion or a command to grip, because such a control step already has a high computational load.
+        """
+        cell = self._cell
+        held_item = cell.ledger.find_held_item()
+        may_hold = self._grip_tick not in (None, tick) and held_item is None
+        if may_hold and self._item_and_bin and cell.tool.holding:
+            self._grip_tick = None
+            item, bin = self._item_and_bin
+            cell.arm.plan_ahead(make_bin_goal(cell, bin, item), make_transport_task(cell, item))
+        elif self._change_tick not in (None, tick) and held_item is not None and self._is_moving_to_bin():
+            self._change_tick = None
+            pickable_targets = sort_pickable_targets(cell, cell.ledger.find_targets())
+            if targets := sort_by_tour(cell, pickable_targets):
+                cell.arm.plan_ahead(*make_approach(cell, targets[0]))
+
+    def _is_moving_to_bin(self) -> bool:
+        destination = self._cell.arm.destination
+        return any(bin.contains(destination) for bin in self._cell.bins.values())

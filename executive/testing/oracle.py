@@ -33,6 +33,9 @@ from executive.geometry import Array, Pose
 from executive.perception.camera_model import NEAR_PLANE, project
 from executive.perception.detectors.requests import PendingSearch
 
+ORACLE_CONFIDENCE = 0.9
+"""Confidence of all detections of an oracle."""
+
 
 class TrueObject(NamedTuple):
     """True state of an object.
@@ -130,10 +133,6 @@ class WorldAccess:
         if self._is_fake:
             return TrueObject(body, body.label, body.position.copy())
         return TrueObject(body, self.world.labels[body], self.world.get_object_pose(body).position)
-
-
-ORACLE_CONFIDENCE = 0.9
-"""Confidence of all detections of an oracle."""
 
 
 @dataclass(frozen=True, eq=False)
