@@ -28,7 +28,8 @@ from executive.manipulation.tool_goals import (
 )
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
-from skills.release import PutDown, Release
+from skills.put_down import PutDown
+from skills.release import Release
 from skills.transit import Transit
 
 SAFE = (0.45, -0.30)

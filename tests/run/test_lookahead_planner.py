@@ -21,7 +21,8 @@ from executive.run.run import LookaheadPlanner, Run
 from executive.skill import Skill, SkillFailed
 from skills.approach import Approach
 from skills.grasp import Grasp
-from skills.release import PutDown, Release
+from skills.put_down import PutDown
+from skills.release import Release
 from skills.select_target import SelectTarget
 from skills.transit import Transit
 

@@ -12,7 +12,7 @@ from executive.cell.objects import Target
 from executive.cells.fake import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.conditions import HasCounted, HasElapsed, IsFresh, IsHolding, IsPlaced, IsReachable
-from skills.grasp import ConfirmGrasp
+from skills.confirm_grasp import ConfirmGrasp
 from skills.wait import Wait
 
 

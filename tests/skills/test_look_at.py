@@ -10,7 +10,7 @@ from executive.cell.objects import Target
 from executive.cells.fake import FakeCell
 from executive.errors import NoDepth
 from executive.testing.run_skill import SkillResult, run_skill
-from skills.detect import LookAt
+from skills.look_at import LookAt
 from skills.release import Release
 from skills.transit import Transit
 

@@ -13,7 +13,7 @@ from executive.errors import Blocked, Unreachable
 from executive.motion.straight_paths import StraightMotion
 from executive.skill import SkillFailed
 from executive.testing.run_skill import run_skill
-from skills.release import PutDown
+from skills.put_down import PutDown
 
 
 def lost(fake: FakeCell, held: str, when: Callable[[], bool]) -> SkillFailed:

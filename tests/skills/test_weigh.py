@@ -12,7 +12,8 @@ from executive.geometry import GRAVITY
 from executive.skill import SkillFailed
 from executive.testing.run_skill import SkillResult, run_skill
 from skills.select_target import SelectTarget
-from skills.transit import Transit, Weigh
+from skills.transit import Transit
+from skills.weigh import Weigh
 
 ROUTES = {"bottle": ("red_bin",), "full_bottle": ("blue_bin",), "jar": ("yellow_bin",), "duck": ("red_bin",)}
 

@@ -16,11 +16,12 @@ from executive.skill import In, Out, Skill, param, port
 from executive.testing.run_mission import make_failing, make_raising
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
+from skills.await_request import AwaitRequest
 from skills.detect import Detect
 from skills.grasp import Grasp
 from skills.localize import Localize
 from skills.select_target import SelectTarget
-from skills.wait import AwaitRequest, Wait
+from skills.wait import Wait
 
 
 class Worker(Skill):
