@@ -95,7 +95,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
     ],
     "Test kit: faults": [
         ("Times and effects", "testing/faults.py", ""),
-        ("effect = Effect(...)", "testing/faults.py", "Effect"),
+        ("effect = Effect(...)", "testing/faulty_cell.py", "Effect"),
     ],
     "Test kit: conformance": [
         ("Checks", "testing/conformance.py", ""),

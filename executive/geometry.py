@@ -68,7 +68,8 @@ class Pose:
         if i == 3:
             q = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], 1 + np.trace(r)])
         else:
-            j, k = (i + 1) % 3, (i + 2) % 3
+            j = (i + 1) % 3
+            k = (i + 2) % 3
             q = np.empty(4)
             q[i] = 1 + r[i, i] - r[j, j] - r[k, k]
             q[j] = r[j, i] + r[i, j]
@@ -92,7 +93,8 @@ class Pose:
 
 def rotate_about_z(angle: float) -> Array:
     """Return the rotation `(3, 3)` by `angle` [rad] about the z axis."""
-    c, s = math.cos(angle), math.sin(angle)
+    c = math.cos(angle)
+    s = math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 

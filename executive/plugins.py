@@ -35,6 +35,8 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+DISTRIBUTION = "pick-place-executive"
+"""Name of the distribution of this project; `executive` in the package index is another project."""
 SKILL_GROUP = "executive.skills"
 """Entry-point group of skills."""
 CELL_KIND_GROUP = "executive.cells"
@@ -291,10 +293,6 @@ def _read_project(file: Path) -> Project:
     if not isinstance(table, dict):
         raise InputError(f"{file}: project is not a table; begin it with a line [project]")
     return Project(file, str(table.get("name", "")), table)
-
-
-DISTRIBUTION = "pick-place-executive"
-"""Name of the distribution of this project; `executive` in the package index is another project."""
 
 
 @functools.cache

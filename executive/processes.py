@@ -19,6 +19,11 @@ ReturnT = TypeVar("ReturnT")
 
 THREAD_COUNT_VARIABLES = ("OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 """Environment variables with the number of threads: of linear algebra and models, and of OpenCV."""
+MAX_BLOCKING_TIME = 0.05
+"""Maximum uninterrupted wait for another thread [s]; within this time, Python handles a signal, for example
+a second Ctrl-C, which ends the process at once."""
+CONTROL_THRESHOLD = 700
+"""Number of new objects after which Python collects garbage between control steps: the default of Python."""
 
 
 class WorkerPool(ProcessPoolExecutor):
@@ -98,21 +103,10 @@ def build_command(module: str, *arguments: str) -> list[str]:
     return [sys.executable, "-c", script, module, *arguments]
 
 
-T = TypeVar("T")
-
-MAX_BLOCKING_TIME = 0.05
-"""Maximum uninterrupted wait for another thread [s]; within this time, Python handles a signal, for example
-a second Ctrl-C, which ends the process at once."""
-
-
-def wait_until_done(future: Future[T]) -> None:
+def wait_until_done(future: Future[Any]) -> None:
     """Wait until another thread has computed a result or raised an exception."""
     while not future.done():
         wait([future], MAX_BLOCKING_TIME)
-
-
-CONTROL_THRESHOLD = 700
-"""Number of new objects after which Python collects garbage between control steps: the default of Python."""
 
 
 @contextmanager

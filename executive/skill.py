@@ -14,12 +14,10 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, TypeVar, get_args, get_origin, get_type_hints
 
+from executive.cell.protocols import Cell
 from executive.errors import InputError
-
-if TYPE_CHECKING:
-    from executive.cell.protocols import Cell
 
 T = TypeVar("T")
 """Type of the value of a port."""
@@ -52,7 +50,9 @@ class ToolState(Enum):
     HOLDING = "holding"
 
 
-ANY, EMPTY, HOLDING = ToolState.ANY, ToolState.EMPTY, ToolState.HOLDING
+ANY = ToolState.ANY
+EMPTY = ToolState.EMPTY
+HOLDING = ToolState.HOLDING
 
 DEVICES = ("arm", "tool", "camera")
 """Values that `Skill.uses` may contain."""
@@ -151,7 +151,8 @@ class SkillFailed(Exception):
 
     def __init__(self, reason: str, message: str) -> None:
         super().__init__(message)
-        self.reason, self.message = reason, message
+        self.reason = reason
+        self.message = message
 
 
 class Skill:
@@ -199,16 +200,18 @@ class Skill:
         _require_annotations(cls)
         if "tool_left" in vars(cls):
             raise TypeError(f"{cls.__qualname__}.tool_left: the attribute is now tool_state_after_failure")
-        params, ports = dict(cls.params), dict(cls.ports)
+        params = dict(cls.params)
+        ports = dict(cls.ports)
         for name, hint in list(cls.__annotations__.items()):
             if hint is ClassVar or str(hint).endswith("ClassVar"):
                 # `get_type_hints` of Python 3.10 does not accept a ClassVar without a type.
                 del cls.__annotations__[name]
         hints = get_type_hints(cls, include_extras=True)
         for attribute in cls.__annotations__:
-            hint, name = hints[attribute], _get_mission_name(attribute)
+            hint = hints[attribute]
             if get_origin(hint) is ClassVar:
                 continue
+            name = _get_mission_name(attribute)
             value_type, *metadata = get_args(hint) if get_origin(hint) is Annotated else (hint,)
             declaration = cls.__dict__.get(attribute)
             direction = next((value for value in metadata if isinstance(value, Direction)), None)
@@ -225,7 +228,8 @@ class Skill:
                 raise TypeError(f"{place}: attributes of a skill are In[...], Out[...] or param(...)")
             if isinstance(declaration, Param | Port):
                 delattr(cls, attribute)
-        cls.params, cls.ports = params, ports
+        cls.params = params
+        cls.ports = ports
         _check_attributes(cls)
 
     def __init__(self, **values: Any) -> None:

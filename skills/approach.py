@@ -50,7 +50,8 @@ class Approach(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Move to the target and descend until the cup touches something."""
-        item, tool = self.target.item, cell.tool
+        item = self.target.item
+        tool = cell.tool
         if not cell.ledger.is_fresh(self.target):
             message = f"the robot may have moved {item} since its detection at {self.target.stamp:.2f} s"
             raise self.failure("stale", f"{message}; look again")
@@ -60,9 +61,11 @@ class Approach(Skill):
         # The zero of a load cell drifts; only before the descent, the tool is at rest and certainly empty.
         cell.ledger.record_empty_load(tool.load)
         yield from follow(self, cell, motion, until=_build_contact_check(tool))
-        label, object_class = self.target.label, cell.classes[self.target.label]
+        label = self.target.label
+        object_class = cell.classes[label]
         centre_height = float(self.target.position[2])
-        height, start_height = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded_length
+        height = float(cell.arm.tool_pose.position[2])
+        start_height = goal.position[2] + goal.guarded_length
         expectation = f"was expected at {(start_height - cell.descent) * 1000:.0f} mm"
         if not tool.touching:
             cell.ledger.record_failed_pick(item, found_table=_proves_absence(goal, self.target, object_class))

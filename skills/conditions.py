@@ -99,7 +99,8 @@ class IsHolding(Skill):
 
     def run(self, cell: Cell) -> None:
         """Compare the vacuum sensor with the ledger."""
-        item, is_sealed = cell.ledger.find_held_item(), cell.tool.holding
+        item = cell.ledger.find_held_item()
+        is_sealed = cell.tool.holding
         if not is_sealed:
             known = f", but the ledger reports {item} in the tool" if item else ""
             raise self.failure("empty", f"the sensor detects no seal{known}")

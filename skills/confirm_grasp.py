@@ -24,7 +24,8 @@ class ConfirmGrasp(Skill):
 
     def run(self, cell: Cell) -> None:
         """Compare the vacuum sensor with the ledger; unless both report an item, open the tool and fail."""
-        item, is_sealed = cell.ledger.find_held_item(), cell.tool.holding
+        item = cell.ledger.find_held_item()
+        is_sealed = cell.tool.holding
         if is_sealed and item is not None:
             self.held = item
             return

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from executive.cell.frame import Detections
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.looks import LookingSkill
+from executive.manipulation.motions import capture_and_detect
 from executive.manipulation.tool_goals import is_detection_in_bin
-from executive.skill import Out, param, port
+from executive.skill import Out, Skill, param, port
+
+
+class LookingSkill(Skill):
+    """Base class of skills that take a look with `capture_and_detect`."""
+
+    detector: str = param("", refers_to="detector", doc="a detector of the cell; empty: the first detector")
+    view: str = param("table", choices=("table", "full"), doc="`table`: the workspace; `full`: entire image")
+    reasons: ClassVar[tuple[str, ...]] = ("unavailable", "crowded", "camera_moved")
+    uses = ("camera",)
+    senses = True
 
 
 class Detect(LookingSkill):
@@ -31,7 +43,7 @@ class Detect(LookingSkill):
         camera = cell.camera
         if self.hidden == "fail" and not camera.sees_table():
             raise self.failure("hidden", f"the arm hides part of the workspace from camera {camera.name}")
-        look = yield from self.capture_and_detect(cell)
+        look = yield from capture_and_detect(cell, self.detector, self.view)
         on_table = (entry for entry in look.doubtful if not is_detection_in_bin(cell, entry, look.frame))
         if not look.confident and self.doubtful == "fail" and (best := next(on_table, None)):
             raise self.failure("unsure", look.describe_doubt(best))

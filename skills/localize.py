@@ -5,7 +5,7 @@ from __future__ import annotations
 from executive.cell.frame import Detections
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
-from executive.errors import NoDepth
+from executive.manipulation.motions import localize_and_observe
 from executive.skill import In, Out, Skill, port
 
 
@@ -25,19 +25,5 @@ class Localize(Skill):
     reasons = ("stale", "no_depth")
 
     def run(self, cell: Cell) -> Steps:
-        """Localize every detection, then update the ledger.
-
-        Localization, update and the next skill run in separate control steps, because their total computation
-        time exceeds a control period.
-        """
-        frame = self.detections.frame
-        try:
-            observations = cell.localizer.localize(self.detections)
-        except NoDepth as error:
-            raise self.failure("no_depth", str(error)) from error
-        yield
-        if not cell.ledger.is_current(frame):
-            message = f"the robot may have moved objects after frame {frame.id} was captured; look again"
-            raise self.failure("stale", message)
-        self.targets = list(cell.ledger.observe(self.detections, observations))
-        yield
+        """Localize every detection, then update the ledger."""
+        _, self.targets = yield from localize_and_observe(cell, self.detections)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from contextlib import suppress
 
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Presence, Steps
-from executive.errors import NoDepth
-from executive.manipulation.looks import LookingSkill
-from executive.skill import In, param, port
+from executive.manipulation.motions import capture_and_detect, complete, localize_and_observe
+from executive.skill import In, SkillFailed, param, port
+from skills.detect import LookingSkill
 
 
 class LookAt(LookingSkill):
@@ -52,11 +51,10 @@ class LookAt(LookingSkill):
         self, cell: Cell, items: list[Item]
     ) -> Generator[None, None, dict[Item, Presence]]:
         """Take a look, update the ledger, and return the answer for each item."""
-        look = yield from self.capture_and_detect(cell)
-        # Objects may have moved since the capture while another branch of a `parallel` used the tool.
-        if cell.ledger.is_current(look.frame):
-            with suppress(NoDepth):
-                observations = cell.localizer.localize(look)
-                cell.ledger.observe(look, observations)
-                return {item: cell.ledger.update_presence(item, look, observations) for item in items}
-        return dict.fromkeys(items, Presence.UNSURE)
+        look = yield from capture_and_detect(cell, self.detector, self.view)
+        try:
+            observations, _ = complete(localize_and_observe(cell, look))
+        except SkillFailed:
+            # Objects may have moved since the capture while another branch of a `parallel` used the tool.
+            return dict.fromkeys(items, Presence.UNSURE)
+        return {item: cell.ledger.update_presence(item, look, observations) for item in items}

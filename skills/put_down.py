@@ -35,7 +35,8 @@ class PutDown(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Transport the item to a free position, and release the item."""
-        item, object_class = self.held, cell.classes[cell.ledger.get_label(self.held)]
+        item = self.held
+        object_class = cell.classes[cell.ledger.get_label(item)]
         goal = make_put_down_goal(cell, object_class, self.drop, item)
         top_height = float(cell.safe_place[2]) + object_class.height
         try:

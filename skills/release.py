@@ -28,7 +28,8 @@ class Release(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Open the tool, wait, and read the sensors of vacuum and contact."""
-        item, bin = self.held, self.bin
+        item = self.held
+        bin = self.bin
         if cell.ledger.find_held_item() == item:
             record_placement = partial(cell.ledger.record_placement, item, bin)
             falls = cell.bins[bin].contains(cell.arm.tool_pose.position)

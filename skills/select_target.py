@@ -64,7 +64,9 @@ class SelectTarget(Skill):
         if names := self._format_uncertain_items(cell, cell.ledger.describe(best.item).deferral_rank):
             message = f"{best.item} is deferred, and not enough looks agree on {names} yet; look again"
             raise self.failure("doubtful", message)
-        self.target, self.item, self.bin = best, best.item, choose_bin(cell, best.item)
+        self.target = best
+        self.item = best.item
+        self.bin = choose_bin(cell, best.item)
         cell.report_selection(best, self.bin)
 
     def _make_sort_key(self, cell: Cell, target: Target) -> tuple[float | str, ...]:

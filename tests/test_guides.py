@@ -64,7 +64,7 @@ def assert_does_its_work(loaded: LoadedMission) -> None:
     try:
         outcome = run.execute()
         assert (outcome.status, outcome.message) == ("SUCCESS", "")
-        items = run.count_items()
+        items = run.workcell.accounts.count_states()
         assert items["lost"] == 0
         # Whoever says where things go brings at least one of them there.
         assert items["placed"] >= bool(loaded.routes)

@@ -13,7 +13,8 @@ from executive.mission.nodes import SkillNode
 from executive.record.timeline import Activation
 from executive.skill import EMPTY, HOLDING, Skill
 from executive.testing import faults as effects
-from executive.testing.faults import Effect, ObjectChoice, ScheduledFault, after, between, during
+from executive.testing.faults import after, between, during
+from executive.testing.faulty_cell import Effect, ObjectChoice, ScheduledFault
 from executive.testing.run_mission import make_raising, make_substitute
 
 FAULT_DURATIONS = (0.5, 5.0)

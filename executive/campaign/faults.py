@@ -26,7 +26,8 @@ from executive.record.result import is_confirmed_by_audit
 from executive.record.timeline import Timeline, group_by_node
 from executive.run.assembly import RunOptions, assemble
 from executive.skill import Skill
-from executive.testing.faults import FaultyCell, with_faults
+from executive.testing.faults import with_faults
+from executive.testing.faulty_cell import FaultyCell
 from executive.view.report import try_write_report
 from executive.view.terminal import describe_end
 
@@ -239,8 +240,8 @@ def run_trial(
             recorder = Recorder(directory)
             run_directory = execute_recorded(run, loaded, recorder, mission.seed, start_time).run
             try_write_report(run_directory)
-        items = run.count_items()
-        audit = run.count_ground_truth()
+        items = workcell.accounts.count_states()
+        audit = workcell.audit()
         is_arm_at_rest = workcell.cell.arm.at_rest
         is_holding = workcell.cell.tool.holding
     end = timeline.ended

@@ -1,1 +1,1 @@
-"""Functions that several skills use: tool goals, motions, obstacles, and detection of drops."""
+"""Functions that several skills use: loops of looks and motions, goals of the tool, obstacles."""

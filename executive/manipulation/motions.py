@@ -1,24 +1,89 @@
-"""Motions of the arm for skills: planning, execution, transport, detection of drops, release of an item."""
+"""Loops of skills: looks (capture, detect, localize, observe) and motions (plan, follow, watch)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
+from typing import TypeVar
 
 import numpy as np
 
 from executive.cell.arm import Arm, Goal, Motion, Task
-from executive.cell.objects import Item, Load
+from executive.cell.frame import Detections, Observation
+from executive.cell.objects import Item, Load, Target
 from executive.cell.protocols import Cell, Steps
-from executive.errors import Blocked, Unreachable
+from executive.errors import Blocked, Crowded, NoDepth, Unavailable, Unreachable
 from executive.geometry import GRAVITY, Array
 from executive.manipulation.tool_goals import list_obstacles
 from executive.skill import Skill, SkillFailed
 
+T = TypeVar("T")
+"""Type of the result of a loop."""
 MAX_PLANNING_ATTEMPTS = 3
 """Maximum number of planning attempts for one motion; an update of the ledger may change goal or task."""
 MAX_PREDICTABLE_SPEED = 0.2
 """Maximum tool speed at which the landing position of an item is predictable [m/s]; faster items roll."""
+
+
+def capture_and_detect(cell: Cell, detector: str, view: str) -> Generator[None, None, Detections]:
+    """Capture a frame, yield until the detector has answered, and return its detections.
+
+    Args:
+        cell: The work cell.
+        detector: Name of the detector; "": the first detector of the cell.
+        view: The searched part of the frame: `table` or `full`.
+
+    Raises:
+        SkillFailed: `camera_moved`, `crowded` or `unavailable`.
+    """
+    frame = cell.camera.capture()
+    request = cell.detectors[detector or next(iter(cell.detectors))].request(frame, view)
+    # The detector searches the frame during this check.
+    if displacement := cell.camera.describe_displacement(frame):
+        raise SkillFailed("camera_moved", displacement)
+    while not request.ready:
+        yield
+    try:
+        answer = request.result()
+    except Unavailable as error:
+        reason = "crowded" if isinstance(error, Crowded) else "unavailable"
+        raise SkillFailed(reason, str(error)) from error
+    return Detections(**vars(answer), frame=frame, view=view, area=cell.camera.get_view_box(view))
+
+
+def localize_and_observe(
+    cell: Cell, look: Detections
+) -> Generator[None, None, tuple[Sequence[Observation], list[Target]]]:
+    """Localize the detections of a look, update the ledger, and return the observations and all targets.
+
+    Localization, update and what follows run in separate control steps, because their total computation time
+    exceeds a control period.
+
+    Raises:
+        SkillFailed: `no_depth`, or `stale` if the robot may have moved objects since the capture.
+    """
+    try:
+        observations = cell.localizer.localize(look)
+    except NoDepth as error:
+        raise SkillFailed("no_depth", str(error)) from error
+    yield
+    if not cell.ledger.is_current(look.frame):
+        message = f"the robot may have moved objects after frame {look.frame.id} was captured; look again"
+        raise SkillFailed("stale", message)
+    targets = list(cell.ledger.observe(look, observations))
+    yield
+    return observations, targets
+
+
+def complete(loop: Generator[None, None, T], advance: Callable[[], None] = lambda: None) -> T:
+    """Execute a loop outside a skill, or within one control step; `advance` is called after each `yield`."""
+    while True:
+        try:
+            next(loop)
+        except StopIteration as end:
+            result: T = end.value
+            return result
+        advance()
 
 
 def wait_for_rest(arm: Arm) -> Steps:
@@ -53,10 +118,9 @@ def plan(
             break
     try:
         return planning.result()
-    except Unreachable as error:
-        raise skill.failure("unreachable", str(error)) from error
-    except Blocked as error:
-        raise skill.failure("blocked", str(error)) from error
+    except (Unreachable, Blocked) as error:
+        reason = "blocked" if isinstance(error, Blocked) else "unreachable"
+        raise skill.failure(reason, str(error)) from error
 
 
 def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] = lambda: False) -> Steps:
@@ -160,7 +224,8 @@ def detect_and_record_drop(cell: Cell, item: Item) -> bool:
     if cell.tool.holding:
         return False
     if cell.ledger.find_held_item() == item:
-        velocity, height = cell.arm.tool_velocity, cell.classes[cell.ledger.get_label(item)].height
+        velocity = cell.arm.tool_velocity
+        height = cell.classes[cell.ledger.get_label(item)].height
         is_predictable = float(np.linalg.norm(velocity)) <= MAX_PREDICTABLE_SPEED
         # Each read of the tool pose is written to the journal, so it is read only if it is needed.
         landing = predict_landing(cell.arm.tool_pose.position, velocity, height) if is_predictable else None
@@ -176,7 +241,8 @@ def predict_landing(position: Array, velocity: Array, height: float) -> Array:
         velocity: Velocity of the tool at the drop `(3,)` [m/s].
         height: Height of the object [m].
     """
-    vertical_speed, fall_height = float(velocity[2]), max(float(position[2]) - height, 0.0)
+    vertical_speed = float(velocity[2])
+    fall_height = max(float(position[2]) - height, 0.0)
     # Ballistic fall: positive solution t of fall_height + vertical_speed * t - GRAVITY / 2 * t**2 = 0.
     fall_time = (vertical_speed + math.sqrt(vertical_speed**2 + 2 * GRAVITY * fall_height)) / GRAVITY
     x, y = (position + velocity * fall_time)[:2]

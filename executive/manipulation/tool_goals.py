@@ -79,7 +79,8 @@ def make_obstacle(cell: Cell, target: Target) -> Obstacle:
     x, y, z = map(float, target.position)
     object_class = cell.classes.get(target.label)
     classes = [object_class] if object_class else cell.classes.values()
-    radius, height = max(each.radius for each in classes), max(each.height for each in classes)
+    radius = max(each.radius for each in classes)
+    height = max(each.height for each in classes)
     return Obstacle(x, y, radius, z + height / 2, target.item)
 
 
@@ -190,7 +191,8 @@ def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]
     A target can be picked if its item is open, class and position of the item are certain, a bin below its
     quota is permitted for the item, and the robot cannot have moved the item since its detection.
     """
-    ledger, destination = cell.ledger, cell.arm.destination[:2]
+    ledger = cell.ledger
+    destination = cell.arm.destination[:2]
     pickable_targets = [
         target
         for target in targets
@@ -240,9 +242,10 @@ def explain_uncertain_bin(cell: Cell, bin_name: str, item: Item) -> str:
 
 def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
     """Return the tool goal at which `item` is `drop_height` [m] above the next slot of a bin."""
-    bin, next_slot_index = cell.bins[bin_name], predict_next_slot_index(cell, bin_name, item)
+    next_slot_index = predict_next_slot_index(cell, bin_name, item)
     height = cell.classes[cell.ledger.get_label(item)].height
-    return make_slot_goal(bin, next_slot_index, height, find_max_object_height(cell), drop_height)
+    max_height = find_max_object_height(cell)
+    return make_slot_goal(cell.bins[bin_name], next_slot_index, height, max_height, drop_height)
 
 
 def make_slot_goal(
@@ -324,7 +327,9 @@ def _measure_tour(distances: Sequence[Sequence[float]], first: int) -> float:
             the bin of target `i`.
         first: Index of the first target.
     """
-    remaining, last, length = set(range(len(distances) - 1)) - {first}, first, distances[0][first]
+    remaining = set(range(len(distances) - 1)) - {first}
+    last = first
+    length = distances[0][first]
     while remaining:
         row = distances[last + 1]
         last = min(remaining, key=lambda index: (row[index], index))

@@ -185,7 +185,7 @@ def execute_recorded(
                 observer(timed)
         run.add_recorder(recorder)
         run_end = run.execute()
-        audit = run.count_ground_truth()
+        audit = run.workcell.audit()
     workcell = run.workcell
     path = recorder.directory.path
     item_counts = workcell.accounts.count_states()

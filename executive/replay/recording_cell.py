@@ -133,7 +133,8 @@ def encode_observations(observations: Sequence[Observation]) -> list[Any]:
     """Return the attributes of each observation as a list."""
     encoded = []
     for seen in observations:
-        detection, position = encode_detection(seen.detection), seen.position.tolist()
+        detection = encode_detection(seen.detection)
+        position = seen.position.tolist()
         encoded.append([detection, position, seen.std, seen.is_confident, seen.contradiction])
     return encoded
 

@@ -12,15 +12,7 @@ from executive import errors
 from executive.cell.protocols import StepClock
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import CellWrapper, Workcell
-from executive.events import (
-    InputRead,
-    RunEnded,
-    RunHalted,
-    RunResumed,
-    RunStarted,
-    TimedEvent,
-    ToolCommanded,
-)
+from executive.events import InputRead, RunEnded, RunHalted, RunResumed, RunStarted, TimedEvent, ToolCommanded
 from executive.replay.recording_cell import IDENTITY, RECORDED_ROLES, Codec, find_input_format
 
 
@@ -74,15 +66,20 @@ class InputLog:
             if isinstance(timed.event, RunResumed):
                 self.events = _select_before(self.events, timed.event.valid_ticks)
             self.events.append(timed)
-        incomplete_end_ticks = _find_incomplete_end_ticks(self.events)
+        self._incomplete_end_ticks = {
+            timed.tick
+            for timed in self.events
+            if isinstance(timed.event, RunEnded) and timed.event.status == "INCOMPLETE"
+        }
         self.inputs: dict[str, list[RecordedInput]] = defaultdict(list)
         self.interruptions: dict[int, Interruption] = {}
         self.halt: Halt | None = None
         for timed in self.events:
-            tick, event = timed.tick, timed.event
+            tick = timed.tick
+            event = timed.event
             match event:
                 case RunResumed(count, action):
-                    restarts_tree = count - 1 in incomplete_end_ticks
+                    restarts_tree = count - 1 in self._incomplete_end_ticks
                     self.interruptions[count] = Interruption(count, action, restarts_tree, tick)
                 case InputRead(name):
                     self.inputs[name].append(RecordedInput(tick, event))
@@ -135,15 +132,15 @@ class InputLog:
             step_count: Number of control steps that the cell has executed.
             is_complete: True if the log contains all events of its last control step.
         """
-        incomplete_end_ticks = _find_incomplete_end_ticks(self.events)
-        if self.last_tick in incomplete_end_ticks:
+        if self.last_tick in self._incomplete_end_ticks:
             return Interruption(self.last_tick + 1, self.last_action, True, self.last_tick + 1)
         logged_count = self.last_tick + 1 if is_complete else self.last_tick
         kept_count = min(step_count, logged_count if self.halt is None else self.halt.tick)
         for interruption in reversed(self.interruptions.values()):
             if interruption.resume_tick >= kept_count:
                 kept_count = min(kept_count, interruption.kept_step_count)
-        return Interruption(kept_count, self.last_action, kept_count - 1 in incomplete_end_ticks, step_count)
+        restarts_tree = kept_count - 1 in self._incomplete_end_ticks
+        return Interruption(kept_count, self.last_action, restarts_tree, step_count)
 
     def has_ended_before_tick(self, tick: int) -> bool:
         """Return True if the recorded run ended before its tree was ticked in control step `tick`."""
@@ -157,12 +154,6 @@ class InputLog:
 def _select_before(events: Iterable[TimedEvent], tick: int) -> list[TimedEvent]:
     """Return the events before control step `tick`, including the start of the run."""
     return [timed for timed in events if timed.tick < tick or isinstance(timed.event, RunStarted)]
-
-
-def _find_incomplete_end_ticks(events: Iterable[TimedEvent]) -> set[int]:
-    """Return the control steps in which the run ended as INCOMPLETE."""
-    ends = ((timed.tick, timed.event) for timed in events if isinstance(timed.event, RunEnded))
-    return {tick for tick, end in ends if end.status == "INCOMPLETE"}
 
 
 class InputNotRecorded(errors.Fault):
@@ -274,7 +265,8 @@ class ReplayedCell(CellWrapper):
 
         If the inner cell has executed fewer control steps than the log contains, it executes the rest first.
         """
-        interruption, self.pending_interruption = self.pending_interruption, None
+        interruption = self.pending_interruption
+        self.pending_interruption = None
         assert interruption is not None, "only an interrupted run can be resumed"
         if interruption is not self.last_interruption:
             self._begin_step(interruption.resume_tick)

@@ -1,26 +1,29 @@
-"""Assembly of the runs of a loaded mission: new, resumed and replayed runs."""
+"""Runs of a loaded mission: assembly of new, resumed and replayed runs, and the resumption of a run."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from executive.cell.protocols import Operator
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.cell.protocols import Cell, Operator
 from executive.cell.workcell import CellOptions, ResumePoint, Workcell
 from executive.cells.without_hardware import CellWithoutHardware
-from executive.errors import InputError
-from executive.events import Observer, RequestGiven, RunStarted
+from executive.errors import Fault, InputError
+from executive.events import Observer, RequestGiven, RunEnded, RunResumed, RunStarted
 from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission
 from executive.plugins import list_versions, load_cell_kind
-from executive.replay.replayed_cell import InputLog, ReplayedCell
+from executive.replay.replayed_cell import InputLog, Interruption, ReplayedCell
 from executive.run.operator import ScriptedOperator, TerminalOperator
-from executive.run.resumed_run import ResumedRun
-from executive.run.run import LookaheadPlanner, Run, RunContext
-from executive.run.run_control import RunControl
+from executive.run.run import LookaheadPlanner, Run, brake_arm
 from executive.skill import Skill
-from executive.tree.tree_node import Blackboard, TreeNode
+from executive.tree.skill_leaf import SkillLeaf
+from executive.tree.tree_node import Blackboard, halt
 
 
 @dataclass(frozen=True)
@@ -59,11 +62,10 @@ def assemble(loaded: LoadedMission, options: RunOptions, observers: Sequence[Obs
     Raises:
         InputError: The kind of the cell is not installed, or a request names no class of the mission.
     """
-    context = RunContext(observers)
-    control = RunControl()
-    workcell = _build_workcell(loaded, options, context, control)
-    context.connect(workcell, LookaheadPlanner(workcell.cell))
-    start_event = RunStarted(
+    run = Run(loaded.mission.name, observers, is_realtime=options.is_realtime)
+    workcell = _build_workcell(loaded, options, run)
+    _complete(run, loaded, options, workcell, workcell.cell)
+    run.start_event = RunStarted(
         mission=loaded.mission.name,
         file=str(loaded.path),
         seed=options.seed,
@@ -74,9 +76,7 @@ def assemble(loaded: LoadedMission, options: RunOptions, observers: Sequence[Obs
         step=workcell.cell.clock.step,
         versions=dict(list_versions()),
     )
-    root = _build_tree(loaded, options, context)
-    is_realtime = options.is_realtime
-    return Run(context, root, control, loaded.mission.name, start_event=start_event, is_realtime=is_realtime)
+    return run
 
 
 def assemble_resumed(
@@ -102,12 +102,12 @@ def assemble_resumed(
         InputError: The kind of the cell is not installed, its world cannot be reconstructed, or the log lacks
             commands to arm or tool.
     """
-    context = RunContext()
-    control = RunControl()
-    frame_count, pose_count = (len(log.inputs.get(name, ())) for name in ("camera.frame", "camera.next_pose"))
+    run = ResumedRun(loaded.mission.name, is_realtime=options.is_realtime)
+    frame_count = len(log.inputs.get("camera.frame", ()))
+    pose_count = len(log.inputs.get("camera.next_pose", ()))
     request_count = sum(isinstance(timed.event, RequestGiven) for timed in log.events)
     resume_point = ResumePoint(world_log, frame_count, pose_count)
-    workcell = _build_workcell(loaded, options, context, control, resume_point, request_count)
+    workcell = _build_workcell(loaded, options, run, resume_point, request_count)
     # A killed run loses no command: before the cell executes a command, the journal contains an event of the
     # same control step, which is `ToolCommanded` or `MotionPlanned`.
     if workcell.last_command_step > log.last_tick:
@@ -115,8 +115,9 @@ def assemble_resumed(
         text = f"the journal ends in control step {log.last_tick}, and lacks later commands to arm or tool"
         raise InputError(f"{text}; somebody changed it, or a disk lost its end; run the mission again")
     interruption = log.make_final_interruption(workcell.steps, is_complete=is_complete)
-    cell = ReplayedCell(workcell, log, None if has_ended else interruption)
-    return _build_resumed_run(loaded, options, context, control, cell)
+    replayed_cell = ReplayedCell(workcell, log, None if has_ended else interruption)
+    _complete(run, loaded, options, replayed_cell, workcell.cell)
+    return run
 
 
 def assemble_replay(
@@ -124,17 +125,16 @@ def assemble_replay(
 ) -> ResumedRun:
     """Return a run that replays a recorded run without hardware or simulation."""
     options = RunOptions(seed, requests=(), make_cell=CellWithoutHardware)
-    context = RunContext(observers)
-    control = RunControl()
-    cell = ReplayedCell(_build_workcell(loaded, options, context, control), log)
-    return _build_resumed_run(loaded, options, context, control, cell)
+    run = ResumedRun(loaded.mission.name, observers)
+    inner = _build_workcell(loaded, options, run)
+    _complete(run, loaded, options, ReplayedCell(inner, log), inner.cell)
+    return run
 
 
 def _build_workcell(
     loaded: LoadedMission,
     options: RunOptions,
-    context: RunContext,
-    control: RunControl,
+    run: Run,
     resume_point: ResumePoint | None = None,
     request_count: int = 0,
 ) -> Workcell:
@@ -143,27 +143,126 @@ def _build_workcell(
     For a resumed run, `resume_point` is the state of the cell at the interruption, and `request_count` the
     number of requests that the operator had given before.
     """
-    emit = context.emit
-    operator: Operator = TerminalOperator(emit, control, has_keyboard=options.has_keyboard)
+    operator: Operator = TerminalOperator(run.emit, run.control, has_keyboard=options.has_keyboard)
     if options.requests is not None:
-        operator = ScriptedOperator(options.requests, tuple(loaded.routes), emit, request_count)
-    config, base = loaded.cell_config, loaded.cell_path.parent
+        operator = ScriptedOperator(options.requests, tuple(loaded.routes), run.emit, request_count)
+    base = loaded.cell_path.parent
     cell_options = CellOptions(
         operator, base, options.gui, resume=resume_point, scene=options.scene, quotas=loaded.quotas
     )
+    config = loaded.cell_config
     make_cell = options.make_cell or load_cell_kind(config.kind)
-    return make_cell(config, seed=options.seed, routes=loaded.routes, emit=emit, options=cell_options)
+    return make_cell(config, seed=options.seed, routes=loaded.routes, emit=run.emit, options=cell_options)
 
 
-def _build_resumed_run(
-    loaded: LoadedMission, options: RunOptions, context: RunContext, control: RunControl, cell: ReplayedCell
-) -> ResumedRun:
-    """Return a run on a cell that replays a log and, after the interruption at its end, continues."""
-    context.connect(cell)
-    root = _build_tree(loaded, options, context)
-    return ResumedRun(context, cell, root, control, loaded.mission.name, is_realtime=options.is_realtime)
+def _complete(
+    run: Run, loaded: LoadedMission, options: RunOptions, workcell: Workcell, real_cell: Cell
+) -> None:
+    """Give a run its work cell, its tree, and a planner that reads `real_cell` without a record."""
+    run.connect(workcell, LookaheadPlanner(real_cell))
+    run.set_tree(build_tree(loaded, loaded.skills, run.cell, Blackboard(), run.emit, options.substitutes))
 
 
-def _build_tree(loaded: LoadedMission, options: RunOptions, context: RunContext) -> TreeNode:
-    """Return the behaviour tree of the mission for the cell of `context`."""
-    return build_tree(loaded, loaded.skills, context.cell, Blackboard(), context.emit, options.substitutes)
+class ResumedRun(Run):
+    """Run that replays an interrupted run, and then may continue on the inner cell.
+
+    The replay includes earlier resumptions of the run. Observers receive all events; recorders receive only
+    the events after the replay, during which the speed of the wall clock has no effect either.
+    """
+
+    workcell: ReplayedCell
+
+    def __init__(
+        self, mission: str, observers: Sequence[Observer] = (), *, is_realtime: bool = False
+    ) -> None:
+        super().__init__(mission, observers)
+        self._is_realtime_after_replay = is_realtime
+        self._recorders: list[Observer] = []
+        self.control.call_between_ticks(self._stop_or_resume)
+
+    def add_recorder(self, recorder: Observer) -> None:
+        """Register a recorder, which receives each event after the replay, before the observers."""
+        self._recorders.append(recorder)
+
+    def plan_ahead(self) -> None:
+        """Plan the probable next motion, except during the replay."""
+        if self.workcell.is_live:
+            super().plan_ahead()
+
+    def _execute_tree(self) -> RunEnded:
+        """Execute the tree, and again after each resumption of an INCOMPLETE run; return the last end."""
+        run_end = super()._execute_tree()
+        while run_end.status == "INCOMPLETE" and self.workcell.is_resumed_from_incomplete:
+            self.advance()
+            run_end = super()._execute_tree()
+        return run_end
+
+    def _stop_or_resume(self) -> None:
+        """Stop or resume the run in the same control step as the recorded run; called between two ticks."""
+        cell = self.workcell
+        while not cell.is_live and not cell.has_run_ended and cell.pending_interruption is not None:
+            self._resume(cell.pending_interruption)
+        if not cell.is_live and cell.has_run_ended:
+            self.control.stop()
+
+    def _resume(self, interruption: Interruption) -> None:
+        """Continue after an interruption: halt the skills, brake the arm, and update the ledger.
+
+        Raises:
+            Fault: The arm did not come to rest.
+        """
+        cell = self.workcell
+        cell.resume()
+        if cell.is_live:
+            self._begin_on_inner_cell(interruption)
+        else:
+            self.begin_step(cell.steps)
+        halt_running_skills(self.root)
+        brake_arm(self.cell, self.advance)
+        if interruption.restarts_tree:
+            cell.accounts.discard_rejected_and_skipped()
+        reconcile_ledger(self.cell, interruption.last_action)
+
+    def _begin_on_inner_cell(self, interruption: Interruption) -> None:
+        """Brake the arm, then emit `RunResumed`. A kill before this event leaves the journal unchanged."""
+        inner = self.workcell.inner
+        brake_arm(inner.cell, inner.advance)
+        for recorder in self._recorders:
+            super().add_recorder(recorder)
+        self._is_realtime = self._is_realtime_after_replay
+        self.begin_step(inner.steps)
+        self._wall_start = time.monotonic() - self.now
+        versions = dict(list_versions())
+        self.emit(RunResumed(interruption.kept_step_count, interruption.last_action, versions))
+
+
+def halt_running_skills(root: Behaviour) -> None:
+    """Halt every running skill, so that the next tick starts the skill again; control nodes keep their state.
+
+    Raises:
+        Fault: The clean-up of a skill failed; nevertheless all running skills are halted.
+    """
+    nodes = [node for node in root.iterate() if isinstance(node, SkillLeaf) and node.status is Status.RUNNING]
+    if problems := [problem for node in nodes for problem in halt(node)]:
+        raise Fault("; ".join(problems))
+
+
+def reconcile_ledger(cell: Cell, last_action: str) -> None:
+    """Correct the ledger with the sensor of the tool, and mark the positions of all items as invalid.
+
+    During the interruption, a person may have moved objects, and the tool may have dropped its item.
+
+    Args:
+        cell: Cell with its arm at rest.
+        last_action: Last action of the tool, `open` or `close`; "" without an action.
+    """
+    held_item = cell.ledger.find_held_item()
+    is_holding = cell.tool.holding
+    if held_item is None and is_holding:
+        # The interruption came after the tool gripped an object and before the ledger recorded the grasp.
+        cell.tool.open()
+    elif held_item is not None and not is_holding and last_action == "close":
+        cell.tool.open()
+        cell.ledger.record_drop(held_item)
+    # After the action `open`, the item stays held: the skill starts again and records the release.
+    cell.ledger.invalidate_positions()

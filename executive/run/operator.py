@@ -34,7 +34,8 @@ class ScriptedOperator:
         for text in requests:
             if parse_request(text, choices) == "":
                 raise InputError(f'cannot pick "{text}"; ask for one of: {", ".join(choices)}')
-        self._requests, self._emit = list(requests)[index:], emit
+        self._requests = list(requests)[index:]
+        self._emit = emit
 
     def ask(self, choices: Sequence[str]) -> str | None:
         """Return the next request, or None at the end of the list."""
@@ -53,7 +54,9 @@ class TerminalOperator:
     """
 
     def __init__(self, emit: Emit, control: RunControl, *, has_keyboard: bool = True) -> None:
-        self._emit, self._control, self._has_keyboard = emit, control, has_keyboard
+        self._emit = emit
+        self._control = control
+        self._has_keyboard = has_keyboard
 
     def ask(self, choices: Sequence[str]) -> str | None:
         """Ask for a request; return a class, `rescan`, or None for `q` or the end of the input.

@@ -6,11 +6,15 @@ import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from types import FrameType
 
 PAUSE_POLL_PERIOD = 0.05
 """Period at which a paused run handles signals and calls the callbacks of `call_between_ticks` [s]."""
+TERMINATION_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
+"""Signals other than SIGINT that request the end of a process."""
+HALT_SIGNALS = (signal.SIGINT, *TERMINATION_SIGNALS)
+"""Signals that halt a run."""
 
 
 class RunControl:
@@ -47,7 +51,8 @@ class RunControl:
 
     def resume(self) -> None:
         """End the pause."""
-        self._is_paused, self._remaining_ticks = False, 0
+        self._is_paused = False
+        self._remaining_ticks = 0
         self._wake_up.set()
 
     def step(self, tick_count: int = 1) -> None:
@@ -74,22 +79,16 @@ class RunControl:
 
     def wait_while_paused(self) -> None:
         """Call the callbacks; in a pause, wait for `resume` or `stop`, or begin a tick of `step`."""
-        for callback in self._callbacks:
-            callback()
-        while self.is_paused:
+        while True:
+            for callback in self._callbacks:
+                callback()
+            if not self.is_paused:
+                return
             if self._remaining_ticks > 0:
                 self._remaining_ticks -= 1
                 return
             self._wake_up.wait(PAUSE_POLL_PERIOD)
             self._wake_up.clear()
-            for callback in self._callbacks:
-                callback()
-
-
-TERMINATION_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
-"""Signals other than SIGINT that request the end of a process."""
-HALT_SIGNALS = (signal.SIGINT, *TERMINATION_SIGNALS)
-"""Signals that halt a run."""
 
 
 @contextmanager
@@ -101,20 +100,12 @@ def handle_signals(
     A signal that the process ignores stays ignored (`nohup`), except SIGINT: a waiting worker process ignores
     SIGINT, but SIGINT must halt a run. Python allows no handlers outside the main thread.
     """
-    previous_handlers = {}
-    if threading.current_thread() is threading.main_thread():
-        for number in signal_numbers:
+    is_main_thread = threading.current_thread() is threading.main_thread()
+    with ExitStack() as previous_handlers:
+        for number in signal_numbers if is_main_thread else ():
             if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN:
-                previous_handlers[number] = signal.signal(number, handler)
-
-    def restore() -> None:
-        for number, previous_handler in previous_handlers.items():
-            signal.signal(number, previous_handler)
-
-    try:
-        yield restore
-    finally:
-        restore()
+                previous_handlers.callback(signal.signal, number, signal.signal(number, handler))
+        yield previous_handlers.close
 
 
 @contextmanager

@@ -24,9 +24,11 @@ from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import CellOptions
 from executive.cells.fake import SHIPPED_ROUTES, FakeCell
 from executive.cells.without_hardware import SilentOperator
+from executive.manipulation.motions import capture_and_detect, complete, localize_and_observe
 from executive.mission.ports import describe_type, find_element_type, is_assignable, is_union
 from executive.skill import ANY, EMPTY, HALT, HOLDING, Direction, Param, Port, Skill
 from executive.testing import faults
+from executive.testing.faulty_cell import FaultyCell, ScheduledFault
 from executive.testing.run_skill import SkillResult, run_skill
 
 MAX_TICKS = int(60.0 / STEP)
@@ -95,7 +97,7 @@ class Situation:
     name: str
     is_holding: bool
     params: Mapping[str, Any] = field(default_factory=dict)
-    script: Sequence[faults.ScheduledFault] = ()
+    script: Sequence[ScheduledFault] = ()
 
 
 def _list_situations(skill: type[Skill]) -> Iterator[Situation]:
@@ -183,14 +185,10 @@ def _build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
 
 
 def _detect_targets(fake: FakeCell) -> tuple[Detections, list[Target]]:
-    """Capture an image; return the detections of the first detector on the table, and their targets."""
-    frame = fake.camera.capture()
-    request = next(iter(fake.cell.detectors.values())).request(frame, "table")
-    while not request.ready:
-        fake.advance()
-    area = fake.camera.get_view_box("table")
-    detections = Detections(**vars(request.result()), frame=frame, view="table", area=area)
-    return detections, list(fake.ledger.observe(detections, fake.cell.localizer.localize(detections)))
+    """Look at the table; return the detections of the first detector, and their targets."""
+    detections = complete(capture_and_detect(fake.cell, "", "table"), fake.advance)
+    _, targets = complete(localize_and_observe(fake.cell, detections))
+    return detections, targets
 
 
 @dataclass(frozen=True)
@@ -250,7 +248,7 @@ class SkillRuns:
     def _run(self, situation: Situation, halt_at: int | None = None) -> SkillTestRun:
         scene, values = _prepare_scene(self.skill, situation, self.arrange)
         fake = scene.cell
-        workcell = faults.FaultyCell(fake, situation.script)
+        workcell = FaultyCell(fake, situation.script)
         calls: list[tuple[int, str]] = []
         first_step = fake.steps
 

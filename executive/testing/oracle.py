@@ -6,6 +6,7 @@ detector knows only the objects that are visible in its frame.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
@@ -31,6 +32,9 @@ from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import NEAR_PLANE, project
 from executive.perception.detectors.requests import PendingSearch
+
+ORACLE_CONFIDENCE = 0.9
+"""Confidence of all detections of an oracle."""
 
 
 class TrueObject(NamedTuple):
@@ -78,15 +82,39 @@ class WorldAccess:
         body = self.world.held_object if self._is_fake else self.cell.tool.held_body
         return None if body is None else self._describe_object(body)
 
+    def find_nearest_object(
+        self, position: Sequence[float] | Array, max_distance: float = math.inf
+    ) -> TrueObject | None:
+        """Return the nearest object within a horizontal distance [m]; none in a bin or in the tool counts."""
+        held_object = self.held_object
+        candidates = [
+            true_object
+            for true_object in self.objects
+            if not any(bin.contains(true_object.position) for bin in self.cell.bins.values())
+            and (held_object is None or true_object.body != held_object.body)
+            and math.dist(true_object.position[:2], position[:2]) <= max_distance
+        ]
+        return min(candidates, key=lambda each: math.dist(each.position[:2], position[:2]), default=None)
+
+    def is_free(self, position: Array, moved_object: TrueObject) -> bool:
+        """Return True if `moved_object` would touch no other object at a horizontal `position` [m]."""
+        classes = self.cell.classes
+        radius = classes[moved_object.label].radius
+        return all(
+            math.dist(position, other.position[:2]) - classes[other.label].radius > radius
+            for other in self.objects
+            if other.body != moved_object.body
+        )
+
     def remove(self, true_object: TrueObject) -> None:
         """Remove an object from the world; a held object is released first."""
-        self._release_if_held(true_object)
+        self.release(true_object)
         remove = self.world.remove if self._is_fake else self.world.remove_object
         remove(true_object.body)
 
     def move(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
         """Displace an object by `(x, y)` [m]; a held object is released first."""
-        self._release_if_held(true_object)
+        self.release(true_object)
         body = true_object.body
         if self._is_fake:
             body.position[:2] += displacement
@@ -96,7 +124,8 @@ class WorldAccess:
             position = X_WO.position + np.array([*displacement, 0.0])
             self.world.place_object(body, Pose(X_WO.rotation, position))
 
-    def _release_if_held(self, true_object: TrueObject) -> None:
+    def release(self, true_object: TrueObject) -> None:
+        """Break the seal on an object if the tool holds it."""
         if self.held_object is not None and self.held_object.body == true_object.body:
             self.cell.tool.break_seal()
 
@@ -104,10 +133,6 @@ class WorldAccess:
         if self._is_fake:
             return TrueObject(body, body.label, body.position.copy())
         return TrueObject(body, self.world.labels[body], self.world.get_object_pose(body).position)
-
-
-ORACLE_CONFIDENCE = 0.9
-"""Confidence of all detections of an oracle."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -96,8 +96,10 @@ def run_skill(
 
 def _count_braking_steps(workcell: Workcell) -> int | None:
     """Wait until the arm is at rest; return the number of control steps, or None after `MAX_BRAKING_TIME`."""
-    arm, clock = workcell.cell.arm, workcell.cell.clock
-    first_step, deadline = workcell.steps, clock.now + MAX_BRAKING_TIME
+    arm = workcell.cell.arm
+    clock = workcell.cell.clock
+    first_step = workcell.steps
+    deadline = clock.now + MAX_BRAKING_TIME
     while not arm.at_rest:
         if clock.now >= deadline:
             return None

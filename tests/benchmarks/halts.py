@@ -265,7 +265,7 @@ class _RunWithHalts:
             halt.update(measure_braking([*self._commands], before_stop, self._motion, self._limits))
         problems = [
             *check_journal(read_journal(self._journal_path), outcome),
-            *check_ledger(run.count_items(), run.count_ground_truth()),
+            *check_ledger(run.workcell.accounts.count_states(), run.workcell.audit()),
             *check_arm_at_rest(run.workcell),
         ]
         if run.workcell.cell.tool.holding != bool(outcome.held_item):

@@ -19,14 +19,12 @@ from executive.cell.frame import Answer
 from executive.errors import Fault
 from executive.plugins import load_cell_kind
 from executive.testing.faults import (
-    Effect,
-    Occurrence,
-    ScheduledFault,
     after,
     during,
     make_detector_effect,
     tool_does_not_release,
 )
+from executive.testing.faulty_cell import Effect, Occurrence, ScheduledFault
 from executive.testing.run_mission import MissionResult, run_mission
 from tests.benchmarks.report import Figures, run_command
 

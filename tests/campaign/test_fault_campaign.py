@@ -23,7 +23,7 @@ from executive.events import RunEnded
 from executive.mission.analysis import UnhandledFailure
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
-from executive.testing.faults import ScheduledFault
+from executive.testing.faulty_cell import ScheduledFault
 
 SLOW = pytest.mark.slow
 MISSION = """\

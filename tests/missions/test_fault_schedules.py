@@ -11,14 +11,12 @@ from executive.cell.frame import Answer
 from executive.cells.fake import FakeCell
 from executive.plugins import load_cell_kind
 from executive.testing.faults import (
-    Effect,
-    Occurrence,
-    ScheduledFault,
     after,
     during,
     make_detector_effect,
     object_bumped,
 )
+from executive.testing.faulty_cell import Effect, Occurrence, ScheduledFault
 from executive.testing.run_mission import MissionResult, run_mission
 
 X_RANGE, Y_RANGE = (0.42, 0.64), (-0.22, 0.22)
@@ -30,7 +28,7 @@ SEEDS = range(171000, 171006)
 def exchange_objects(occurrence: Occurrence) -> bool:
     """Swap the target object with one of another class, once."""
     world = occurrence.context.world
-    if (first := occurrence.context.find_object("node", occurrence.item)) is None:
+    if (first := occurrence.find_object("node")) is None:
         return False
     others = [
         thing

@@ -57,9 +57,9 @@ def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = F
     with closing(assemble(mission, options, [events.append])) as run:
         outcome = run.execute()
         rows = run.workcell.accounts.list_items()
-        audit = dict(run.count_ground_truth() or {})
+        audit = dict(run.workcell.audit() or {})
     ahead = [one.event.planned_ahead for one in events if isinstance(one.event, MotionPlanned)]
-    return Done(outcome, run.count_items(), rows, audit, ahead)
+    return Done(outcome, run.workcell.accounts.count_states(), rows, audit, ahead)
 
 
 def assert_done(name: str, done: Done) -> None:

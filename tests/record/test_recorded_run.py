@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 
 from executive.cell.json_values import to_json
 from executive.cells.fake import FakeCell
+from executive.cells.without_hardware import CellWithoutHardware
 from executive.cli.main import main
 from executive.errors import InputError
 from executive.events import RunEnded, RunStarted, TargetSelected
@@ -22,7 +23,6 @@ from executive.record.journal import Journal, read_journal
 from executive.record.picture_recorder import PictureRecorder
 from executive.record.recorded_run import GuardedView, RecordOptions, record_run
 from executive.run.assembly import RunOptions
-from executive.run.run import Run
 
 
 class Watcher:
@@ -90,7 +90,7 @@ def test_whatever_ends_a_run_early_view_journal_and_cell_are_closed(run, tmp_pat
     def fails(self):
         raise error
 
-    monkeypatch.setattr(Run, "count_ground_truth", fails)
+    monkeypatch.setattr(CellWithoutHardware, "audit", fails)
     view, other = Watcher(), Watcher()
     with pytest.raises(type(error)):
         run(view, other)

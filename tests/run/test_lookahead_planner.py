@@ -17,7 +17,7 @@ from executive.events import FrameSearched, MotionPlanned, TargetSelected, Timed
 from executive.manipulation.tool_goals import sort_pickable_targets
 from executive.motion.configurations import ConfigurationPairs, find_configuration_pairs
 from executive.motion.joints import Kinematics
-from executive.run.run import LookaheadPlanner, RunContext
+from executive.run.run import LookaheadPlanner, Run
 from executive.skill import Skill, SkillFailed
 from skills.approach import Approach
 from skills.grasp import Grasp
@@ -41,10 +41,10 @@ class Bench:
     def __init__(self) -> None:
         self.plans: list[MotionPlanned] = []
         self.decisions: list[str] = []
-        self.context = RunContext([self.note])
-        self.fake = FakeCell(emit=self.context.emit)
-        self.context.connect(self.fake, LookaheadPlanner(self.fake.cell))
-        self.context.begin_step(0)
+        self.mission_run = Run("bench", [self.note])
+        self.fake = FakeCell(emit=self.mission_run.emit)
+        self.mission_run.connect(self.fake, LookaheadPlanner(self.fake.cell))
+        self.mission_run.begin_step(0)
         self.look = partial(at_hand.look, self.fake)
         self.fake.world.put("cube", 0.5, 0.0)
 
@@ -56,11 +56,11 @@ class Bench:
 
     def run(self, skill: Skill, meanwhile: Callable[[], object] = lambda: None) -> Skill:
         """Run a skill to its end; call `meanwhile` once, 30 control steps after its beginning."""
-        for tick, _ in enumerate(skill.run(self.context.cell) or ()):
+        for tick, _ in enumerate(skill.run(self.mission_run.cell) or ()):
             if tick == 30:
                 meanwhile()
-            self.context.plan_ahead()
-            self.context.advance()
+            self.mission_run.plan_ahead()
+            self.mission_run.advance()
         return skill
 
     def grasp(self, targets: list[Target]) -> Any:
@@ -121,7 +121,7 @@ def test_an_approach_that_was_not_foreseen_is_waited_for(bench: Bench, change: s
     if change == "moved":
         duck.position[0] += 0.002
         targets = bench.look()
-    bench.run(Approach(target=sort_pickable_targets(bench.context.cell, targets)[change == "another"]))
+    bench.run(Approach(target=sort_pickable_targets(bench.mission_run.cell, targets)[change == "another"]))
     assert (bench.ahead[-1], bench.plans[-1].delay) == (False, LATENCY)
 
 
@@ -146,11 +146,11 @@ def test_the_transit_is_planned_in_the_control_step_after_the_command_to_grip(
 ) -> None:
     selected = bench.run(SelectTarget(targets=bench.look()))
     bench.run(Approach(target=selected.target))
-    bench.context.cell.tool.close()
-    bench.context.plan_ahead()
+    bench.mission_run.cell.tool.close()
+    bench.mission_run.plan_ahead()
     assert planned == []
-    bench.context.advance()
-    bench.context.plan_ahead()
+    bench.mission_run.advance()
+    bench.mission_run.plan_ahead()
     assert len(planned) == 1
 
 
@@ -163,9 +163,9 @@ def test_a_look_during_a_transit_lets_the_planner_plan_in_the_next_control_step(
 
     def look_again() -> None:
         bench.look()
-        bench.context.emit(FrameSearched(9, "overhead", "embedded", "table", [], [], []))
+        bench.mission_run.emit(FrameSearched(9, "overhead", "embedded", "table", [], [], []))
         counts.append(len(planned))
-        bench.context.plan_ahead()
+        bench.mission_run.plan_ahead()
         counts.append(len(planned))
 
     bench.carry(targets[:1], meanwhile=look_again)
@@ -213,7 +213,7 @@ def test_a_decision_for_something_unknown_plans_nothing_and_ends_nothing(
 ) -> None:
     targets = bench.look()
     bench.run(Approach(target=targets[0]))
-    bench.context.emit(TargetSelected(item, "cube", 1, bin))
+    bench.mission_run.emit(TargetSelected(item, "cube", 1, bin))
     bench.run(Grasp(target=targets[0]))
     bench.run(Transit(held="cube-1", bin="red_bin"))
     assert bench.ahead[-1] is False

@@ -38,7 +38,7 @@ def story_of(name: str, seed: int, make_cell: Callable[..., Any] = FakeCell) -> 
     try:
         outcome = run.execute()
         items = run.workcell.accounts.list_items()
-        return outcome.status, outcome.ticks, trace.hexdigest(), items, run.count_ground_truth()
+        return outcome.status, outcome.ticks, trace.hexdigest(), items, run.workcell.audit()
     finally:
         run.close()
 

@@ -6,7 +6,7 @@ import pytest
 from at_hand import look
 
 from executive.cells.fake import FakeCell
-from executive.run.resumed_run import reconcile_ledger
+from executive.run.assembly import reconcile_ledger
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 

@@ -17,7 +17,8 @@ from executive.cells.fake import FakeCell
 from executive.errors import InputError, NoDepth, Unavailable, Unreachable
 from executive.events import FaultInjected, NodeEnded, NodeStarted, ToolCommanded
 from executive.testing import faults as effects
-from executive.testing.faults import Effect, FaultyCell, ScheduledFault, after, between, during
+from executive.testing.faults import after, between, during
+from executive.testing.faulty_cell import Effect, FaultyCell, ScheduledFault
 from executive.testing.run_mission import run_mission
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect

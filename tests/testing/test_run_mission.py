@@ -11,7 +11,8 @@ import pytest
 from executive.cells.fake import FakeCell
 from executive.errors import Fault, InputError
 from executive.events import RunEnded, RunStarted, TimedEvent
-from executive.testing.faults import FaultyCell, after, detector_dead, during, seal_fails
+from executive.testing.faults import after, detector_dead, during, seal_fails
+from executive.testing.faulty_cell import FaultyCell
 from executive.testing.run_mission import make_failing, run_mission
 from skills.wait import Wait
 
