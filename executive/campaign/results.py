@@ -20,6 +20,16 @@ from executive.cell.json_values import DECIMAL_PLACES
 from executive.errors import InputError
 from executive.record.result import Audit, ItemCounts, Result, describe_disagreement
 from executive.record.timeline import PlanningTotals, Timeline
+from executive.view.terminal import format_repeat_command
+
+FILE_NAME = "results.sqlite"
+"""Name of the database in the folder of a sweep."""
+SCHEMA_PATH = Path(__file__).with_name("schema.sql")
+"""Statements that create the tables."""
+SCHEMA_VERSION = 1
+"""Version of the tables, stored as `user_version` of the file."""
+BUSY_TIMEOUT = 60.0
+"""Maximum time for which a transaction waits for another program that reads the file [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +53,11 @@ class SweepSettings:
         """Each combination of the varied values by name; one empty combination if no value is varied."""
         names = self.variations
         return [dict(zip(names, values, strict=True)) for values in product(*names.values())]
+
+    def make_repeat_command(self, run: RunRow) -> str:
+        """Return the command line that repeats a run of the sweep."""
+        overrides = {**self.overrides, **run.variant}
+        return format_repeat_command(self.mission, run.seed, overrides, scene=self.scene)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,7 +169,6 @@ def make_record(run_index: int, variant: Mapping[str, str], result: Result, time
 
 
 def _list_items(run_index: int, timeline: Timeline) -> Iterator[ItemRow]:
-    """Yield the row of each item."""
     for name, history in timeline.items.by_name.items():
         last = history.last_change
         yield ItemRow(
@@ -175,7 +189,6 @@ def _measure_item_time(name: str, timeline: Timeline) -> float:
 
 
 def _list_skills(run_index: int, timeline: Timeline) -> Iterator[SkillRow]:
-    """Yield the row of each skill."""
     for skill in dict.fromkeys(activation.skill for activation in timeline.activations if activation.skill):
         activations = [activation for activation in timeline.activations if activation.skill == skill]
         time = sum(activation.end - activation.start for activation in activations)
@@ -186,16 +199,6 @@ def _list_skills(run_index: int, timeline: Timeline) -> Iterator[SkillRow]:
         )  # fmt: skip
 
 
-FILE_NAME = "results.sqlite"
-"""Name of the database in the folder of a sweep."""
-SCHEMA_PATH = Path(__file__).with_name("schema.sql")
-"""Statements that create the tables."""
-SCHEMA_VERSION = 1
-"""Version of the tables, stored as `user_version` of the file."""
-BUSY_TIMEOUT = 60.0
-"""Maximum time for which a transaction waits for another program that reads the file [s]."""
-
-
 class ResultsDatabase:
     """An open database; each run is stored in one transaction, so that no program reads a part of a run.
 
@@ -204,7 +207,7 @@ class ResultsDatabase:
 
     Args:
         path: The file.
-        settings: Settings with which the database is created; None to open an existing database.
+        settings: Settings with which the database is created and locked; None to open an existing database.
 
     Attributes:
         path: The file.
@@ -236,6 +239,8 @@ class ResultsDatabase:
                 f"this program reads version {SCHEMA_VERSION}; start a new sweep"
             )
         (self.settings,) = map(_decode_settings, self._select("settings"))
+        if settings is not None:
+            self.lock()
 
     def lock(self) -> None:
         """Reserve the sweep for this process until the database is closed; other processes can read the file.
@@ -298,11 +303,6 @@ class ResultsDatabase:
                 f'the results "{self.path}" cannot be read or written: {error}; '
                 "runs that were stored before this error may still be in the file"
             ) from error
-
-
-def get_database_path(path: Path) -> Path:
-    """Return the path of the database: `path`, or the file in it if `path` is a folder."""
-    return path / FILE_NAME if path.is_dir() else path
 
 
 def encode_run(run: RunRow) -> dict[str, Any]:

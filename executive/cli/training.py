@@ -35,7 +35,7 @@ def dataset_command(
     """
     with keep_stdout_clean():
         from executive.campaign.evaluation import load_cells
-        from executive.cli.tables import show_progress
+        from executive.cli.progress import show_progress
         from executive.training.rendering import generate_dataset
 
         configs = load_cells(cells)
@@ -71,7 +71,7 @@ def train_command(
     Needs the extra `train`: uv sync --extra train (a download of about 3 GB on Linux).
     """
     with keep_stdout_clean():
-        from executive.cli.tables import show_progress
+        from executive.cli.progress import show_progress
         from executive.training.train import load_dataset, train
 
         splits = load_dataset(dataset)
@@ -179,7 +179,7 @@ def evaluate_command(
     with keep_stdout_clean():
         from executive.campaign import evaluation
         from executive.campaign.evaluation import find_cell, load_cells
-        from executive.cli.tables import print_report, show_progress
+        from executive.cli.progress import print_report, show_progress
         from executive.training.samples import LabelledDataset
         from executive.view.detector_results import list_metrics
 
