@@ -37,10 +37,44 @@ MIN_ACCURACY = 0.5
 """Minimum precision and recall in a measurement that runs may use."""
 OpenProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
 """Function that opens a progress bar with a name; the context manager yields `update(done, total)`."""
-
-
 Images = LabelledDataset | list[LabelledImage]
 """Labelled images of a dataset, or of rendered scenes."""
+
+
+def load_cells(
+    paths_or_names: tuple[str, ...], overrides: Mapping[str, str] | None = None
+) -> dict[Path, CellConfig]:
+    """Return the configurations of cells by the path of the cell file.
+
+    `paths_or_names` contains paths of cell files and names of shipped cells. `overrides` contains values for
+    keys of the cells, by key name `cell.KEY.KEY`.
+
+    Raises:
+        InputError: A cell does not exist, two cells have the same name, or a file is invalid.
+    """
+    cells: dict[Path, CellConfig] = {}
+    for path in map(find_cell, paths_or_names):
+        config = load_cell(path, overrides)
+        if any(config.cell == other.cell for other in cells.values()):
+            raise InputError(f'two cells are called "{config.cell}"; give one of them another name')
+        cells[path] = config
+    return cells
+
+
+def find_cell(path_or_name: str) -> Path:
+    """Return the path of a cell file, or the path of the shipped cell file with this name.
+
+    Raises:
+        InputError: There is neither a cell file with this path nor a shipped cell with this name.
+    """
+    path = Path(path_or_name)
+    if path.is_file():
+        return path
+    shipped_files = {file.stem: file for file in sorted((get_shipped_folder() / "cells").glob("*.yaml"))}
+    if path_or_name in shipped_files:
+        return shipped_files[path_or_name]
+    choices = suggest_choice(path_or_name, shipped_files, "Shipped cells")
+    raise InputError(f'there is neither a cell file nor a shipped cell "{path_or_name}". {choices}')
 
 
 @dataclass(frozen=True)
@@ -145,15 +179,16 @@ def measure_detector(
     cell_of_images = None if settings.dataset is not None or settings.is_randomized else detector.cell
     camera = next(iter(cell_of_images.cameras.values())) if cell_of_images else None
     classes = tuple(detector.cell.objects) if detector.cell else None
-    configs, name, folder = detector.configs, detector.name, detector.base_folder
+    name = detector.name
     if settings.dataset is not None:
-        known_classes = classes or find_detectable_labels(configs, folder)[name] or ()
+        known_classes = classes or find_detectable_labels(detector.configs, detector.base_folder)[name] or ()
         settings.dataset.match_classes(known_classes, f"detector {name}")
     with _open_images(detector.cell, settings, progress) as samples:
         cell_detector = CellDetector(
-            configs, name, base=folder, camera=camera, view=settings.view, classes=classes
-        )
-        with contextlib.closing(cell_detector), progress(f"running {detector.name}") as update:
+            detector.configs, name, base=detector.base_folder, camera=camera, view=settings.view,
+            classes=classes,
+        )  # fmt: skip
+        with contextlib.closing(cell_detector), progress(f"running {name}") as update:
             return evaluate.evaluate(
                 cell_detector, _iterate_with_progress(samples, update), mistakes=mistakes,
                 localizer=_build_localizer(cell_of_images) if cell_of_images else None, cell=cell_of_images,
@@ -175,7 +210,7 @@ def _open_images(
         with progress(f"rendering {cell.cell}") as update:
             if settings.is_randomized:
                 generate_dataset(
-                    {cell.cell: cell}, Path(folder), image_count=settings.image_count, seed=settings.seed,
+                    [cell], Path(folder), image_count=settings.image_count, seed=settings.seed,
                     layout="coco", worker_count=settings.workers, valid_fraction=1.0, progress=update,
                 )  # fmt: skip
                 images = LabelledDataset(Path(folder))
@@ -271,39 +306,3 @@ def store_evaluation(
         old_measurements = envelope.read_measurements(path)
         write_atomically(path, envelope.format_measurements(old_measurements, new_measurement))
     return path
-
-
-def load_cells(
-    paths_or_names: tuple[str, ...], overrides: Mapping[str, str] | None = None
-) -> dict[str, CellConfig]:
-    """Return the configurations of cells by cell name.
-
-    `paths_or_names` contains paths of cell files and names of shipped cells. `overrides` contains values for
-    keys of the cells, by key name `cell.KEY.KEY`.
-
-    Raises:
-        InputError: A cell does not exist, two cells have the same name, or a file is invalid.
-    """
-    cells: dict[str, CellConfig] = {}
-    for path_or_name in paths_or_names:
-        config = load_cell(find_cell(path_or_name), overrides)
-        if config.cell in cells:
-            raise InputError(f'two cells are called "{config.cell}"; give one of them another name')
-        cells[config.cell] = config
-    return cells
-
-
-def find_cell(path_or_name: str) -> Path:
-    """Return the path of a cell file, or the path of the shipped cell file with this name.
-
-    Raises:
-        InputError: There is neither a cell file with this path nor a shipped cell with this name.
-    """
-    path = Path(path_or_name)
-    if path.is_file():
-        return path
-    shipped_files = {file.stem: file for file in sorted((get_shipped_folder() / "cells").glob("*.yaml"))}
-    if path_or_name in shipped_files:
-        return shipped_files[path_or_name]
-    choices = suggest_choice(path_or_name, shipped_files, "Shipped cells")
-    raise InputError(f'there is neither a cell file nor a shipped cell "{path_or_name}". {choices}')

@@ -62,16 +62,19 @@ class LabelledImage:
 
     def to_frame(self, frame_id: int) -> Frame:
         """Return the image as a frame, with the true camera pose if the pose is known."""
-        matrix, X_WC = np.eye(3), Pose.identity()
+        matrix = np.eye(3)
+        X_WC = Pose.identity()
         if "matrix" in self.truth and "X_WC" in self.truth:
             matrix = self._compute_camera_matrix()
             X_WC = Pose.of(self.truth["X_WC"][:3], self.truth["X_WC"][3:])
-        camera, visible = str(self.truth.get("camera", "image")), np.ones(self.image.shape[:2], np.bool_)
+        camera = str(self.truth.get("camera", "image"))
+        visible = np.ones(self.image.shape[:2], np.bool_)
         return Frame(frame_id, camera, self.image, self.depth, matrix, X_WC, 0.0, visible, change_count=0)
 
     def is_fully_inside(self, index: int) -> bool:
         """Return True if the object with the given index lies completely in the searched region."""
-        box, (left, top, right, bottom) = self.boxes[index], self.region or self._image_region
+        box = self.boxes[index]
+        left, top, right, bottom = self.region or self._image_region
         distance = min(box[0] - left, box[1] - top, right - box[2], bottom - box[3])
         return distance >= MIN_BORDER_DISTANCE
 

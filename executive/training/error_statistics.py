@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from supervision import box_iou_batch
 
 from executive.cell.frame import Box, Detection, Frame
 from executive.cell.protocols import Localizer
@@ -94,9 +95,6 @@ def is_ignored(detection: Detection, sample: LabelledImage) -> bool:
 
 def compute_ious(boxes: Sequence[Box], other_boxes: Sequence[Box]) -> NDArray[np.float32]:
     """Return the intersection over union of each of N boxes and each of M other boxes, `(N, M)`."""
-    # The import takes half a second; only an evaluation needs the package.
-    from supervision import box_iou_batch
-
     return np.asarray(box_iou_batch(np.array(boxes).reshape(-1, 4), np.array(other_boxes).reshape(-1, 4)))
 
 
@@ -122,8 +120,10 @@ class ErrorStatistics:
         self._image_count = 0
         self.counts_by_object_count: dict[int, Counter[str]] = defaultdict(Counter)
         self.confusion: Counter[tuple[str, str]] = Counter()
-        self.centre_errors, self.position_errors = list[float](), list[float]()
-        self.localization_errors, self._squared_offsets = list[float](), list[float]()
+        self.centre_errors: list[float] = []
+        self.position_errors: list[float] = []
+        self.localization_errors: list[float] = []
+        self._squared_offsets: list[float] = []
 
     def add(self, matches: Sequence[BoxMatch], sample: LabelledImage, frame: Frame) -> None:
         """Count the matches of one image, and measure the position errors of its correct detections."""
@@ -151,8 +151,8 @@ class ErrorStatistics:
         object_count = sum(count for (label, _), count in self.confusion.items() if label in labels)
         detection_count = sum(count for (_, label), count in self.confusion.items() if label in labels)
         correct_count = sum(self.confusion[label, label] for label in labels)
-        precision, recall = correct_count / max(detection_count, 1), correct_count / max(object_count, 1)
-        return ClassMetrics(object_count, precision, recall)
+        precision = correct_count / max(detection_count, 1)
+        return ClassMetrics(object_count, precision, correct_count / max(object_count, 1))
 
     def make_confusion_matrix(self) -> dict[str, dict[str, int]]:
         """Return the number of objects by true class (row), then by detected class (column)."""
@@ -214,9 +214,11 @@ class RepeatedErrors:
 
     def __init__(self, localizer: Localizer | None) -> None:
         self._localizer = localizer
-        self.error_count = self.repeated_count = 0
-        self._random_variances, self._error_products = list[float](), list[float]()
-        """Values for each object and axis: variances in the image [pixel²], products on the table [m²]."""
+        self.error_count = 0
+        self.repeated_count = 0
+        # Values for each object and axis: variances in the image [pixel²], products on the table [m²].
+        self._random_variances: list[float] = []
+        self._error_products: list[float] = []
 
     def add(
         self, matches: list[BoxMatch], second_matches: list[BoxMatch], sample: LabelledImage, frame: Frame
@@ -227,7 +229,8 @@ class RepeatedErrors:
         for index, label in enumerate(sample.labels):
             if not sample.is_fully_visible(index):
                 continue
-            first_match, second_match = first_by_object.get(index), second_by_object.get(index)
+            first_match = first_by_object.get(index)
+            second_match = second_by_object.get(index)
             if first_match is None and is_occluded(index, matches, sample):
                 continue
             first_label = first_match and first_match.detection.label

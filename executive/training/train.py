@@ -12,9 +12,10 @@ from jinja2 import Environment, StrictUndefined
 from executive.errors import InputError
 from executive.perception.detectors.rfdetr import read_labels
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
+from executive.training.dataset_files import read_image, read_image_header
 from executive.training.evaluate import evaluate_model, find_label_file
 from executive.training.metrics import Evaluation
-from executive.training.samples import LabelledDataset, read_image, read_image_header
+from executive.training.samples import LabelledDataset
 
 CARD_THRESHOLD = 0.5
 """Minimum confidence of the detections for precision and recall in a model card."""
