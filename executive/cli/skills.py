@@ -13,7 +13,7 @@ import click
 
 from executive.cli.options import json_option
 from executive.cli.streams import keep_stdout_clean, print_json
-from executive.errors import ExitCode
+from executive.errors import ExitCode, InputError
 
 if TYPE_CHECKING:
     from executive.skill import Param, Port, Skill
@@ -37,7 +37,7 @@ def skills_command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
     fails or cannot be run.
     """
     with keep_stdout_clean():
-        from executive.errors import InputError
+        # The imports take 0.2 s, for which `--help` must not wait.
         from executive.mission.findings import suggest_choice
         from executive.plugins import load_skills
 
@@ -58,11 +58,13 @@ def skills_command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
 
 def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
     """Check skills, print the results after each skill, and return True if all checks passed."""
+    with keep_stdout_clean():
+        # Only this check needs the work cells, whose import takes half a second.
+        from executive.testing.conformance import list_conformance_checks
+
     verdicts: list[dict[str, Any]] = []
     for name, skill in skills.items():
         with keep_stdout_clean():
-            from executive.testing.conformance import list_conformance_checks
-
             skill_verdicts = [_run_check(check) for check in list_conformance_checks(skill, name=name)]
         if not as_json:
             click.echo("\n".join(map(_describe_verdict, skill_verdicts)))
@@ -97,6 +99,7 @@ def _describe_verdict(verdict: Mapping[str, Any]) -> str:
 
 def collect_declarations(name: str, skill: type[Skill]) -> Declaration:
     """Return a skill's declaration as JSON values; `tool.left` is the tool state after each failure."""
+    # The skills have imported pydantic, for which `--help` must not wait.
     from pydantic_core import to_json
 
     state_before, state_after = skill.tool_state
