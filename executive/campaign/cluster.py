@@ -18,27 +18,9 @@ from concurrent.futures import BrokenExecutor
 from dataclasses import replace
 from pathlib import Path
 
-from distributed import (
-    CancelledError,
-    Client,
-    Future,
-    KilledWorker,
-    Worker,
-    WorkerPlugin,
-    as_completed,
-    get_worker,
-)
+import distributed
 
-from executive.campaign.cluster_bundle import (
-    INSTALLATION_ADVICE,
-    PACKAGES_FOLDER,
-    ReturnedRun,
-    check_environment,
-    describe_environment,
-    make_bundle,
-    pack_run,
-    unpack_run,
-)
+from executive.campaign import cluster_bundle
 from executive.campaign.jobs import MAX_CRASHES, JobOptions, SweepJob, make_fault_record, run_job
 from executive.campaign.results import RunRecord
 from executive.errors import InputError
@@ -67,32 +49,32 @@ def run_jobs_on_cluster(
             differs.
     """
     crash_counts: Counter[int] = Counter()
-    unfinished_jobs: dict[Future, int] = {}
+    unfinished_jobs: dict[distributed.Future, int] = {}
     signal_event = threading.Event()
     with handle_signals(HALT_SIGNALS, lambda *_: signal_event.set()), _connect(address) as client:
         _check_workers(client, address)
-        plugin = BundlePlugin(make_bundle(jobs), describe_environment())
+        plugin = BundlePlugin(cluster_bundle.make_bundle(jobs), cluster_bundle.describe_environment())
         client.register_plugin(plugin)
 
-        def submit(index: int) -> Future:
+        def submit(index: int) -> distributed.Future:
             future = client.submit(execute_on_worker, plugin.name, jobs[index], pure=False)
             unfinished_jobs[future] = index
             return future
 
         try:
-            completions = as_completed(list(map(submit, range(len(jobs)))), loop=client.loop)
+            completions = distributed.as_completed(list(map(submit, range(len(jobs)))), loop=client.loop)
             while unfinished_jobs and not signal_event.is_set():
                 for future in completions.next_batch(block=False):
                     index = unfinished_jobs.pop(future)
                     try:
-                        record = unpack_run(future.result())
-                    except CancelledError:
+                        record = cluster_bundle.unpack_run(future.result())
+                    except distributed.CancelledError:
                         message = "the scheduler ended or forgot the jobs; continue with --resume"
                         raise InputError(message) from None
                     except InputError:
                         raise
                     except Exception as error:
-                        if isinstance(error, (BrokenExecutor, KilledWorker)):
+                        if isinstance(error, (BrokenExecutor, distributed.KilledWorker)):
                             crash_counts[index] += 1
                             if crash_counts[index] < MAX_CRASHES:
                                 completions.add(submit(index))
@@ -109,26 +91,26 @@ def run_jobs_on_cluster(
                 client.unregister_worker_plugin(plugin.name)
 
 
-def _connect(address: str) -> Client:
+def _connect(address: str) -> distributed.Client:
     try:
-        return Client(address, timeout=CONNECTION_TIMEOUT, set_as_default=False)
+        return distributed.Client(address, timeout=CONNECTION_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
         advice = "start it with `dask scheduler`, and give the address that it prints, like tcp://host:8786"
         raise InputError(f'the scheduler "{address}" cannot be reached: {error}; {advice}') from error
 
 
-def _check_workers(client: Client, address: str) -> None:
+def _check_workers(client: distributed.Client, address: str) -> None:
     """Raise InputError unless there are workers, and all have the software of this computer."""
     try:
-        results = client.run(check_environment, describe_environment())
+        results = client.run(cluster_bundle.check_environment, cluster_bundle.describe_environment())
     except (ImportError, AttributeError) as error:
-        message = f"a worker cannot import this project: {error}; {INSTALLATION_ADVICE}"
+        message = f"a worker cannot import this project: {error}; {cluster_bundle.INSTALLATION_ADVICE}"
         raise InputError(message) from error
     if not results:
         raise InputError(f"the scheduler has no workers; start one: `dask worker {address} --nthreads 1`")
 
 
-class BundlePlugin(WorkerPlugin):
+class BundlePlugin(distributed.WorkerPlugin):
     """A plugin with a bundle; a worker that joins later also receives the plugin.
 
     Args:
@@ -142,7 +124,7 @@ class BundlePlugin(WorkerPlugin):
         self._bundle = bundle
         self._working_directory = Path.cwd()
 
-    def setup(self, worker: Worker) -> None:
+    def setup(self, worker: distributed.Worker) -> None:
         """Unpack the bundle into a temporary folder of the worker."""
         self._root = Path(tempfile.mkdtemp(prefix="executive-", dir=worker.local_directory)).resolve()
         with zipfile.ZipFile(io.BytesIO(self._bundle)) as archive:
@@ -153,7 +135,7 @@ class BundlePlugin(WorkerPlugin):
         self._lock = threading.Lock()
         self._pool: WorkerPool | None = WorkerPool(1)
 
-    def teardown(self, worker: Worker) -> None:
+    def teardown(self, worker: distributed.Worker) -> None:
         """Kill the process of the jobs, and delete the folder."""
         del worker
         if self._pool is not None:
@@ -161,7 +143,7 @@ class BundlePlugin(WorkerPlugin):
             self._pool = None
         shutil.rmtree(self._root, ignore_errors=True)
 
-    def execute(self, job: SweepJob) -> ReturnedRun:
+    def execute(self, job: SweepJob) -> cluster_bundle.ReturnedRun:
         """Execute a job in the process of the plugin.
 
         Raises:
@@ -176,28 +158,28 @@ class BundlePlugin(WorkerPlugin):
                 raise
 
 
-def execute_on_worker(plugin_name: str, job: SweepJob) -> ReturnedRun:
+def execute_on_worker(plugin_name: str, job: SweepJob) -> cluster_bundle.ReturnedRun:
     """Execute a job on this worker with the plugin of this name.
 
     Raises:
         BrokenExecutor: The process of the job died.
         InputError: The software of this worker differs from the software of the client.
     """
-    worker = get_worker()
+    worker = distributed.get_worker()
     plugin = worker.plugins[plugin_name]
     assert isinstance(plugin, BundlePlugin)
-    check_environment(plugin.client_versions, worker)
+    cluster_bundle.check_environment(plugin.client_versions, worker)
     return plugin.execute(job)
 
 
-def _execute_job(job: SweepJob, root: Path, working_directory: Path) -> ReturnedRun:
+def _execute_job(job: SweepJob, root: Path, working_directory: Path) -> cluster_bundle.ReturnedRun:
     """Execute a job in the working directory of the client below `root`, the folder of the bundle."""
     # In a process group of its own, the process receives no Ctrl-C from the terminal of the worker.
     os.setpgid(0, 0)
     worker_directory = _make_worker_path(root, working_directory)
     worker_directory.mkdir(parents=True, exist_ok=True)
     os.chdir(worker_directory)
-    packages = str(root / PACKAGES_FOLDER)
+    packages = str(root / cluster_bundle.PACKAGES_FOLDER)
     if packages not in sys.path:
         sys.path.insert(0, packages)
         search_path = filter(None, (packages, os.environ.get("PYTHONPATH")))
@@ -207,9 +189,9 @@ def _execute_job(job: SweepJob, root: Path, working_directory: Path) -> Returned
     settings = replace(job.settings, mission=mission, scene=scene)
     job = replace(job, settings=settings, runs_folder=_make_worker_path(root, job.runs_folder))
     try:
-        return pack_run(run_job(job), root)
+        return cluster_bundle.pack_run(run_job(job), root)
     except Exception as error:
-        return pack_run(make_fault_record(job, error), root)
+        return cluster_bundle.pack_run(make_fault_record(job, error), root)
 
 
 def _make_worker_path(root: Path, path: Path) -> Path:

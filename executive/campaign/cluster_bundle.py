@@ -23,22 +23,13 @@ from typing import TYPE_CHECKING
 from packaging.utils import canonicalize_name
 
 import executive
+from executive import plugins
 from executive.campaign.jobs import SweepJob
 from executive.campaign.results import RunRecord
 from executive.errors import InputError
 from executive.mission.text.file_search import find_mission, get_shipped_folder
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.envelope import MEASUREMENT_SUFFIX
-from executive.plugins import (
-    CELL_KIND_GROUP,
-    DISTRIBUTION,
-    SKILL_GROUP,
-    find_project,
-    find_version,
-    list_entries,
-    list_requirements,
-    list_versions,
-)
 from executive.record.run_directory import convert_os_errors, make_unique_folder
 from executive.tree.node_registry import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
 
@@ -51,7 +42,7 @@ TEXT_SUFFIXES = (".yaml", ".yml", ".urdf", ".obj", ".mtl")
 """Suffixes of files that name further files: libraries, cells, weights, labels, meshes and textures."""
 _FILE_NAME_PATTERN = re.compile(r""""([^"\n]+)"|'([^'\n]+)'|([^\s"'<>,\[\]{}]+)""")
 """Pattern of a possible file name in a text: a quoted text or a word."""
-PLUGIN_GROUPS = (SKILL_GROUP, CONTROL_NODE_GROUP, DETECTOR_GROUP, CELL_KIND_GROUP)
+PLUGIN_GROUPS = (plugins.SKILL_GROUP, CONTROL_NODE_GROUP, DETECTOR_GROUP, plugins.CELL_KIND_GROUP)
 """Groups of entry points with which a package extends this project."""
 PROJECT_PACKAGES = ("executive", "skills")
 """Top-level packages of this project, which each worker has."""
@@ -85,7 +76,7 @@ def make_bundle(jobs: Sequence[SweepJob]) -> bytes:
     values = {text for job in jobs for text in (*job.settings.overrides.values(), *job.variant.values())}
     files = {f"{PACKAGES_FOLDER}/{name}": content for name, content in _list_plugin_files()}
     files |= {str(path): path.read_bytes() for path in _find_named_files(paths, values)}
-    if project := find_project():
+    if project := plugins.find_project():
         files[str(project.file)] = project.file.read_bytes()
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
@@ -133,11 +124,11 @@ def _list_plugin_files() -> Iterator[tuple[str, bytes]]:
     for distribution in distributions():
         name = canonicalize_name(distribution.name)
         is_plugin = any(entry.group in PLUGIN_GROUPS for entry in distribution.entry_points)
-        if is_plugin and name != DISTRIBUTION:
+        if is_plugin and name != plugins.DISTRIBUTION:
             folder = f"{name.replace('-', '_')}-{distribution.version}.dist-info"
             for file in METADATA_FILES:
                 yield f"{folder}/{file}", (distribution.read_text(file) or "").encode()
-    entries = (entry for group in PLUGIN_GROUPS for entry in list_entries(group, "plugin").values())
+    entries = (entry for group in PLUGIN_GROUPS for entry in plugins.list_entries(group, "plugin").values())
     modules = {entry.value.partition(":")[0].partition(".")[0] for entry in entries}
     for module in sorted(modules.difference(PROJECT_PACKAGES)):
         yield from _list_module_files(module)
@@ -158,8 +149,8 @@ def _list_module_files(module: str) -> Iterator[tuple[str, bytes]]:
 @functools.cache
 def describe_environment() -> Mapping[str, str]:
     """Return versions by name, and a hash of the code, missions and models of this project."""
-    cluster_versions = {name: find_version(name) for name in list_requirements(CLUSTER_EXTRA)}
-    return {**list_versions(), **cluster_versions, FILES_KEY: _hash_files()}
+    cluster_versions = {name: plugins.find_version(name) for name in plugins.list_requirements(CLUSTER_EXTRA)}
+    return {**plugins.list_versions(), **cluster_versions, FILES_KEY: _hash_files()}
 
 
 def _hash_files() -> str:

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.layout import build_object_class
-from executive.cell.protocols import Localizer
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import find_max_object_count
 from executive.errors import InputError, explain_os_errors
@@ -118,11 +117,6 @@ class DetectorUnderTest:
     name: str
     base_folder: Path
 
-    def make_measurement_name(self, dataset: Path | None) -> str:
-        """Return the name of a measurement on a dataset, or on scenes of the cell if `dataset` is None."""
-        cell_name = self.cell.cell if self.cell else ""
-        return " on ".join(filter(None, (cell_name, str(dataset or ""))))
-
 
 def list_detectors(
     cells: Mapping[Path, CellConfig], name: str | None, model_file: Path | None, label_file: Path | None
@@ -179,6 +173,12 @@ def measure_detector(
     cell_of_images = None if settings.dataset is not None or settings.is_randomized else detector.cell
     camera = next(iter(cell_of_images.cameras.values())) if cell_of_images else None
     classes = tuple(detector.cell.objects) if detector.cell else None
+    localizer = None
+    # The method `ray` needs a simulated world.
+    if cell_of_images and cell_of_images.localization != "ray":
+        objects = cell_of_images.objects
+        object_classes = {label: build_object_class(label, objects[label]) for label in objects}
+        localizer = CellLocalizer(cell_of_images.localization, object_classes)
     name = detector.name
     if settings.dataset is not None:
         known_classes = classes or find_detectable_labels(detector.configs, detector.base_folder)[name] or ()
@@ -191,8 +191,7 @@ def measure_detector(
         with contextlib.closing(cell_detector), progress(f"running {name}") as update:
             return evaluate.evaluate(
                 cell_detector, _iterate_with_progress(samples, update), mistakes=mistakes,
-                localizer=_build_localizer(cell_of_images) if cell_of_images else None, cell=cell_of_images,
-                threshold=settings.threshold,
+                localizer=localizer, cell=cell_of_images, threshold=settings.threshold,
             )  # fmt: skip
 
 
@@ -230,14 +229,6 @@ def _iterate_with_progress(images: Images, update: Callable[[int, int], None]) -
     for image_count, image in enumerate(images, 1):
         yield image
         update(image_count, len(images))
-
-
-def _build_localizer(cell: CellConfig) -> Localizer | None:
-    """Return the localizer of the cell; None for the method `ray`, which needs a simulated world."""
-    if cell.localization == "ray":
-        return None
-    classes = {label: build_object_class(label, config) for label, config in cell.objects.items()}
-    return CellLocalizer(cell.localization, classes)
 
 
 def find_weakness(detector: DetectorUnderTest, evaluation: Evaluation) -> str:

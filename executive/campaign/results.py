@@ -16,6 +16,8 @@ from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from executive.cell.json_values import DECIMAL_PLACES
 from executive.errors import InputError
 from executive.record.result import Audit, ItemCounts, Result, describe_disagreement
@@ -315,6 +317,10 @@ def encode_run(run: RunRow) -> dict[str, Any]:
     return columns
 
 
+_RUN_ADAPTER = TypeAdapter(RunRow)
+"""Converts the numbers of SQLite, which has no Boolean type, to a run."""
+
+
 def _decode_run(columns: dict[str, Any]) -> RunRow:
     parts: dict[str, dict[str, Any]] = {"items": {}, "audit": {}, "planning": {}}
     for column in list(columns):
@@ -322,15 +328,9 @@ def _decode_run(columns: dict[str, Any]) -> RunRow:
         if prefix in parts:
             parts[prefix][name] = columns.pop(column)
     has_audit = parts["audit"]["agrees"] is not None
-    # SQLite has no Boolean type.
-    audit = Audit(**{**parts["audit"], "agrees": bool(parts["audit"]["agrees"])}) if has_audit else None
-    columns["variant"] = json.loads(columns["variant"])
-    return RunRow(
-        **columns,
-        items=ItemCounts(**parts["items"]),
-        audit=audit,
-        planning=PlanningTotals(**parts["planning"]),
-    )
+    variant = json.loads(columns["variant"])
+    values = {**columns, **parts, "variant": variant, "audit": parts["audit"] if has_audit else None}
+    return _RUN_ADAPTER.validate_python(values)
 
 
 def _encode_settings(settings: SweepSettings) -> dict[str, Any]:
@@ -343,10 +343,7 @@ def _encode_settings(settings: SweepSettings) -> dict[str, Any]:
 def _decode_settings(columns: dict[str, Any]) -> SweepSettings:
     for name in ("overrides", "variations", "versions"):
         columns[name] = json.loads(columns[name])
-    columns["variations"] = {name: tuple(values) for name, values in columns["variations"].items()}
-    columns["scene"] = columns["scene"] and Path(columns["scene"])
-    columns["saves_images"] = bool(columns["saves_images"])
-    return SweepSettings(**columns)
+    return TypeAdapter(SweepSettings).validate_python(columns)
 
 
 def _to_json_text(value: Any) -> str:

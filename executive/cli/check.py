@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from itertools import compress
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -18,7 +18,6 @@ from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import ExitCode, InputError
 
 if TYPE_CHECKING:
-    from executive.cell.protocols import Cell
     from executive.mission.flow_analysis import UnhandledFailure
 
 
@@ -129,7 +128,7 @@ def tree_command(
 
         loaded = load_mission(mission, load_skills(), overrides)
         # No node of the tree is executed, so that none needs a clock or a ledger.
-        placeholder_cell = cast("Cell", SimpleNamespace(clock=None, ledger=None))
+        placeholder_cell: Any = SimpleNamespace(clock=None, ledger=None)
         nodes = make_outline(build_tree(loaded, loaded.skills, placeholder_cell, Blackboard(), discard_event))
         nodes = fold_subtrees(nodes) if fold else nodes
         match "".join(formats).removeprefix("--format ").removeprefix("--"):

@@ -147,11 +147,6 @@ _SWEEP_OPTIONS = (
     overrides_option, scene_option, runs_option, json_option,
 )  # fmt: skip
 """Options that the commands `sweep` and `compare` share."""
-_SWEEP_SETTINGS = {
-    "mission", "missions", "seeds", "save_images", "scene",
-    "variations", "overrides", "overrides_a", "overrides_b",
-}  # fmt: skip
-"""Parameters of `sweep` and `compare` whose values `--resume` reads from the results."""
 
 
 def add_sweep_options(command: CommandT) -> CommandT:
@@ -167,24 +162,9 @@ def check_disjoint(overrides: Mapping[str, str], options: str, values: Mapping[s
         raise click.UsageError(f"{key} is set with --set and also with {options}; omit one of them")
 
 
-def check_resume(
-    ctx: click.Context, *, has_missions_and_seeds: bool, required_arguments: str, resumed_settings_text: str
-) -> None:
-    """Check that the command line gives either missions and seeds, or `--resume`, but not both.
-
-    Args:
-        ctx: Context of the command.
-        has_missions_and_seeds: True if the command line gives missions and seeds.
-        required_arguments: Arguments that the command needs, for the message.
-        resumed_settings_text: Settings that `--resume` reads, and their source, for the message.
-    """
-    is_resume = ctx.params["resume"] is not None
-    names = ctx.params.keys() & _SWEEP_SETTINGS
-    has_settings = any(ctx.get_parameter_source(name) is not ParameterSource.DEFAULT for name in names)
-    check_usage(
-        (not is_resume and not has_missions_and_seeds, f"give {required_arguments}"),
-        (is_resume and has_settings, f"--resume takes {resumed_settings_text}; omit them"),
-    )
+def is_any_given(ctx: click.Context, *names: str) -> bool:
+    """Return True if the command line gives a value for one of these parameters."""
+    return any(ctx.get_parameter_source(name) is not ParameterSource.DEFAULT for name in names)
 
 
 def check_video(file: Path, cell_kind: str, *, force: bool) -> None:

@@ -43,8 +43,7 @@ def run_command(
 
     MISSION is a file or the name of a shipped mission.
     """
-    option_sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests", "scene"))
-    has_mission_options = any(source is not click.core.ParameterSource.DEFAULT for source in option_sources)
+    has_mission_options = options.is_any_given(ctx, "mission", "seed", "overrides", "requests", "scene")
     has_keyboard = sys.stdin is not None and sys.stdin.isatty()
     settings_text = "mission, seed, params, requests and scene from the run"
     pauses_forever = paused and not has_page and (quiet or not has_keyboard)

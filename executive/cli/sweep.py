@@ -41,11 +41,13 @@ def sweep_command(
     not met. Ctrl-C ends the current runs; then the results of the complete runs are printed. A second Ctrl-C
     quits immediately.
     """
-    options.check_resume(
-        ctx, has_missions_and_seeds=None not in (mission, seeds),
-        required_arguments="a MISSION and --seeds, or --resume SWEEP",
-        resumed_settings_text="mission, seeds and settings from the sweep",
-    )  # fmt: skip
+    names = ("mission", "seeds", "variations", "overrides", "save_images", "scene")
+    has_settings = resume is not None and options.is_any_given(ctx, *names)
+    lacks_input = resume is None and (mission is None or seeds is None)
+    options.check_usage(
+        (lacks_input, "give a MISSION and --seeds, or --resume SWEEP"),
+        (has_settings, "--resume takes mission, seeds and settings from the sweep; omit them"),
+    )
     options.check_disjoint(overrides, "--vary", variations)
     with keep_stdout_clean():
         # The imports take more than a second, for which `--help` and wrong options must not wait.
@@ -107,11 +109,13 @@ def compare_command(
     b/results.sqlite in a folder below --runs. Each difference has a 95 % confidence interval.
     Ctrl-C ends the current runs; then the results of the complete pairs are printed.
     """
-    options.check_resume(
-        ctx, has_missions_and_seeds=len(missions) in (1, 2) and seeds is not None,
-        required_arguments="one or two missions and --seeds, or --resume FOLDER",
-        resumed_settings_text="missions, seeds and settings from the comparison",
-    )  # fmt: skip
+    names = ("missions", "seeds", "overrides", "overrides_a", "overrides_b", "save_images", "scene")
+    has_settings = resume is not None and options.is_any_given(ctx, *names)
+    lacks_input = resume is None and (len(missions) not in (1, 2) or seeds is None)
+    options.check_usage(
+        (lacks_input, "give one or two missions and --seeds, or --resume FOLDER"),
+        (has_settings, "--resume takes missions, seeds and settings from the comparison; omit them"),
+    )
     options.check_disjoint(overrides, "--set-a or --set-b", {**overrides_a, **overrides_b})
     with keep_stdout_clean():
         # The imports take more than a second, for which `--help` and wrong options must not wait.

@@ -195,7 +195,8 @@ def evaluate_command(
         for detector in detectors:
             evaluation.check_detector(detector, settings)
         for detector in detectors:
-            name = detector.make_measurement_name(dataset)
+            cell_name = detector.cell.cell if detector.cell else ""
+            name = " on ".join(filter(None, (cell_name, str(dataset or ""))))
             start_time = time.monotonic()
             result = evaluation.measure_detector(detector, settings, worst_mistakes, show_progress)
             print_report(list_metrics(name, detector.name, result))

@@ -25,14 +25,15 @@ from executive.errors import Unavailable
 from executive.perception.detectors.detector_registry import build_detectors
 from executive.perception.envelope import FrameRange, compute_frame_statistics
 from executive.training.dataset import LabelledImage
-from executive.training.error_statistics import (
+from executive.training.metrics import (
     BoxMatch,
+    Distribution,
     ErrorStatistics,
+    Evaluation,
     RepeatedErrors,
     is_ignored,
     match_detections,
 )
-from executive.training.metrics import Distribution, Evaluation
 
 MIN_CONFIDENCE = 0.01
 """Minimum confidence of the detections of a model file; the average precision needs low confidences."""
@@ -248,25 +249,6 @@ def make_model_config(model: Path, labels: Path) -> DetectorConfig:
     """Return the detector configuration of an exported RF-DETR: an ONNX file and a file of class names."""
     files = {"model_path": str(model.absolute()), "labels": str(labels.absolute())}
     return DetectorConfig.model_validate({"kind": "rfdetr", "floor": MIN_CONFIDENCE, **files})
-
-
-def evaluate_model(
-    model: Path, labels: Path, images: Iterable[LabelledImage], threshold: float
-) -> Evaluation:
-    """Return the accuracy of an exported RF-DETR on labelled images.
-
-    Args:
-        model: The ONNX file.
-        labels: The text file with the class names.
-        images: The images.
-        threshold: Minimum confidence of a detection.
-
-    Raises:
-        InputError: Model, labels or images cannot be read.
-    """
-    detector = CellDetector({MODEL_NAME: make_model_config(model, labels)}, MODEL_NAME, base=Path())
-    with contextlib.closing(detector):
-        return evaluate(detector, images, threshold=threshold)
 
 
 @dataclass(frozen=True, eq=False)

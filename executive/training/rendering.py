@@ -8,7 +8,7 @@ the mesh, including occluded parts.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import replace
 from functools import partial
@@ -123,20 +123,18 @@ def render_run_frames(
         progress: Called after each block of `BLOCK_SIZE` frames.
         scene: Differences of the simulated world from the cell file.
     """
-    return _render_blocks(partial(_render_frames, config, scene, seed), image_count, worker_count, progress)
+    render_block = partial(_render_images, [config], scene, seed)
+    return _render_blocks(render_block, image_count, worker_count, progress)
 
 
 def _render_blocks(
-    render_block: Callable[[range], dict[int, ResultT]],
-    count: int,
-    worker_count: int,
-    progress: ReportProgress,
+    render_block: Callable[[range], dict[int, ResultT]], count: int, workers: int, progress: ReportProgress
 ) -> list[ResultT]:
     """Return the results of `render_block` for images 0 to `count` - 1, in order, from worker processes."""
     image_numbers = range(count)
     results: dict[int, ResultT] = {}
     blocks = [image_numbers[start : start + BLOCK_SIZE] for start in image_numbers[::BLOCK_SIZE]]
-    with WorkerPool(worker_count) as pool:
+    with WorkerPool(workers) as pool:
         for task in as_completed([pool.submit(render_block, block) for block in blocks]):
             results.update(task.result())
             progress(len(results), count)
@@ -144,17 +142,17 @@ def _render_blocks(
 
 
 def _render_images(
-    cells: Sequence[CellConfig], seed: int, image_numbers: range, scene: SceneConfig | None = None
-) -> Iterator[tuple[int, LabelledImage]]:
-    """Yield number and labelled image of random scenes; without `scene`, scenes vary more."""
+    cells: Sequence[CellConfig], scene: SceneConfig | None, seed: int, image_numbers: range
+) -> dict[int, LabelledImage]:
+    """Return labelled images of random scenes by number; without `scene`, the scenes vary more."""
     cv2.setNumThreads(1)
+    images = {}
     with contextlib.ExitStack() as stack:
-        renderers = [SceneRenderer(cell, scene) for cell in cells]
-        for renderer in renderers:
-            stack.callback(renderer.close)
+        renderers = [stack.enter_context(contextlib.closing(SceneRenderer(cell, scene))) for cell in cells]
         for number in image_numbers:
             image_seed = int(np.random.SeedSequence([seed, number]).generate_state(1, np.uint64)[0])
-            yield number, renderers[number % len(cells)].render_image(image_seed, number)
+            images[number] = renderers[number % len(cells)].render_image(image_seed, number)
+    return images
 
 
 def _render_dataset_images(
@@ -162,7 +160,7 @@ def _render_dataset_images(
 ) -> dict[int, DatasetEntry]:
     """Render and save images in a worker process; return their dataset entries by image number."""
     entries = {}
-    for number, image in _render_images(cells, seed, image_numbers):
+    for number, image in _render_images(cells, None, seed, image_numbers).items():
         split = "train" if number < train_count else "valid"
         file = f"{image.file}.jpg"
         save_image(build_image_path(out, layout, split, file), image.image)
@@ -175,13 +173,6 @@ def _render_dataset_images(
             split, file, size, image.labels, image.boxes, image.ignored_boxes, truth
         )
     return entries
-
-
-def _render_frames(
-    config: CellConfig, scene: SceneConfig, seed: int, image_numbers: range
-) -> dict[int, LabelledImage]:
-    """Render frames in a worker process, and return them by image number."""
-    return dict(_render_images([config], seed, image_numbers, scene))
 
 
 class SceneRenderer:

@@ -18,9 +18,9 @@ from executive.cell.frame import Box
 from executive.cell.paths import has_outside_link
 from executive.errors import MAX_QUOTATION_LENGTH, InputError
 from executive.geometry import Array
-from executive.training.dataset import LabelledImage
-from executive.training.dataset_files import (
+from executive.training.dataset import (
     MAX_LABEL_FILE_SIZE,
+    LabelledImage,
     find_label_file,
     find_splits,
     parse_file,
@@ -125,7 +125,7 @@ class LabelledDataset:
 
     Args:
         folder: Folder of the dataset, or of one split.
-        split: `train`, `valid` or `test`; "": the first existing split of `SPLITS`.
+        split: `train`, `valid` or `test`; "": the first existing split of `PREFERRED_SPLITS`.
 
     Attributes:
         folder: Folder of the dataset.
