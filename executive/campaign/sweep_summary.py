@@ -10,7 +10,6 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest, bootstrap
 
 from executive.campaign.results import RunRow, SkillRow, SweepSettings
 from executive.record.timeline import PlanningTotals
@@ -218,6 +217,9 @@ def estimate_proportion(successes: int, total: int) -> Estimate:
     """Return the proportion successes / total with its Wilson score interval."""
     if total == 0:
         return Estimate(successes, total)
+    # The import takes 0.5 s, for which the refusal of wrong inputs must not wait.
+    from scipy.stats import binomtest
+
     interval = binomtest(successes, total).proportion_ci(method="wilson")
     return Estimate(successes, total, successes / total, float(interval.low), float(interval.high))
 
@@ -255,6 +257,9 @@ def compute_bootstrap_interval(
     """
     if len(samples[0]) < 2:
         return None, None
+    # The import takes 0.5 s, for which the refusal of wrong inputs must not wait.
+    from scipy.stats import bootstrap
+
     # scipy warns if all resamples are equal or if a denominator is 0.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

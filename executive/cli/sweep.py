@@ -50,7 +50,7 @@ def sweep_command(
     )
     options.check_disjoint(overrides, "--vary", variations)
     with keep_stdout_clean():
-        # The imports take more than a second, for which `--help` and wrong options must not wait.
+        # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.campaign import sweep_reports
         from executive.campaign.jobs import JobOptions
         from executive.campaign.sweep import create_sweep, make_settings, open_sweep, read_results, run_sweep
@@ -118,7 +118,7 @@ def compare_command(
     )
     options.check_disjoint(overrides, "--set-a or --set-b", {**overrides_a, **overrides_b})
     with keep_stdout_clean():
-        # The imports take more than a second, for which `--help` and wrong options must not wait.
+        # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.campaign import sweep, sweep_reports
         from executive.campaign.jobs import JobOptions
         from executive.campaign.sweep_summary import SweepResults, compute_differences, pair_runs

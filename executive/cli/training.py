@@ -176,7 +176,7 @@ def evaluate_command(
     has_run_conditions = threshold is None and view == "table" and not (weights or varied or scene)
     is_stored = bool(cells) and has_run_conditions and (out is not None or not overrides)
     with keep_stdout_clean():
-        # The imports take two seconds, for which `--help` and wrong options must not wait.
+        # The imports take a second, for which `--help` and wrong options must not wait.
         from executive.campaign import evaluation
         from executive.cli.progress import print_report, show_progress
         from executive.training.dataset import save_image

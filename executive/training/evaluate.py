@@ -13,9 +13,7 @@ from typing import Any
 
 import cv2
 import numpy as np
-import supervision as sv
 from numpy.typing import NDArray
-from supervision.metrics import MeanAveragePrecision
 
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.device_config import CameraConfig
@@ -159,6 +157,9 @@ class AveragePrecision:
     """Mean average precision (mAP) over all classes in the images."""
 
     def __init__(self) -> None:
+        # The import takes half a second, for which the refusal of wrong inputs must not wait.
+        from supervision.metrics import MeanAveragePrecision
+
         self._metric = MeanAveragePrecision()
         self._class_ids: dict[str, int] = {}
 
@@ -176,6 +177,8 @@ class AveragePrecision:
 
     def _to_detections(self, boxes: Sequence[Box], labels: Sequence[str]) -> Any:
         """Return boxes and labels as `supervision.Detections`."""
+        import supervision as sv  # See `__init__`.
+
         ids = [self._class_ids.setdefault(label, len(self._class_ids)) for label in labels]
         return sv.Detections(np.array(boxes, float).reshape(-1, 4), class_id=np.array(ids, dtype=int))
 
@@ -330,6 +333,8 @@ def draw_sheet(mistakes: Sequence[Mistake], title: str) -> Picture:
 
 def _draw_tile(mistake: Mistake) -> Picture:
     """Return a crop around a mistake with true and detected boxes, `(TILE_SIZE, TILE_SIZE, 3)` RGB."""
+    import supervision as sv  # See `AveragePrecision`.
+
     left, top, right, bottom = mistake.box
     crop_size = max(CROP_SCALE * max(right - left, bottom - top), MIN_CROP_SIZE)
     crop_corner = np.array([left + right - crop_size, top + bottom - crop_size]) / 2

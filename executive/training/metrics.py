@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, gammaincinv
-from supervision import box_iou_batch
 
 from executive.cell.frame import Box, Detection, Frame
 from executive.cell.protocols import Localizer
@@ -272,6 +271,9 @@ def is_ignored(detection: Detection, sample: LabelledImage) -> bool:
 
 def compute_ious(boxes: Sequence[Box], other_boxes: Sequence[Box]) -> NDArray[np.float32]:
     """Return the intersection over union of each of N boxes and each of M other boxes, `(N, M)`."""
+    # The import takes half a second, for which the refusal of wrong inputs must not wait.
+    from supervision import box_iou_batch
+
     return np.asarray(box_iou_batch(np.array(boxes).reshape(-1, 4), np.array(other_boxes).reshape(-1, 4)))
 
 

@@ -12,7 +12,6 @@ from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
-from supervision.dataset.formats.yolo import yolo_annotations_to_detections
 
 from executive.cell.frame import Box
 from executive.cell.paths import has_outside_link
@@ -250,6 +249,9 @@ class LabelledDataset:
 
     def _read_yolo(self) -> list[str]:
         """Read the annotations of the images of a YOLO dataset, and return the classes."""
+        # The import takes half a second, for which the refusal of wrong inputs must not wait.
+        from supervision.dataset.formats.yolo import yolo_annotations_to_detections
+
         content = read_class_file(self._source.file)
         names = dict(enumerate(content.names)) if isinstance(content.names, list) else content.names
         labels_of_images: dict[Path, tuple[Path | None, list[list[str]]]] = {}
