@@ -318,9 +318,7 @@ def test_each_run_is_a_test_case_of_the_junit_report() -> None:
         ("testcase", "sort", "2.500")
     }
     assert [case.get("name") for case in suite] == ["seed 0", "seed 1", "seed 2", "seed 3 speed=1"]
-    assert [case.findtext("system-out") for case in suite] == [
-        repeat(0), repeat(1), repeat(2), SETTINGS.make_repeat_command(runs[3])
-    ]  # fmt: skip
+    assert [case.findtext("system-out") for case in suite] == list(map(SETTINGS.make_repeat_command, runs))
     problems = [case[0] for case in suite if len(case) > 1]
     assert [(one.tag, one.get("type")) for one in problems] == [
         ("failure", "Grasp.missed"), ("error", "fault"), ("failure", "disagreement"),
