@@ -11,7 +11,6 @@ from pathlib import Path
 
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.layout import build_object_class
-from executive.cell.protocols import Localizer
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import find_max_object_count
 from executive.errors import InputError, explain_os_errors
@@ -37,10 +36,44 @@ MIN_ACCURACY = 0.5
 """Minimum precision and recall in a measurement that runs may use."""
 OpenProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
 """Function that opens a progress bar with a name; the context manager yields `update(done, total)`."""
-
-
 Images = LabelledDataset | list[LabelledImage]
 """Labelled images of a dataset, or of rendered scenes."""
+
+
+def load_cells(
+    paths_or_names: tuple[str, ...], overrides: Mapping[str, str] | None = None
+) -> dict[Path, CellConfig]:
+    """Return the configurations of cells by the path of the cell file.
+
+    `paths_or_names` contains paths of cell files and names of shipped cells. `overrides` contains values for
+    keys of the cells, by key name `cell.KEY.KEY`.
+
+    Raises:
+        InputError: A cell does not exist, two cells have the same name, or a file is invalid.
+    """
+    cells: dict[Path, CellConfig] = {}
+    for path in map(find_cell, paths_or_names):
+        config = load_cell(path, overrides)
+        if any(config.cell == other.cell for other in cells.values()):
+            raise InputError(f'two cells are called "{config.cell}"; give one of them another name')
+        cells[path] = config
+    return cells
+
+
+def find_cell(path_or_name: str) -> Path:
+    """Return the path of a cell file, or the path of the shipped cell file with this name.
+
+    Raises:
+        InputError: There is neither a cell file with this path nor a shipped cell with this name.
+    """
+    path = Path(path_or_name)
+    if path.is_file():
+        return path
+    shipped_files = {file.stem: file for file in sorted((get_shipped_folder() / "cells").glob("*.yaml"))}
+    if path_or_name in shipped_files:
+        return shipped_files[path_or_name]
+    choices = suggest_choice(path_or_name, shipped_files, "Shipped cells")
+    raise InputError(f'there is neither a cell file nor a shipped cell "{path_or_name}". {choices}')
 
 
 @dataclass(frozen=True)
@@ -83,11 +116,6 @@ class DetectorUnderTest:
     configs: dict[str, DetectorConfig]
     name: str
     base_folder: Path
-
-    def make_measurement_name(self, dataset: Path | None) -> str:
-        """Return the name of a measurement on a dataset, or on scenes of the cell if `dataset` is None."""
-        cell_name = self.cell.cell if self.cell else ""
-        return " on ".join(filter(None, (cell_name, str(dataset or ""))))
 
 
 def list_detectors(
@@ -145,19 +173,25 @@ def measure_detector(
     cell_of_images = None if settings.dataset is not None or settings.is_randomized else detector.cell
     camera = next(iter(cell_of_images.cameras.values())) if cell_of_images else None
     classes = tuple(detector.cell.objects) if detector.cell else None
-    configs, name, folder = detector.configs, detector.name, detector.base_folder
+    localizer = None
+    # The method `ray` needs a simulated world.
+    if cell_of_images and cell_of_images.localization != "ray":
+        objects = cell_of_images.objects
+        object_classes = {label: build_object_class(label, objects[label]) for label in objects}
+        localizer = CellLocalizer(cell_of_images.localization, object_classes)
+    name = detector.name
     if settings.dataset is not None:
-        known_classes = classes or find_detectable_labels(configs, folder)[name] or ()
+        known_classes = classes or find_detectable_labels(detector.configs, detector.base_folder)[name] or ()
         settings.dataset.match_classes(known_classes, f"detector {name}")
     with _open_images(detector.cell, settings, progress) as samples:
         cell_detector = CellDetector(
-            configs, name, base=folder, camera=camera, view=settings.view, classes=classes
-        )
-        with contextlib.closing(cell_detector), progress(f"running {detector.name}") as update:
+            detector.configs, name, base=detector.base_folder, camera=camera, view=settings.view,
+            classes=classes,
+        )  # fmt: skip
+        with contextlib.closing(cell_detector), progress(f"running {name}") as update:
             return evaluate.evaluate(
                 cell_detector, _iterate_with_progress(samples, update), mistakes=mistakes,
-                localizer=_build_localizer(cell_of_images) if cell_of_images else None, cell=cell_of_images,
-                threshold=settings.threshold,
+                localizer=localizer, cell=cell_of_images, threshold=settings.threshold,
             )  # fmt: skip
 
 
@@ -175,7 +209,7 @@ def _open_images(
         with progress(f"rendering {cell.cell}") as update:
             if settings.is_randomized:
                 generate_dataset(
-                    {cell.cell: cell}, Path(folder), image_count=settings.image_count, seed=settings.seed,
+                    [cell], Path(folder), image_count=settings.image_count, seed=settings.seed,
                     layout="coco", worker_count=settings.workers, valid_fraction=1.0, progress=update,
                 )  # fmt: skip
                 images = LabelledDataset(Path(folder))
@@ -195,14 +229,6 @@ def _iterate_with_progress(images: Images, update: Callable[[int, int], None]) -
     for image_count, image in enumerate(images, 1):
         yield image
         update(image_count, len(images))
-
-
-def _build_localizer(cell: CellConfig) -> Localizer | None:
-    """Return the localizer of the cell; None for the method `ray`, which needs a simulated world."""
-    if cell.localization == "ray":
-        return None
-    classes = {label: build_object_class(label, config) for label, config in cell.objects.items()}
-    return CellLocalizer(cell.localization, classes)
 
 
 def find_weakness(detector: DetectorUnderTest, evaluation: Evaluation) -> str:
@@ -271,39 +297,3 @@ def store_evaluation(
         old_measurements = envelope.read_measurements(path)
         write_atomically(path, envelope.format_measurements(old_measurements, new_measurement))
     return path
-
-
-def load_cells(
-    paths_or_names: tuple[str, ...], overrides: Mapping[str, str] | None = None
-) -> dict[str, CellConfig]:
-    """Return the configurations of cells by cell name.
-
-    `paths_or_names` contains paths of cell files and names of shipped cells. `overrides` contains values for
-    keys of the cells, by key name `cell.KEY.KEY`.
-
-    Raises:
-        InputError: A cell does not exist, two cells have the same name, or a file is invalid.
-    """
-    cells: dict[str, CellConfig] = {}
-    for path_or_name in paths_or_names:
-        config = load_cell(find_cell(path_or_name), overrides)
-        if config.cell in cells:
-            raise InputError(f'two cells are called "{config.cell}"; give one of them another name')
-        cells[config.cell] = config
-    return cells
-
-
-def find_cell(path_or_name: str) -> Path:
-    """Return the path of a cell file, or the path of the shipped cell file with this name.
-
-    Raises:
-        InputError: There is neither a cell file with this path nor a shipped cell with this name.
-    """
-    path = Path(path_or_name)
-    if path.is_file():
-        return path
-    shipped_files = {file.stem: file for file in sorted((get_shipped_folder() / "cells").glob("*.yaml"))}
-    if path_or_name in shipped_files:
-        return shipped_files[path_or_name]
-    choices = suggest_choice(path_or_name, shipped_files, "Shipped cells")
-    raise InputError(f'there is neither a cell file nor a shipped cell "{path_or_name}". {choices}')

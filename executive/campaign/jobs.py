@@ -28,6 +28,14 @@ from executive.run.assembly import RunOptions
 from executive.run.run_control import HALT_SIGNALS, handle_signals
 from executive.view.report import try_write_report
 
+Job = TypeVar("Job")
+JobResult = TypeVar("JobResult")
+
+MAX_HALT_DELAY = 0.1
+"""Maximum time between a signal to this process and the signals to its workers [s]."""
+MAX_CRASHES = 2
+"""A job fails as soon as this many worker processes have died while they executed it."""
+
 
 @dataclass(frozen=True)
 class MissionUnderTest:
@@ -71,18 +79,10 @@ def load_mission_under_test(
     if kind != "sim":
         name = loaded.mission.name
         raise InputError(f"--oracle requires a simulated cell, but the cell of {name} is of kind {kind}")
+    # The import loads the simulator, which takes 0.5 s; no other cell needs it.
     from executive.testing.oracle import make_oracle_kind
 
     return MissionUnderTest(loaded, make_oracle_kind(), "sim, true detections", seed)
-
-
-Job = TypeVar("Job")
-JobResult = TypeVar("JobResult")
-
-MAX_HALT_DELAY = 0.1
-"""Maximum time between a signal to this process and the signals to its workers [s]."""
-MAX_CRASHES = 2
-"""A job fails as soon as this many worker processes have died while they executed it."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,8 @@ def run_jobs(
     crash_counts: Counter[int] = Counter()
     # Each pool has one process, because the death of a process breaks all jobs of its pool.
     idle_pools = [WorkerPool(1) for _ in range(min(options.workers, len(jobs)))]
-    is_halted, signal_event = False, threading.Event()
+    is_halted = False
+    signal_event = threading.Event()
     try:
         with handle_signals(HALT_SIGNALS, lambda *_: signal_event.set()):
             while running_jobs or pending_indices:
@@ -159,7 +160,8 @@ def run_jobs(
                     _halt_runs()
                 # Store the results. A job whose process died becomes pending again, or has failed.
                 for future in ended_jobs:
-                    (index, pool), error = running_jobs.pop(future), future.exception()
+                    index, pool = running_jobs.pop(future)
+                    error = future.exception()
                     idle_pools.append(pool)
                     if isinstance(error, BrokenExecutor):
                         if is_halted:

@@ -16,10 +16,22 @@ from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from executive.cell.json_values import DECIMAL_PLACES
 from executive.errors import InputError
 from executive.record.result import Audit, ItemCounts, Result, describe_disagreement
 from executive.record.timeline import PlanningTotals, Timeline
+from executive.view.terminal import format_repeat_command
+
+FILE_NAME = "results.sqlite"
+"""Name of the database in the folder of a sweep."""
+SCHEMA_PATH = Path(__file__).with_name("schema.sql")
+"""Statements that create the tables."""
+SCHEMA_VERSION = 1
+"""Version of the tables, stored as `user_version` of the file."""
+BUSY_TIMEOUT = 60.0
+"""Maximum time for which a transaction waits for another program that reads the file [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +55,11 @@ class SweepSettings:
         """Each combination of the varied values by name; one empty combination if no value is varied."""
         names = self.variations
         return [dict(zip(names, values, strict=True)) for values in product(*names.values())]
+
+    def make_repeat_command(self, run: RunRow) -> str:
+        """Return the command line that repeats a run of the sweep."""
+        overrides = {**self.overrides, **run.variant}
+        return format_repeat_command(self.mission, run.seed, overrides, scene=self.scene)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,7 +171,6 @@ def make_record(run_index: int, variant: Mapping[str, str], result: Result, time
 
 
 def _list_items(run_index: int, timeline: Timeline) -> Iterator[ItemRow]:
-    """Yield the row of each item."""
     for name, history in timeline.items.by_name.items():
         last = history.last_change
         yield ItemRow(
@@ -175,7 +191,6 @@ def _measure_item_time(name: str, timeline: Timeline) -> float:
 
 
 def _list_skills(run_index: int, timeline: Timeline) -> Iterator[SkillRow]:
-    """Yield the row of each skill."""
     for skill in dict.fromkeys(activation.skill for activation in timeline.activations if activation.skill):
         activations = [activation for activation in timeline.activations if activation.skill == skill]
         time = sum(activation.end - activation.start for activation in activations)
@@ -186,16 +201,6 @@ def _list_skills(run_index: int, timeline: Timeline) -> Iterator[SkillRow]:
         )  # fmt: skip
 
 
-FILE_NAME = "results.sqlite"
-"""Name of the database in the folder of a sweep."""
-SCHEMA_PATH = Path(__file__).with_name("schema.sql")
-"""Statements that create the tables."""
-SCHEMA_VERSION = 1
-"""Version of the tables, stored as `user_version` of the file."""
-BUSY_TIMEOUT = 60.0
-"""Maximum time for which a transaction waits for another program that reads the file [s]."""
-
-
 class ResultsDatabase:
     """An open database; each run is stored in one transaction, so that no program reads a part of a run.
 
@@ -204,7 +209,7 @@ class ResultsDatabase:
 
     Args:
         path: The file.
-        settings: Settings with which the database is created; None to open an existing database.
+        settings: Settings with which the database is created and locked; None to open an existing database.
 
     Attributes:
         path: The file.
@@ -236,6 +241,8 @@ class ResultsDatabase:
                 f"this program reads version {SCHEMA_VERSION}; start a new sweep"
             )
         (self.settings,) = map(_decode_settings, self._select("settings"))
+        if settings is not None:
+            self.lock()
 
     def lock(self) -> None:
         """Reserve the sweep for this process until the database is closed; other processes can read the file.
@@ -300,11 +307,6 @@ class ResultsDatabase:
             ) from error
 
 
-def get_database_path(path: Path) -> Path:
-    """Return the path of the database: `path`, or the file in it if `path` is a folder."""
-    return path / FILE_NAME if path.is_dir() else path
-
-
 def encode_run(run: RunRow) -> dict[str, Any]:
     """Return the columns of a run; those of the audit are missing if there was no audit."""
     columns = {**vars(run), "variant": _to_json_text(run.variant)}
@@ -315,6 +317,10 @@ def encode_run(run: RunRow) -> dict[str, Any]:
     return columns
 
 
+_RUN_ADAPTER = TypeAdapter(RunRow)
+"""Converts the numbers of SQLite, which has no Boolean type, to a run."""
+
+
 def _decode_run(columns: dict[str, Any]) -> RunRow:
     parts: dict[str, dict[str, Any]] = {"items": {}, "audit": {}, "planning": {}}
     for column in list(columns):
@@ -322,15 +328,9 @@ def _decode_run(columns: dict[str, Any]) -> RunRow:
         if prefix in parts:
             parts[prefix][name] = columns.pop(column)
     has_audit = parts["audit"]["agrees"] is not None
-    # SQLite has no Boolean type.
-    audit = Audit(**{**parts["audit"], "agrees": bool(parts["audit"]["agrees"])}) if has_audit else None
-    columns["variant"] = json.loads(columns["variant"])
-    return RunRow(
-        **columns,
-        items=ItemCounts(**parts["items"]),
-        audit=audit,
-        planning=PlanningTotals(**parts["planning"]),
-    )
+    variant = json.loads(columns["variant"])
+    values = {**columns, **parts, "variant": variant, "audit": parts["audit"] if has_audit else None}
+    return _RUN_ADAPTER.validate_python(values)
 
 
 def _encode_settings(settings: SweepSettings) -> dict[str, Any]:
@@ -343,10 +343,7 @@ def _encode_settings(settings: SweepSettings) -> dict[str, Any]:
 def _decode_settings(columns: dict[str, Any]) -> SweepSettings:
     for name in ("overrides", "variations", "versions"):
         columns[name] = json.loads(columns[name])
-    columns["variations"] = {name: tuple(values) for name, values in columns["variations"].items()}
-    columns["scene"] = columns["scene"] and Path(columns["scene"])
-    columns["saves_images"] = bool(columns["saves_images"])
-    return SweepSettings(**columns)
+    return TypeAdapter(SweepSettings).validate_python(columns)
 
 
 def _to_json_text(value: Any) -> str:

@@ -5,7 +5,6 @@ A folder is only created if the inputs are valid, and only opened if they have n
 
 from __future__ import annotations
 
-import functools
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,45 +13,19 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from executive.campaign.cluster import run_jobs_on_cluster
-from executive.campaign.jobs import JobOptions, SweepJob, list_jobs, make_fault_record, run_job, run_jobs
-from executive.campaign.results import (
-    FILE_NAME,
-    ResultsDatabase,
-    RunRecord,
-    RunRow,
-    SweepSettings,
-    get_database_path,
-)
+from executive.campaign.jobs import JobOptions, list_jobs, make_fault_record, run_job, run_jobs
+from executive.campaign.results import FILE_NAME, ResultsDatabase, RunRecord, SweepSettings
 from executive.campaign.sweep_summary import SweepResults, summarize_runs
 from executive.cells.sim.scene_file import load_scene
 from executive.errors import InputError
 from executive.mission.file_search import read_source
 from executive.mission.load import LoadedMission, load_mission
 from executive.perception.envelope import FAKE_KIND, compute_fingerprint
-from executive.plugins import list_versions, load_cell_kind, load_skills
+from executive.plugins import DISTRIBUTION, list_versions, load_cell_kind, load_skills
 from executive.record.run_directory import make_dated_folder
-from executive.view.terminal import format_repeat_command
 
 SIDES = ("a", "b")
 """Names of the folders of the two sweeps of a comparison."""
-
-
-def create_sweep(settings: SweepSettings, runs_folder: Path) -> ResultsDatabase:
-    """Create the folder `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_sweep_<mission>` with a locked database.
-
-    Raises:
-        InputError: The folder cannot be made.
-    """
-    folder = make_dated_folder(runs_folder, f"sweep_{settings.mission_name}", datetime.now())
-    return create_database(folder, settings)
-
-
-def create_database(folder: Path, settings: SweepSettings) -> ResultsDatabase:
-    """Create the database of a sweep in an empty folder, and reserve the sweep for this process."""
-    database = ResultsDatabase(folder / FILE_NAME, settings)
-    database.lock()
-    return database
 
 
 def make_settings(
@@ -79,8 +52,48 @@ def make_settings(
         saves_images=saves_images, inputs_hash="", versions=dict(list_versions()),
     )  # fmt: skip
     missions = _load_variants(settings)
-    name, cell, inputs_hash = missions[0].mission.name, missions[0].cell_path, _hash_inputs(missions, scene)
-    return replace(settings, mission_name=name, cell=str(cell), inputs_hash=inputs_hash)
+    first = missions[0]
+    return replace(
+        settings, mission_name=first.mission.name, cell=str(first.cell_path),
+        inputs_hash=_hash_inputs(missions, scene),
+    )  # fmt: skip
+
+
+def _load_variants(settings: SweepSettings) -> list[LoadedMission]:
+    """Load the mission of each variant and check the scene, to report an error before the first run."""
+    skills = load_skills()
+    missions = [
+        load_mission(settings.mission, skills, {**settings.overrides, **variant}, load_cell_kind)
+        for variant in settings.variants
+    ]
+    for loaded in missions if settings.scene else ():
+        load_scene(settings.scene, loaded.cell_config)
+    return missions
+
+
+def _hash_inputs(missions: Iterable[LoadedMission], scene: Path | None) -> str:
+    """Return a hash of all inputs.
+
+    The inputs are the texts of the missions, libraries and scene, the cell configurations, and the detector
+    weights.
+    """
+    inputs: list[object] = [] if scene is None else [read_source(scene).text]
+    for loaded in missions:
+        cell = loaded.cell_config
+        names = [] if cell.kind == FAKE_KIND else [*cell.detectors]
+        weights = [compute_fingerprint(cell, name, loaded.cell_path.parent)["weights"] for name in names]
+        inputs += [loaded.text, dict(loaded.libraries), cell.model_dump(mode="json"), weights]
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
+
+
+def create_sweep(settings: SweepSettings, runs_folder: Path) -> ResultsDatabase:
+    """Create the folder `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_sweep_<mission>` with a locked database.
+
+    Raises:
+        InputError: The folder cannot be made.
+    """
+    folder = make_dated_folder(runs_folder, f"sweep_{settings.mission_name}", datetime.now())
+    return ResultsDatabase(folder / FILE_NAME, settings)
 
 
 def open_sweep(path: Path) -> ResultsDatabase:
@@ -90,7 +103,8 @@ def open_sweep(path: Path) -> ResultsDatabase:
         InputError: There is no such sweep, another process executes the sweep, or an input has changed.
     """
     with ExitStack() as stack:  # It closes the database after an error.
-        database = stack.enter_context(closing(ResultsDatabase(get_database_path(path))))
+        file = path / FILE_NAME if path.is_dir() else path
+        database = stack.enter_context(closing(ResultsDatabase(file)))
         settings = database.settings
         if _hash_inputs(_load_variants(settings), settings.scene) != settings.inputs_hash:
             raise InputError(
@@ -113,7 +127,8 @@ def create_comparison(settings: Sequence[SweepSettings], runs_folder: Path) -> l
     folder = make_dated_folder(runs_folder, f"compare_{name}", datetime.now())
     for side in SIDES:
         (folder / side).mkdir()
-    return [create_database(folder / side, values) for side, values in zip(SIDES, settings, strict=True)]
+    files = [folder / side / FILE_NAME for side in SIDES]
+    return list(map(ResultsDatabase, files, settings))
 
 
 def open_comparison(folder: Path) -> list[ResultsDatabase]:
@@ -128,64 +143,38 @@ def open_comparison(folder: Path) -> list[ResultsDatabase]:
     return databases
 
 
-def _load_variants(settings: SweepSettings) -> list[LoadedMission]:
-    """Load the mission of each variant and check the scene, to report an error before the first run."""
-    skills, mission = load_skills(), settings.mission
-    missions = [
-        load_mission(mission, skills, {**settings.overrides, **variant}, load_cell_kind)
-        for variant in settings.variants
-    ]
-    for loaded in missions if settings.scene else ():
-        load_scene(settings.scene, loaded.cell_config)
-    return missions
-
-
-def _hash_inputs(missions: Iterable[LoadedMission], scene: Path | None) -> str:
-    """Return a hash of all inputs.
-
-    The inputs are the texts of the missions, libraries and scene, the cell configurations, and the detector
-    weights.
-    """
-    inputs: list[object] = [] if scene is None else [read_source(scene).text]
-    for loaded in missions:
-        cell, base = loaded.cell_config, loaded.cell_path.parent
-        names = [] if cell.kind == FAKE_KIND else [*cell.detectors]
-        weights = [compute_fingerprint(cell, name, base)["weights"] for name in names]
-        inputs += [loaded.text, dict(loaded.libraries), cell.model_dump(mode="json"), weights]
-    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
-
-
-def make_repeat_command(settings: SweepSettings, run: RunRow) -> str:
-    """Return the command line that repeats a run of a sweep."""
-    overrides = {**settings.overrides, **run.variant}
-    return format_repeat_command(settings.mission, run.seed, overrides, scene=settings.scene)
-
-
-def run_sweep(
-    jobs: Sequence[SweepJob], database: ResultsDatabase, options: JobOptions, cluster: str | None = None
-) -> None:
-    """Execute all jobs, and store the record of each run as soon as the run ends.
+def run_sweep(database: ResultsDatabase, options: JobOptions, cluster: str | None = None) -> None:
+    """Execute the missing runs of a sweep, and store the record of each run as soon as the run ends.
 
     A run gets the status `FAULT` after two of its worker processes died. After Ctrl-C or SIGTERM no further
     run starts, and current runs are halted; halted runs are not stored. `cluster` is the address of a dask
-    scheduler, whose workers execute the jobs, or None.
+    scheduler, whose workers execute the runs, or None.
+
+    Raises:
+        InputError: The jobs cannot be executed on the cluster.
     """
+    stored_indices = {run.run_index for run in database.read_runs()}
+    jobs = list_jobs(database.settings, database.path.parent)
+    missing_jobs = [job for job in jobs if job.index not in stored_indices]
 
     def store(_: int, record: RunRecord, crash_count: int) -> None:
         if record.run.status != "HALTED":
             database.append(replace(record, run=replace(record.run, crashes=crash_count)))
 
     if cluster is None:
-        run_jobs(jobs, run_job, make_fault_record, options, store)
-    else:
-        run_jobs_on_cluster(jobs, cluster, options, store)
+        run_jobs(missing_jobs, run_job, make_fault_record, options, store)
+        return
+    try:
+        # The packages of the extra `cluster` are optional.
+        from executive.campaign.cluster import run_jobs_on_cluster
+    except ImportError:
+        advice = f'install them with `uv sync --extra cluster` or `pip install "{DISTRIBUTION}[cluster]"`'
+        raise InputError(f'--cluster needs the packages of the extra "cluster"; {advice}') from None
+    run_jobs_on_cluster(missing_jobs, cluster, options, store)
 
 
 def read_results(database: ResultsDatabase, side: str = "") -> SweepResults:
     """Return the results of all stored runs of a sweep; `side` is `A` or `B` in a comparison, else ""."""
-    settings = database.settings
     runs = database.read_runs()
-    make_command = functools.partial(make_repeat_command, settings)
-    summaries = summarize_runs(runs, database.read_skills(), make_command)
-    planned_run_count = len(list_jobs(settings, database.path.parent))
-    return SweepResults(side, settings, runs, summaries, planned_run_count)
+    summaries = summarize_runs(runs, database.read_skills(), database.settings)
+    return SweepResults(side, database.settings, runs, summaries)

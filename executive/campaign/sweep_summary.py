@@ -22,8 +22,6 @@ BOOTSTRAP_SEED = 0
 """Seed of the bootstrap resamples; a fixed seed makes a summary reproducible."""
 SECONDS_PER_HOUR = 3600.0
 """Number of seconds per hour [s]."""
-RepeatCommandFactory = Callable[[RunRow], str]
-"""Function that returns the command line that repeats a run."""
 
 
 @dataclass(frozen=True)
@@ -134,14 +132,18 @@ class SweepResults:
         settings: Settings of the sweep.
         runs: Rows of the runs.
         summaries: Summary of each variant.
-        planned_run_count: Number of runs of a complete sweep.
     """
 
     side: str
     settings: SweepSettings
     runs: Sequence[RunRow]
     summaries: Sequence[VariantSummary]
-    planned_run_count: int
+
+    @property
+    def planned_run_count(self) -> int:
+        """Number of runs of the complete sweep."""
+        seed_count = self.settings.last_seed - self.settings.first_seed + 1
+        return len(self.settings.variants) * seed_count
 
     @property
     def is_incomplete(self) -> bool:
@@ -150,17 +152,17 @@ class SweepResults:
 
 
 def summarize_runs(
-    runs: Sequence[RunRow], skills: Sequence[SkillRow], make_repeat_command: RepeatCommandFactory
+    runs: Sequence[RunRow], skills: Sequence[SkillRow], settings: SweepSettings
 ) -> list[VariantSummary]:
     """Return the summary of each variant, in the order of the jobs."""
     runs_by_variant: dict[tuple[tuple[str, str], ...], list[RunRow]] = defaultdict(list)
     for run in runs:
         runs_by_variant[tuple(run.variant.items())].append(run)
-    return [_summarize_variant(group, skills, make_repeat_command) for group in runs_by_variant.values()]
+    return [_summarize_variant(group, skills, settings) for group in runs_by_variant.values()]
 
 
 def _summarize_variant(
-    runs: Sequence[RunRow], skills: Sequence[SkillRow], make_repeat_command: RepeatCommandFactory
+    runs: Sequence[RunRow], skills: Sequence[SkillRow], settings: SweepSettings
 ) -> VariantSummary:
     """Return the summary of the runs of one variant; `skills` contains the rows of all variants."""
     audits = [run.audit for run in runs if run.audit]
@@ -178,7 +180,7 @@ def _summarize_variant(
         wall_time_s=SummaryStatistics.from_values([run.wall_time_s for run in runs]),
         planning=PlanningTotals(*map(sum, zip(*plannings, strict=True))),
         skills=_summarize_skills([row for row in skills if row.run_index in run_indices], len(runs)),
-        failure_groups=_group_failures(runs, make_repeat_command),
+        failure_groups=_group_failures(runs, settings),
     )
 
 
@@ -194,7 +196,7 @@ def _summarize_skills(skills: Sequence[SkillRow], run_count: int) -> tuple[Skill
     return tuple(sorted(summaries, key=lambda summary: -summary.mean_robot_time_s))
 
 
-def _group_failures(runs: Sequence[RunRow], make_command: RepeatCommandFactory) -> tuple[FailureGroup, ...]:
+def _group_failures(runs: Sequence[RunRow], settings: SweepSettings) -> tuple[FailureGroup, ...]:
     """Return the runs with a problem, grouped by status, reason and node, by decreasing number of runs."""
     groups: dict[tuple[str, str, str], list[RunRow]] = defaultdict(list)
     for run in runs:
@@ -204,10 +206,9 @@ def _group_failures(runs: Sequence[RunRow], make_command: RepeatCommandFactory) 
     for (status, reason, node), group in groups.items():
         first = group[0]
         seeds = tuple(run.seed for run in group)
+        command = settings.make_repeat_command(first)
         failures.append(
-            FailureGroup(
-                status, reason, node, seeds, first.explanation, first.run_directory, make_command(first)
-            )
+            FailureGroup(status, reason, node, seeds, first.explanation, first.run_directory, command)
         )
     return tuple(sorted(failures, key=lambda failure: -len(failure.seeds)))
 
@@ -216,7 +217,8 @@ def estimate_proportion(successes: int, total: int) -> Estimate:
     """Return the proportion successes / total with its Wilson score interval."""
     if total == 0:
         return Estimate(successes, total)
-    from scipy.stats import binomtest  # Imported here, because the import takes 0.5 s.
+    # The import takes 0.5 s, for which the refusal of wrong inputs must not wait.
+    from scipy.stats import binomtest
 
     interval = binomtest(successes, total).proportion_ci(method="wilson")
     return Estimate(successes, total, successes / total, float(interval.low), float(interval.high))
@@ -255,6 +257,7 @@ def compute_bootstrap_interval(
     """
     if len(samples[0]) < 2:
         return None, None
+    # The import takes 0.5 s, for which the refusal of wrong inputs must not wait.
     from scipy.stats import bootstrap
 
     # scipy warns if all resamples are equal or if a denominator is 0.
@@ -306,10 +309,7 @@ class Difference:
 
 
 def pair_runs(runs_a: Sequence[RunRow], runs_b: Sequence[RunRow]) -> list[RunPair]:
-    """Return the pairs of runs with the same seed.
-
-    A run is omitted if the other mission has no run with the same seed.
-    """
+    """Return the pairs of runs with the same seed; a run without another run of its seed is omitted."""
     runs_by_seed = {run.seed: run for run in runs_b}
     return [RunPair(run.seed, run, runs_by_seed[run.seed]) for run in runs_a if run.seed in runs_by_seed]
 

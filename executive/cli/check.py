@@ -5,22 +5,20 @@ from __future__ import annotations
 import atexit
 import gc
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from itertools import compress
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from executive.cli.options import check_usage, json_option, mission_argument, overrides_option
 from executive.cli.streams import keep_stdout_clean, print_json
-from executive.errors import ExitCode
+from executive.errors import ExitCode, InputError
 
 if TYPE_CHECKING:
-    from executive.cell.protocols import Cell
     from executive.mission.analysis import UnhandledFailure
-    from executive.mission.findings import Finding
 
 
 @click.command(name="check")
@@ -34,8 +32,8 @@ def check_command(missions: tuple[str, ...], overrides: dict[str, str], as_json:
     that can end its run. Exit code 2 if a mission has errors.
     """
     with keep_stdout_clean():
-        from executive.errors import InputError
-        from executive.mission.findings import MAX_LISTED_FINDINGS, Finding, MissionError
+        # The imports take 0.3 s, for which `--help` must not wait.
+        from executive.mission.findings import MAX_LISTED_FINDINGS, Finding, MissionError, describe_findings
         from executive.mission.load import load_mission
         from executive.plugins import load_cell_kind, load_skills
 
@@ -46,18 +44,22 @@ def check_command(missions: tuple[str, ...], overrides: dict[str, str], as_json:
         reports: list[dict[str, Any]] = []
         texts = []
         for mission in missions:
+            failures: Sequence[UnhandledFailure] = ()
+            is_valid = False
             try:
                 loaded = load_mission(mission, skills, overrides, load_cell_kind)
-                findings, failures, is_valid = loaded.warnings, loaded.unhandled_failures, True
-                texts.append(_describe_mission(mission, findings, failures))
+                findings = loaded.warnings
+                failures = loaded.unhandled_failures
+                is_valid = True
+                lines = [*describe_findings(findings), f"{mission}: ok", *_list_failure_lines(failures)]
+                texts.append("\n".join(lines))
             except InputError as error:
                 missing_mission = Finding(mission, 0, 0, "error", "no-mission", str(error))
                 findings = error.findings if isinstance(error, MissionError) else (missing_mission,)
-                failures, is_valid = (), False
                 texts.append(str(error))
             listed_findings = findings[:MAX_LISTED_FINDINGS]
             entries = [{**asdict(finding), "excerpt": finding.shown_excerpt} for finding in listed_findings]
-            endings = [*map(asdict, failures)]
+            endings = list(map(asdict, failures))
             reports.append({"mission": mission, "ok": is_valid, "findings": entries, "endings": endings})
     if as_json:
         print_json(reports)
@@ -66,22 +68,19 @@ def check_command(missions: tuple[str, ...], overrides: dict[str, str], as_json:
     return ExitCode.SUCCESS if all(report["ok"] for report in reports) else ExitCode.INVALID_INPUT
 
 
-def _describe_mission(mission: str, warnings: Sequence[Finding], failures: Sequence[UnhandledFailure]) -> str:
-    """Return a text with the warnings of a valid mission, and with the failures that can end its run."""
-    from executive.mission.findings import describe_findings
-
-    lines = [*describe_findings(warnings), f"{mission}: ok"]
-    if failures:
-        lines.append("  no node handles these failures; each would end the mission:")
-        # If a mission uses a subtree twice, the failures of the subtree are listed once.
-        reasons_by_place: dict[tuple[str, str, int], dict[str, None]] = {}
-        for failure in failures:
-            place = (failure.source, failure.path, failure.line)
-            reasons_by_place.setdefault(place, {})[failure.reason] = None
-        descriptions = {place: f"{place[0]}: {', '.join(names)}" for place, names in reasons_by_place.items()}
-        width = max(map(len, descriptions.values()))
-        lines += [f"    {text:{width}}  {path}:{line}" for (_, path, line), text in descriptions.items()]
-    return "\n".join(lines)
+def _list_failure_lines(failures: Sequence[UnhandledFailure]) -> Iterator[str]:
+    """Yield the lines about the failures that can end the run of a valid mission."""
+    if not failures:
+        return
+    yield "  no node handles these failures; each would end the mission:"
+    # If a mission uses a subtree twice, the failures of the subtree are listed once.
+    reasons_by_place: dict[tuple[str, str, int], dict[str, None]] = {}
+    for failure in failures:
+        place = (failure.source, failure.path, failure.line)
+        reasons_by_place.setdefault(place, {})[failure.reason] = None
+    descriptions = {place: f"{place[0]}: {', '.join(names)}" for place, names in reasons_by_place.items()}
+    width = max(map(len, descriptions.values()))
+    yield from (f"    {text:{width}}  {path}:{line}" for (_, path, line), text in descriptions.items())
 
 
 @click.command(name="tree")
@@ -115,6 +114,7 @@ def tree_command(
     redundancy_message = f"{''.join(formats)} always contains ports and reasons; omit {' and '.join(details)}"
     check_usage((len(formats) > 1, conflict_message), (formats and details, redundancy_message))
     with keep_stdout_clean():
+        # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.events import discard_event
         from executive.mission.build import build_tree
         from executive.mission.load import load_mission
@@ -128,14 +128,15 @@ def tree_command(
 
         loaded = load_mission(mission, load_skills(), overrides)
         # No node of the tree is executed, so that none needs a clock or a ledger.
-        placeholder_cell = cast("Cell", SimpleNamespace(clock=None, ledger=None))
+        placeholder_cell: Any = SimpleNamespace(clock=None, ledger=None)
         nodes = make_outline(build_tree(loaded, loaded.skills, placeholder_cell, Blackboard(), discard_event))
         nodes = fold_subtrees(nodes) if fold else nodes
         match "".join(formats).removeprefix("--format ").removeprefix("--"):
             case "svg":
                 output = make_svg(nodes, loaded.mission.name)
             case "json":
-                output, as_json = json.loads(format_tree(nodes)), True
+                output = json.loads(format_tree(nodes))
+                as_json = True
             case "btcpp":
                 output = format_btcpp(loaded.mission, loaded.skills)
             case _:
@@ -157,6 +158,7 @@ def schema_command(cell: bool, library: bool, journal: bool) -> None:
     if cell + library + journal > 1:
         raise click.UsageError("--cell, --library and --journal exclude each other; give one of them")
     with keep_stdout_clean():
+        # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
         from executive.plugins import load_skills
         from executive.record.journal import make_journal_schema

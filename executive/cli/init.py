@@ -39,23 +39,6 @@ def write_project(folder: Path, package: str) -> list[str]:
     # This import takes 0.06 s, which `executive --help` must not take.
     from jinja2 import Environment, StrictUndefined
 
-    _require_empty(folder)
-    # The files are code and YAML, in which HTML escapes would be wrong.
-    templates = Environment(autoescape=False, undefined=StrictUndefined, keep_trailing_newline=True)
-    files = {
-        _map_path(file, package): templates.from_string(file.read_text(encoding="utf-8")).render(name=package)
-        for file in sorted(TEMPLATE.rglob(f"*{SUFFIX}"))
-    }
-    for path_in_project, text in files.items():
-        path = folder / path_in_project
-        with explain_os_errors(InputError, f"{path} cannot be written", "name a writable folder"):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
-    return list(files)
-
-
-def _require_empty(folder: Path) -> None:
-    """Raise an InputError if `folder` is a file or contains files."""
     advice = "name a folder that is empty or does not exist"
     if folder.is_file():
         raise InputError(f'"{folder}" is a file; {advice}')
@@ -63,12 +46,19 @@ def _require_empty(folder: Path) -> None:
     if entries:
         more_text = f" and {len(entries) - 1} more" if entries[1:] else ""
         raise InputError(f'the folder "{folder}" is not empty: it contains {entries[0]}{more_text}; {advice}')
-
-
-def _map_path(file: Path, package: str) -> str:
-    """Return the path of a project file, relative to the project, for the path of a template file."""
-    parts = file.relative_to(TEMPLATE).with_suffix("").parts
-    return str(PurePosixPath(*(package if part == PACKAGE else part for part in parts)))
+    # The files are code and YAML, in which HTML escapes would be wrong.
+    templates = Environment(autoescape=False, undefined=StrictUndefined, keep_trailing_newline=True)
+    names = []
+    for template in sorted(TEMPLATE.rglob(f"*{SUFFIX}")):
+        parts = template.relative_to(TEMPLATE).with_suffix("").parts
+        name = PurePosixPath(*(package if part == PACKAGE else part for part in parts))
+        text = templates.from_string(template.read_text(encoding="utf-8")).render(name=package)
+        path = folder / name
+        with explain_os_errors(InputError, f"{path} cannot be written", "name a writable folder"):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        names.append(str(name))
+    return names
 
 
 def make_package_name(folder: Path) -> str:

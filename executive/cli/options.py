@@ -36,7 +36,7 @@ def _parse_variations(
     ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
 ) -> dict[str, tuple[str, ...]]:
     """Return the values of options `--vary KEY=[VALUE, ...]` by key, as texts for `--set`."""
-    import yaml  # Imported here, because other commands start faster without it.
+    import yaml  # The import takes 0.1 s, for which other commands must not wait.
 
     variations: dict[str, tuple[str, ...]] = {}
     for key, text in _parse_overrides(ctx, param, values).items():
@@ -59,7 +59,8 @@ def _parse_seed_range(text: str) -> range:
     match = re.fullmatch(r"(\d{1,10})(?:([-:])(\d{1,10}))?", text)
     if match is None:
         raise click.BadParameter(f'"{text}" is not a range of seeds, for example 0:100 or 0-99')
-    first, last = int(match[1]), int(match[3] or match[1]) - (match[2] == ":")
+    first = int(match[1])
+    last = int(match[3] or match[1]) - (match[2] == ":")
     if last < first:
         end = f"the end {match[3]} is excluded" if match[2] == ":" else f"{last} is less than {first}"
         raise click.BadParameter(f'"{text}" contains no seed: {end}')
@@ -146,11 +147,6 @@ _SWEEP_OPTIONS = (
     overrides_option, scene_option, runs_option, json_option,
 )  # fmt: skip
 """Options that the commands `sweep` and `compare` share."""
-_SWEEP_SETTINGS = {
-    "mission", "missions", "seeds", "save_images", "scene",
-    "variations", "overrides", "overrides_a", "overrides_b",
-}  # fmt: skip
-"""Parameters of `sweep` and `compare` whose values `--resume` reads from the results."""
 
 
 def add_sweep_options(command: CommandT) -> CommandT:
@@ -166,23 +162,9 @@ def check_disjoint(overrides: Mapping[str, str], options: str, values: Mapping[s
         raise click.UsageError(f"{key} is set with --set and also with {options}; omit one of them")
 
 
-def check_resume(
-    ctx: click.Context, *, has_missions_and_seeds: bool, required_arguments: str, resumed_settings_text: str
-) -> None:
-    """Check that the command line gives either missions and seeds, or `--resume`, but not both.
-
-    Args:
-        ctx: Context of the command.
-        has_missions_and_seeds: True if the command line gives missions and seeds.
-        required_arguments: Arguments that the command needs, for the message.
-        resumed_settings_text: Settings that `--resume` reads, and their source, for the message.
-    """
-    is_resume, names = ctx.params["resume"] is not None, ctx.params.keys() & _SWEEP_SETTINGS
-    has_settings = any(ctx.get_parameter_source(name) is not ParameterSource.DEFAULT for name in names)
-    check_usage(
-        (not is_resume and not has_missions_and_seeds, f"give {required_arguments}"),
-        (is_resume and has_settings, f"--resume takes {resumed_settings_text}; omit them"),
-    )
+def is_any_given(ctx: click.Context, *names: str) -> bool:
+    """Return True if the command line gives a value for one of these parameters."""
+    return any(ctx.get_parameter_source(name) is not ParameterSource.DEFAULT for name in names)
 
 
 def check_video(file: Path, cell_kind: str, *, force: bool) -> None:

@@ -6,23 +6,12 @@ import contextlib
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from executive.cli import options
-from executive.cli.options import json_option, runs_option
 from executive.cli.streams import keep_stdout_clean, open_unescaped_stderr, print_json
 from executive.errors import ExitCode
-
-if TYPE_CHECKING:
-    from executive.errors import ExitCode
-    from executive.events import RunStarted
-    from executive.mission.load import LoadedMission
-    from executive.record.recorded_run import RecordOptions
-    from executive.record.result import Result
-    from executive.run.assembly import RunOptions
-    from executive.view.terminal import LineView, TerminalView
 
 
 @click.command(name="run")
@@ -54,8 +43,7 @@ def run_command(
 
     MISSION is a file or the name of a shipped mission.
     """
-    option_sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests", "scene"))
-    has_mission_options = any(source is not click.core.ParameterSource.DEFAULT for source in option_sources)
+    has_mission_options = options.is_any_given(ctx, "mission", "seed", "overrides", "requests", "scene")
     has_keyboard = sys.stdin is not None and sys.stdin.isatty()
     settings_text = "mission, seed, params, requests and scene from the run"
     pauses_forever = paused and not has_page and (quiet or not has_keyboard)
@@ -67,17 +55,29 @@ def run_command(
         (gui and not os.environ.get("DISPLAY"), "--gui needs a display, but DISPLAY is not set; omit --gui"),
     )
     with keep_stdout_clean():
+        # The imports take half a second, for which `--help` and wrong options must not wait.
+        from rich.console import Console
+
         from executive.cell.json_values import to_json
+        from executive.mission.load import load_mission
+        from executive.plugins import load_cell_kind, load_skills
         from executive.record.diagnosis import format_diagnosis
+        from executive.record.journal import find_run_start, read_journal
         from executive.record.recorded_run import GuardedView, RecordOptions, record_run
         from executive.record.result import find_exit_code
         from executive.record.run_directory import RunDirectory, find_run, read_cell
         from executive.run.assembly import RunOptions
+        from executive.view import terminal
         from executive.view.live_page import LivePage
         from executive.view.report import try_write_report
-        from executive.view.terminal import describe_end, format_repeat_command, format_summary
 
-        terminal_view = None if quiet else _make_terminal_view(has_keyboard)
+        console = Console(file=open_unescaped_stderr())
+        is_redrawn = sys.stderr.isatty() and console.is_terminal and not console.is_dumb_terminal
+        terminal_view: terminal.TerminalView | terminal.LineView | None = None
+        if is_redrawn and not quiet:
+            terminal_view = terminal.TerminalView(console, sys.stdin.fileno() if has_keyboard else None)
+        elif not quiet:
+            terminal_view = terminal.LineView(sys.stderr)
         with contextlib.ExitStack() as exit_stack:
             page = LivePage() if has_page else None
             if page is not None:
@@ -90,21 +90,35 @@ def run_command(
                 is_realtime=realtime, scene=scene,
             )  # fmt: skip
             if mission is None:
+                # Only a resumption needs the replay.
+                from executive.record.replayed_run import resume_run
+
                 assert resume is not None
                 path = find_run(resume, runs_folder)
                 if video is not None:
                     options.check_video(video, read_cell(path).kind, force=force)
-                result, start_event = _resume(path, run_options, record)
-                repeat_arguments = start_event.file, start_event.seed, start_event.overrides
+                result = resume_run(path, load_skills(), run_options, record)
+                events = read_journal(path / "journal.jsonl")
+                start_event = find_run_start(events, path, "run the mission again")
+                repeat_arguments = (start_event.file, start_event.seed, start_event.overrides)
             else:
-                loaded_mission = _load_mission(mission, overrides, run_options, record)
+                loaded_mission = load_mission(mission, load_skills(), overrides, load_cell_kind)
+                for warning in loaded_mission.warnings if views else ():
+                    click.echo(str(warning), err=True)
+                if scene is not None:
+                    # The import loads the simulator. Only simulated cells read the scene file, but its errors
+                    # are reported for every cell.
+                    from executive.cells.sim.scene_file import load_scene
+
+                    load_scene(scene, loaded_mission.cell_config)
                 if video is not None:
                     options.check_video(video, loaded_mission.cell_config.kind, force=force)
                 result = record_run(loaded_mission, run_options, runs_folder, record)
-                repeat_arguments = mission, seed, overrides
+                repeat_arguments = (mission, seed, overrides)
             # The command that repeats the run also contains requests that the operator made during the run.
-            all_requests, used_scene = requests or result.requests, RunDirectory(Path(result.run)).scene
-            repeat_command = format_repeat_command(*repeat_arguments, all_requests, used_scene)
+            repeat_command = terminal.format_repeat_command(
+                *repeat_arguments, requests or result.requests, RunDirectory(Path(result.run)).scene
+            )
             report, report_problem = try_write_report(result.run)
             if page is not None:
                 page.finish(result, report and str(Path(report).resolve()))
@@ -114,12 +128,12 @@ def run_command(
             click.echo(f"note: {note}", err=True)
         if terminal_view is not None:
             items = terminal_view.timeline.items.list_items()
-            click.echo(format_summary(result, items, repeat_command, report), err=True, nl=False)
+            click.echo(terminal.format_summary(result, items, repeat_command, report), err=True, nl=False)
         elif result.diagnosis is not None:
             lines = format_diagnosis(result.diagnosis, result.run, repeat_command, report)
             click.echo("\n".join(lines), err=True)
         elif result.status == "INCOMPLETE" or result.disagreement:
-            end_description = describe_end(result.status, result.reason, result.node, result.message)
+            end_description = terminal.describe_end(result.status, result.reason, result.node, result.message)
             click.echo("\n".join(filter(None, (result.disagreement, end_description))), err=True)
     if as_json:
         print_json(to_json(result))
@@ -131,50 +145,6 @@ def run_command(
             write_video(Path(result.run), video)
             click.echo(f"video: {video}", err=True)
     return find_exit_code(result)
-
-
-def _load_mission(
-    mission: str, overrides: dict[str, str], run_options: RunOptions, record: RecordOptions
-) -> LoadedMission:
-    """Return a mission; check the scene file, and print the warnings of the mission if there are views."""
-    from executive.mission.load import load_mission
-    from executive.plugins import load_cell_kind, load_skills
-
-    loaded_mission = load_mission(mission, load_skills(), overrides, load_cell_kind)
-    for warning in loaded_mission.warnings if record.views else ():
-        click.echo(str(warning), err=True)
-    if run_options.scene is not None:
-        from executive.cells.sim.scene_file import load_scene
-
-        # Only simulated cells read the scene file, but its errors are reported for every cell.
-        load_scene(run_options.scene, loaded_mission.cell_config)
-    return loaded_mission
-
-
-def _resume(path: Path, run_options: RunOptions, record: RecordOptions) -> tuple[Result, RunStarted]:
-    """Resume an interrupted run; return the result and the start event of the run."""
-    from executive.plugins import load_skills
-    from executive.record.journal import find_run_start, read_journal
-    from executive.record.replayed_run import resume_run
-
-    result = resume_run(path, load_skills(), run_options, record)
-    return result, find_run_start(read_journal(path / "journal.jsonl"), path, "run the mission again")
-
-
-def _make_terminal_view(has_keyboard: bool) -> LineView | TerminalView:
-    """Return a view that redraws the terminal; if stderr is no terminal, return a view that prints lines."""
-    from executive.view.terminal import LineView
-
-    if sys.stderr.isatty():
-        # The import of `rich` takes 0.06 s, and only a terminal needs `rich`.
-        from rich.console import Console
-
-        from executive.view.terminal import TerminalView
-
-        console = Console(file=open_unescaped_stderr())
-        if console.is_terminal and not console.is_dumb_terminal:
-            return TerminalView(console, sys.stdin.fileno() if has_keyboard else None)
-    return LineView(sys.stderr)
 
 
 @click.command(name="replay")
@@ -197,6 +167,7 @@ def replay_command(
     also after a halt or an interruption.
     """
     with keep_stdout_clean():
+        # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.plugins import load_skills
         from executive.record.journal import read_journal
         from executive.record.replayed_run import replay_run
@@ -220,8 +191,8 @@ def replay_command(
 
 @click.command(name="report")
 @click.argument("run", metavar="RUN")
-@runs_option
-@json_option
+@options.runs_option
+@options.json_option
 def report_command(run: str, runs_folder: Path, as_json: bool) -> None:
     """Write the report of a recorded run.
 
@@ -229,6 +200,7 @@ def report_command(run: str, runs_folder: Path, as_json: bool) -> None:
     ends; this command writes the report again, or for the first time if the run was killed.
     """
     with keep_stdout_clean():
+        # The imports take half a second, for which `--help` must not wait.
         from executive.record.run_directory import find_run
         from executive.view.report import write_report
 

@@ -13,11 +13,10 @@ import click
 
 from executive.cli.options import json_option
 from executive.cli.streams import keep_stdout_clean, print_json
-from executive.errors import ExitCode
+from executive.errors import ExitCode, InputError
 
 if TYPE_CHECKING:
     from executive.skill import Param, Port, Skill
-    from executive.testing.conformance import Check
 
 _LINE_WIDTH = 100
 """Maximum length of a line [characters]."""
@@ -37,7 +36,7 @@ def skills_command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
     fails or cannot be run.
     """
     with keep_stdout_clean():
-        from executive.errors import InputError
+        # The imports take 0.2 s, for which `--help` must not wait.
         from executive.mission.findings import suggest_choice
         from executive.plugins import load_skills
 
@@ -57,16 +56,24 @@ def skills_command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
 
 
 def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
-    """Check skills, print the results after each skill, and return True if all checks passed."""
+    """Check skills, print the result of each check, and return True if all checks passed."""
+    with keep_stdout_clean():
+        # Only this check needs the work cells, whose import takes half a second.
+        from executive.testing.conformance import list_conformance_checks
+
     verdicts: list[dict[str, Any]] = []
     for name, skill in skills.items():
-        with keep_stdout_clean():
-            from executive.testing.conformance import list_conformance_checks
-
-            skill_verdicts = [_run_check(check) for check in list_conformance_checks(skill, name=name)]
-        if not as_json:
-            click.echo("\n".join(map(_describe_verdict, skill_verdicts)))
-        verdicts += skill_verdicts
+        for check in list_conformance_checks(skill, name=name):
+            with keep_stdout_clean():
+                problems = check.find_problems()
+            status = "failed" if problems else "ok"
+            rule = check.rule.__name__
+            summary = (check.rule.__doc__ or "").partition("\n")[0]
+            verdicts.append(
+                {"skill": name, "check": rule, "doc": summary, "status": status, "problems": problems}
+            )
+            if not as_json:
+                click.echo(": ".join([f"{status:7}  {name}.{rule}", *problems[:1]]))
     failed_count = sum(verdict["status"] != "ok" for verdict in verdicts)
     if as_json:
         print_json(verdicts)
@@ -77,26 +84,9 @@ def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool
     return not failed_count
 
 
-def _run_check(check: Check) -> dict[str, Any]:
-    """Run a check, and return names, rule, status (`ok` or `failed`) and violations as JSON values."""
-    problems = check.find_problems()
-    return {
-        "skill": check.runs.name,
-        "check": check.rule.__name__,
-        "doc": (check.rule.__doc__ or "").partition("\n")[0],
-        "status": "failed" if problems else "ok",
-        "problems": problems,
-    }
-
-
-def _describe_verdict(verdict: Mapping[str, Any]) -> str:
-    """Return a line about a check: status, skill, name of the check, and first problem of a failed check."""
-    line = f"{verdict['status']:7}  {verdict['skill']}.{verdict['check']}"
-    return ": ".join([line, *verdict["problems"][:1]])
-
-
 def collect_declarations(name: str, skill: type[Skill]) -> Declaration:
     """Return a skill's declaration as JSON values; `tool.left` is the tool state after each failure."""
+    # The skills have imported pydantic, for which `--help` must not wait.
     from pydantic_core import to_json
 
     state_before, state_after = skill.tool_state

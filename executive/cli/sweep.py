@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import functools
 import re
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from executive.cli import options
 from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import ExitCode
-
-if TYPE_CHECKING:
-    from executive.campaign.results import ResultsDatabase
 
 
 @click.command(name="sweep")
@@ -45,45 +41,41 @@ def sweep_command(
     not met. Ctrl-C ends the current runs; then the results of the complete runs are printed. A second Ctrl-C
     quits immediately.
     """
-    options.check_resume(
-        ctx, has_missions_and_seeds=None not in (mission, seeds),
-        required_arguments="a MISSION and --seeds, or --resume SWEEP",
-        resumed_settings_text="mission, seeds and settings from the sweep",
-    )  # fmt: skip
+    names = ("mission", "seeds", "variations", "overrides", "save_images", "scene")
+    has_settings = resume is not None and options.is_any_given(ctx, *names)
+    lacks_input = resume is None and (mission is None or seeds is None)
+    options.check_usage(
+        (lacks_input, "give a MISSION and --seeds, or --resume SWEEP"),
+        (has_settings, "--resume takes mission, seeds and settings from the sweep; omit them"),
+    )
     options.check_disjoint(overrides, "--vary", variations)
     with keep_stdout_clean():
-        from executive.campaign.requirement import describe_unmet_conditions, parse_requirement, write_junit
-        from executive.campaign.results_page import write_page
-        from executive.campaign.sweep import (
-            create_sweep,
-            make_repeat_command,
-            make_settings,
-            open_sweep,
-            read_results,
-        )
+        # The imports take half a second, for which `--help` and wrong options must not wait.
+        from executive.campaign import sweep_reports
+        from executive.campaign.jobs import JobOptions
+        from executive.campaign.sweep import create_sweep, make_settings, open_sweep, read_results, run_sweep
         from executive.cell.json_values import to_json
-        from executive.cli.tables import print_report
+        from executive.cli.progress import print_halt, print_report, show_progress
 
-        conditions = parse_requirement(require) if require else ()
+        conditions = sweep_reports.parse_requirement(require) if require else ()
         if resume is not None:
             database = open_sweep(resume)
         else:
-            assert mission is not None and seeds is not None
+            assert mission is not None
+            assert seeds is not None
             settings = make_settings(mission, seeds, overrides, variations, scene, save_images)
             database = create_sweep(settings, runs_folder)
         with closing(database):
             click.echo(f"results: {database.path}", err=True)
-            execute_missing_runs(database, workers, cluster)
+            with show_progress(database.settings.mission) as progress:
+                run_sweep(database, JobOptions(workers, progress, print_halt), cluster)
             results = read_results(database)
-            from executive.cli.tables import render_summary
-
-            print_report(render_summary(results.summaries, results.planned_run_count))
-            page = write_page(database.path.parent, [results])
-            click.echo(f"page: {page}", err=True)
-            if junit is not None:
-                make_command = functools.partial(make_repeat_command, results.settings)
-                write_junit(junit, results.settings.mission_name, results.runs, make_command)
-        unmet_conditions = describe_unmet_conditions(conditions, results.runs, results.summaries)
+        print_report(sweep_reports.render_summary(results))
+        page = sweep_reports.write_page(database.path.parent, [results])
+        click.echo(f"page: {page}", err=True)
+        if junit is not None:
+            sweep_reports.write_junit(junit, results)
+        unmet_conditions = sweep_reports.describe_unmet_conditions(conditions, results)
         for message in unmet_conditions:
             click.echo(message, err=True)
     if as_json:
@@ -93,28 +85,6 @@ def sweep_command(
             "variants": results.summaries, "unmet_conditions": unmet_conditions, "runs": results.runs,
         }))  # fmt: skip
     return ExitCode.HALTED if results.is_incomplete else ExitCode(int(bool(unmet_conditions)))
-
-
-def execute_missing_runs(
-    database: ResultsDatabase, workers: int, cluster: str | None, side: str = ""
-) -> None:
-    """Execute the missing runs of a sweep, and store their results.
-
-    Args:
-        database: Database of the sweep.
-        workers: Number of worker processes.
-        cluster: Address of a dask scheduler, whose workers execute the runs, or None.
-        side: `A` or `B` in a comparison, else "".
-    """
-    from executive.campaign.jobs import JobOptions, list_jobs
-    from executive.campaign.sweep import run_sweep
-    from executive.cli.tables import print_halt, show_progress
-
-    mission, jobs = database.settings.mission, list_jobs(database.settings, database.path.parent)
-    stored_indices = {run.run_index for run in database.read_runs()}
-    missing_jobs = [job for job in jobs if job.index not in stored_indices]
-    with show_progress(f"{side}: {mission}" if side else mission) as progress:
-        run_sweep(missing_jobs, database, JobOptions(workers, progress, print_halt), cluster)
 
 
 @click.command(name="compare")
@@ -139,50 +109,53 @@ def compare_command(
     b/results.sqlite in a folder below --runs. Each difference has a 95 % confidence interval.
     Ctrl-C ends the current runs; then the results of the complete pairs are printed.
     """
-    options.check_resume(
-        ctx, has_missions_and_seeds=len(missions) in (1, 2) and seeds is not None,
-        required_arguments="one or two missions and --seeds, or --resume FOLDER",
-        resumed_settings_text="missions, seeds and settings from the comparison",
-    )  # fmt: skip
+    names = ("missions", "seeds", "overrides", "overrides_a", "overrides_b", "save_images", "scene")
+    has_settings = resume is not None and options.is_any_given(ctx, *names)
+    lacks_input = resume is None and (len(missions) not in (1, 2) or seeds is None)
+    options.check_usage(
+        (lacks_input, "give one or two missions and --seeds, or --resume FOLDER"),
+        (has_settings, "--resume takes missions, seeds and settings from the comparison; omit them"),
+    )
     options.check_disjoint(overrides, "--set-a or --set-b", {**overrides_a, **overrides_b})
     with keep_stdout_clean():
-        from executive.campaign.results_page import write_missing_reports, write_page
-        from executive.campaign.sweep import create_comparison, make_settings, open_comparison, read_results
+        # The imports take half a second, for which `--help` and wrong options must not wait.
+        from executive.campaign import sweep, sweep_reports
+        from executive.campaign.jobs import JobOptions
         from executive.campaign.sweep_summary import SweepResults, compute_differences, pair_runs
         from executive.cell.json_values import to_json
-        from executive.cli.tables import print_report
+        from executive.cli.progress import print_halt, print_report, show_progress
 
         if resume is not None:
-            databases = open_comparison(resume)
+            databases = sweep.open_comparison(resume)
         else:
             assert seeds is not None
             settings = [
-                make_settings(mission, seeds, {**overrides, **own_overrides}, {}, scene, save_images)
+                sweep.make_settings(mission, seeds, {**overrides, **own_overrides}, {}, scene, save_images)
                 for mission, own_overrides in ((missions[0], overrides_a), (missions[-1], overrides_b))
             ]
-            databases = create_comparison(settings, runs_folder)
-        sweeps: list[SweepResults] = []
+            databases = sweep.create_comparison(settings, runs_folder)
+        results: list[SweepResults] = []
         for side, database in zip("AB", databases, strict=True):
             with closing(database):
-                if not any(sweep.is_incomplete for sweep in sweeps):
-                    execute_missing_runs(database, workers, cluster, side)
-                sweeps.append(read_results(database, side))
-        pairs = pair_runs(sweeps[0].runs, sweeps[1].runs)
-        differences, changed_pairs = compute_differences(pairs), [pair for pair in pairs if pair.is_changed]
-        write_missing_reports(changed_pairs)
-        page = write_page(databases[0].path.parents[1], sweeps, differences, changed_pairs)
-        from executive.cli.tables import render_differences
-
-        print_report(render_differences(differences, changed_pairs, len(pairs)))
+                if not any(result.is_incomplete for result in results):
+                    with show_progress(f"{side}: {database.settings.mission}") as progress:
+                        sweep.run_sweep(database, JobOptions(workers, progress, print_halt), cluster)
+                results.append(sweep.read_results(database, side))
+        pairs = pair_runs(results[0].runs, results[1].runs)
+        differences = compute_differences(pairs)
+        changed_pairs = [pair for pair in pairs if pair.is_changed]
+        sweep_reports.write_missing_reports(changed_pairs)
+        page = sweep_reports.write_page(databases[0].path.parents[1], results, differences, changed_pairs)
+        print_report(sweep_reports.render_differences(differences, changed_pairs, len(pairs)))
         click.echo(f"page: {page}", err=True)
     if as_json:
         print_json(to_json({
-            "settings": [sweep.settings for sweep in sweeps],
+            "settings": [result.settings for result in results],
             "results": [str(database.path) for database in databases], "page": str(page),
             "pair_count": len(pairs), "differences": differences, "changed_pairs": changed_pairs,
-            "summaries": [summary for sweep in sweeps for summary in sweep.summaries],
+            "summaries": [summary for result in results for summary in result.summaries],
         }))  # fmt: skip
-    return ExitCode.HALTED if any(sweep.is_incomplete for sweep in sweeps) else ExitCode.SUCCESS
+    return ExitCode.HALTED if any(result.is_incomplete for result in results) else ExitCode.SUCCESS
 
 
 def parse_fault_numbers(text: str) -> tuple[int, ...]:
@@ -221,9 +194,10 @@ def faults_command(
     has_conflict = sum((pairs is not None, fault_numbers is not None, list_only)) > 1
     options.check_usage((has_conflict, "--pairs, --fault and --list exclude each other; give one of them"))
     with keep_stdout_clean():
+        # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.campaign import faults as fault_campaign
         from executive.campaign.jobs import JobOptions, load_mission_under_test
-        from executive.cli.tables import print_halt, show_progress
+        from executive.cli.progress import print_halt, show_progress
 
         mission_under_test = load_mission_under_test(mission, overrides, oracle, seed)
         with show_progress("faults", quiet=as_json or list_only or fault_numbers is not None) as progress:

@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import time
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from executive.cli import options
-from executive.cli.options import COUNT, FILE, FOLDER, seed_option, workers_option
 from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import InputError
+
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
+"""File name suffixes of the formats in which the worst mistakes can be saved."""
 
 
 @click.command(name="dataset")
 @click.argument("cells", metavar="CELL...", nargs=-1, required=True)
-@click.option("--out", type=FOLDER, required=True, help="Folder of the dataset.")
-@click.option("--images", type=COUNT, default=1000, help="Number of images.")
-@seed_option
+@click.option("--out", type=options.FOLDER, required=True, help="Folder of the dataset.")
+@click.option("--images", type=options.COUNT, default=1000, help="Number of images.")
+@options.seed_option
 @click.option(
     "--format", "dataset_format", type=click.Choice(["coco", "yolo"]), default="coco",
     help="Format of the dataset: COCO or YOLO, as exported by Roboflow.",
 )  # fmt: skip
-@workers_option
+@options.workers_option
 @click.option("--valid", type=click.FloatRange(0, 1), default=0.1, help="Fraction of images for validation.")
 def dataset_command(
     cells: tuple[str, ...], out: Path, images: int, seed: int, dataset_format: str, workers: int, valid: float
@@ -34,11 +35,12 @@ def dataset_command(
     The images show random scenes of each CELL (a cell file or the name of a shipped cell) in turn.
     """
     with keep_stdout_clean():
+        # The imports take a second, for which `--help` and wrong options must not wait.
         from executive.campaign.evaluation import load_cells
-        from executive.cli.tables import show_progress
+        from executive.cli.progress import show_progress
         from executive.training.rendering import generate_dataset
 
-        configs = load_cells(cells)
+        configs = list(load_cells(cells).values())
         with show_progress("rendering") as progress:
             generate_dataset(
                 configs, out, image_count=images, seed=seed, layout=dataset_format, worker_count=workers,
@@ -49,20 +51,20 @@ def dataset_command(
 
 @click.command(name="train")
 @click.option(
-    "--dataset", type=FOLDER, required=True,
+    "--dataset", type=options.FOLDER, required=True,
     help="COCO or YOLO dataset, from `executive dataset` or an export of an annotation tool.",
 )  # fmt: skip
-@click.option("--out", type=FOLDER, required=True, help="Folder for model, checkpoints and metrics.")
+@click.option("--out", type=options.FOLDER, required=True, help="Folder for model, checkpoints and metrics.")
 @click.option(
-    "--from", "model", type=FILE, metavar="MODEL",
+    "--from", "model", type=options.FILE, metavar="MODEL",
     help="Model file (.onnx or .pth) to fine-tune; by default, training starts from random weights.",
 )  # fmt: skip
 @click.option(
     "--rate", type=click.FloatRange(min=0, min_open=True),
     help="Learning rate; by default 1e-4 if --from is a model for the same classes, else 3e-4.",
 )  # fmt: skip
-@click.option("--epochs", type=COUNT, default=20, help="Number of passes over the dataset.")
-@seed_option
+@click.option("--epochs", type=options.COUNT, default=20, help="Number of passes over the dataset.")
+@options.seed_option
 def train_command(
     dataset: Path, out: Path, model: Path | None, rate: float | None, epochs: int, seed: int
 ) -> None:
@@ -70,8 +72,14 @@ def train_command(
 
     Needs the extra `train`: uv sync --extra train (a download of about 3 GB on Linux).
     """
+
+    def print_epoch(epoch: int, metrics: dict[str, float]) -> None:
+        values = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
+        click.echo(f"epoch {epoch} of {epochs}: {values}", err=True)
+
     with keep_stdout_clean():
-        from executive.cli.tables import show_progress
+        # The imports take a second, for which `--help` and wrong options must not wait.
+        from executive.cli.progress import show_progress
         from executive.training.train import load_dataset, train
 
         splits = load_dataset(dataset)
@@ -80,7 +88,7 @@ def train_command(
         with show_progress("training") as progress:
             train(
                 splits, out, start_model=model, learning_rate=rate, epochs=epochs, seed=seed,
-                report_epoch=partial(_print_epoch, epochs), report_batch=progress,
+                report_epoch=print_epoch, report_batch=progress,
             )  # fmt: skip
         click.echo(
             "add these lines to the cell file, with paths relative to the folder of the cell file:\n\n"
@@ -88,15 +96,6 @@ def train_command(
             f"    model_path: {out / 'model.onnx'}\n    labels: {out / 'labels.txt'}",
             err=True,
         )
-
-
-def _print_epoch(epoch_count: int, epoch: int, metrics: dict[str, float]) -> None:
-    values = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
-    click.echo(f"epoch {epoch} of {epoch_count}: {values}", err=True)
-
-
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
-"""File name suffixes of the formats in which the worst mistakes can be saved."""
 
 
 @click.command(name="evaluate")
@@ -177,9 +176,11 @@ def evaluate_command(
     has_run_conditions = threshold is None and view == "table" and not (weights or varied or scene)
     is_stored = bool(cells) and has_run_conditions and (out is not None or not overrides)
     with keep_stdout_clean():
+        # The imports take a second, for which `--help` and wrong options must not wait.
         from executive.campaign import evaluation
-        from executive.campaign.evaluation import find_cell, load_cells
-        from executive.cli.tables import print_report, show_progress
+        from executive.cli.progress import print_report, show_progress
+        from executive.training.dataset import save_image
+        from executive.training.evaluate import draw_sheet
         from executive.training.samples import LabelledDataset
         from executive.view.detector_results import list_metrics
 
@@ -189,13 +190,14 @@ def evaluate_command(
             click.echo(samples.summary, err=True)
         settings = evaluation.ImageSettings(samples, images, seed, varied, view, workers, scene, threshold)
         cell_names = cells or (() if dataset else ("overhead",))
-        configs = load_cells(cell_names, overrides)
-        configs_by_file = dict(zip(map(find_cell, cell_names), configs.values(), strict=True))
-        detectors = list(evaluation.list_detectors(configs_by_file, detector_name, weights, labels))
+        configs = evaluation.load_cells(cell_names, overrides)
+        detectors = list(evaluation.list_detectors(configs, detector_name, weights, labels))
         for detector in detectors:
             evaluation.check_detector(detector, settings)
         for detector in detectors:
-            name, start_time = detector.make_measurement_name(dataset), time.monotonic()
+            cell_name = detector.cell.cell if detector.cell else ""
+            name = " on ".join(filter(None, (cell_name, str(dataset or ""))))
+            start_time = time.monotonic()
             result = evaluation.measure_detector(detector, settings, worst_mistakes, show_progress)
             print_report(list_metrics(name, detector.name, result))
             kind = detector.configs[detector.name].kind
@@ -207,14 +209,11 @@ def evaluate_command(
                 weaknesses.append(f"the measurement of detector {detector.name} is not stored: {weakness}")
             else:
                 source = f"--dataset {dataset}" if dataset else f"--images {images} --seed {seed}"
-                arguments = f"--cell {detector.cell.cell} --detector {detector.name} {source}"
-                repeat, duration = f"executive evaluate {arguments}", time.monotonic() - start_time
+                repeat = f"executive evaluate --cell {detector.cell.cell} --detector {detector.name} {source}"
+                duration = time.monotonic() - start_time
                 path = evaluation.store_evaluation(detector, result, out, command=repeat, duration=duration)
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:
-            from executive.training.dataset import save_image
-            from executive.training.evaluate import draw_sheet
-
             save_image(sheet, draw_sheet(worst_mistakes, ", ".join(results)))
             click.echo(f"{sheet}: the {len(worst_mistakes)} worst mistakes", err=True)
     if as_json:

@@ -23,15 +23,29 @@ from executive.errors import Unavailable
 from executive.perception.detectors.detector_registry import build_detectors
 from executive.perception.envelope import FrameRange, compute_frame_statistics
 from executive.training.dataset import LabelledImage
-from executive.training.error_statistics import (
+from executive.training.metrics import (
     BoxMatch,
+    Distribution,
     ErrorStatistics,
+    Evaluation,
     RepeatedErrors,
     is_ignored,
     match_detections,
 )
-from executive.training.metrics import Distribution, Evaluation
 
+MIN_CONFIDENCE = 0.01
+"""Minimum confidence of the detections of a model file; the average precision needs low confidences."""
+MODEL_NAME = "model"
+"""Name of the detector that is built from a model file."""
+REQUEST_INTERVAL = 1.0
+"""Simulated time between two requests [s], similar to the time between two frames in a run."""
+ANSWER_TIMEOUT = 60.0
+"""Maximum simulated time from a request to its answer [s]."""
+WHOLE_IMAGE_CAMERA = CameraConfig(
+    mount="fixed", position=(0, 0, 1), look_at=(0, 0, 0), up=(1, 0, 0), fov_deg=60,
+    table_view=(0, 0, 64, 64), scan_poses=("none",),
+).model_copy(update={"table_view": (0, 0, 1 << 20, 1 << 20)})  # fmt: skip
+"""Camera for images of any size; `model_copy` does not validate the size of `table_view`."""
 MAX_COLUMN_COUNT = 6
 """Maximum number of tiles in a row of the sheet."""
 TILE_SIZE = 240
@@ -60,128 +74,8 @@ TRUE_COLOUR = "#56B4E9"
 """Colour of true boxes."""
 DETECTED_COLOUR = "#E69F00"
 """Colour of detected boxes."""
-
 Picture = NDArray[np.uint8]
 """An image `(H, W, 3)`, RGB."""
-
-
-@dataclass(frozen=True, eq=False)
-class Mistake:
-    """Detection error: missed object, false detection, wrong class, or offset of a correct detection.
-
-    Attributes:
-        severity: Visible fraction of a missed object (halved if truncated), confidence of a wrong detection,
-            or offset of a correct box divided by the longer side of the true box; 0 to 1.
-        text: Short description of the mistake.
-        box: Box around the mistake [pixel].
-        sample: The labelled image.
-        detections: All detections in the image at or above the threshold.
-    """
-
-    severity: float
-    text: str
-    box: Box
-    sample: LabelledImage
-    detections: tuple[Detection, ...]
-
-
-def collect_mistakes(
-    mistakes: list[Mistake], matches: Sequence[BoxMatch], sample: LabelledImage, max_count: int = 24
-) -> None:
-    """Add the mistakes in one image to `mistakes`, and keep the most severe `max_count`, sorted."""
-    mistakes += find_mistakes(matches, sample)
-    mistakes.sort(key=lambda mistake: -mistake.severity)
-    del mistakes[max_count:]
-
-
-def find_mistakes(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterator[Mistake]:
-    """Yield the mistakes in one image, including the position errors of correct detections."""
-    detections = tuple(match.detection for match in matches)
-    detected_objects = {match.object_index for match in matches}
-    for index, label in enumerate(sample.labels):
-        if index not in detected_objects:
-            fraction = sample.get_visible_fraction(index)
-            truncation = "" if sample.is_fully_inside(index) else ", truncated"
-            visibility = "" if fraction >= 0.995 else f", {fraction:.0%} visible"
-            text = f"{label} missed{visibility}{truncation}"
-            yield Mistake(fraction / (2 if truncation else 1), text, sample.boxes[index], sample, detections)
-    for match in matches:
-        box, severity = match.detection.box, match.detection.confidence
-        text = f"{match.detection.label} {severity:.2f}"
-        if match.is_correct:
-            offset = float(np.hypot(*match.offset))
-            size = max(match.box[2] - match.box[0], match.box[3] - match.box[1], 1.0)
-            severity, text = min(offset / size, 1.0), f"{match.detection.label} off by {offset:.1f} px"
-        elif match.object_index is None:
-            text = f"false detection: {text}"
-        else:
-            text = f"{sample.labels[match.object_index]} detected as {text}"
-        left, top, right, bottom = match.box
-        enclosing_box = min(box[0], left), min(box[1], top), max(box[2], right), max(box[3], bottom)
-        yield Mistake(severity, text, enclosing_box, sample, detections)
-
-
-def draw_sheet(mistakes: Sequence[Mistake], title: str) -> Picture:
-    """Return a picture with one tile per mistake; title and legend are in the header."""
-    column_count = min(MAX_COLUMN_COUNT, max(len(mistakes), 3))
-    row_count = max(math.ceil(len(mistakes) / column_count), 1)
-    column_width = TILE_SIZE + GAP
-    row_height = TILE_SIZE + CAPTION_HEIGHT + GAP
-    size = (HEADER_HEIGHT + row_count * row_height, GAP + column_count * column_width, 3)
-    sheet = np.full(size, BACKGROUND_COLOUR, np.uint8)
-    _write_text(sheet, f"{title}: {LEGEND if mistakes else 'no mistakes'}", GAP, HEADER_HEIGHT - GAP)
-    for index, mistake in enumerate(mistakes):
-        row, column = divmod(index, column_count)
-        left = GAP + column * column_width
-        top = HEADER_HEIGHT + row * row_height
-        bottom = top + TILE_SIZE
-        sheet[top:bottom, left : left + TILE_SIZE] = _draw_tile(mistake)
-        _write_text(sheet, f"{index + 1}. {mistake.text}"[:MAX_TEXT_LENGTH], left, bottom + 15)
-        _write_text(sheet, mistake.sample.file[:MAX_TEXT_LENGTH], left, bottom + 32)
-    return sheet
-
-
-def _draw_tile(mistake: Mistake) -> Picture:
-    """Return a crop around a mistake with true and detected boxes, `(TILE_SIZE, TILE_SIZE, 3)` RGB."""
-    import supervision as sv
-
-    left, top, right, bottom = mistake.box
-    crop_size = max(CROP_SCALE * max(right - left, bottom - top), MIN_CROP_SIZE)
-    crop_corner = np.array([left + right - crop_size, top + bottom - crop_size]) / 2
-    zoom = TILE_SIZE / crop_size
-    # The centre of pixel i is at i + 0.5 in the coordinates of boxes, and at i in the coordinates of OpenCV.
-    shift = zoom * (0.5 - crop_corner) - 0.5
-    matrix = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
-    image = mistake.sample.image[..., ::-1]  # The annotators expect BGR.
-    tile: Any = cv2.warpAffine(image, matrix, (TILE_SIZE, TILE_SIZE), flags=cv2.INTER_CUBIC)
-    detected_boxes = [detection.box for detection in mistake.detections]
-    for annotator, boxes, colour in (
-        (sv.BoxAnnotator, detected_boxes, DETECTED_COLOUR),
-        (sv.BoxCornerAnnotator, mistake.sample.boxes, TRUE_COLOUR),
-    ):
-        tile_boxes = ((np.array(boxes).reshape(-1, 2, 2) - crop_corner) * zoom).reshape(-1, 4)
-        detections = sv.Detections(tile_boxes, class_id=np.zeros(len(boxes), int))
-        tile = annotator(sv.Color.from_hex(colour), LINE_THICKNESS).annotate(tile, detections)
-    return np.asarray(tile[..., ::-1], dtype=np.uint8)
-
-
-def _write_text(picture: Picture, text: str, left: int, baseline: int) -> None:
-    cv2.putText(picture, text, (left, baseline), cv2.FONT_HERSHEY_SIMPLEX, 0.42, TEXT_COLOUR, 1, cv2.LINE_AA)
-
-
-MIN_CONFIDENCE = 0.01
-"""Minimum confidence of the detections of a model file; the average precision needs low confidences."""
-MODEL_NAME = "model"
-"""Name of the detector that is built from a model file."""
-REQUEST_INTERVAL = 1.0
-"""Simulated time between two requests [s], similar to the time between two frames in a run."""
-ANSWER_TIMEOUT = 60.0
-"""Maximum simulated time from a request to its answer [s]."""
-WHOLE_IMAGE_CAMERA = CameraConfig(
-    mount="fixed", position=(0, 0, 1), look_at=(0, 0, 0), up=(1, 0, 0), fov_deg=60,
-    table_view=(0, 0, 64, 64), scan_poses=("none",),
-).model_copy(update={"table_view": (0, 0, 1 << 20, 1 << 20)})  # fmt: skip
-"""Camera for images of any size; `model_copy` does not validate the size of `table_view`."""
 
 
 def evaluate(
@@ -198,18 +92,21 @@ def evaluate(
         mistakes: The worst mistakes so far, to which those in the images are added; None: no collection.
         cell: Cell whose workspace is measured: brightness, contrast and colours; None: no measurement.
     """
-    errors, repeated_errors = ErrorStatistics(localizer), RepeatedErrors(localizer)
+    errors = ErrorStatistics(localizer)
+    repeated_errors = RepeatedErrors(localizer)
     average_precision = AveragePrecision()
     statistics_of_frames: list[Mapping[str, float]] = []
     latencies: list[float] = []
     answer_counts: Counter[str] = Counter()
-    unavailable_count, unavailable_reason = 0, ""
+    unavailable_count = 0
+    unavailable_reason = ""
     for number, sample in enumerate(samples, 1):
         frame = sample.to_frame(number)
         try:
             answer, latency = detector.detect(frame)
         except Unavailable as error:
-            unavailable_count, unavailable_reason = unavailable_count + 1, str(error) or repr(error)
+            unavailable_count += 1
+            unavailable_reason = str(error) or repr(error)
             continue
         answer_counts[answer.detector] += 1
         latencies.append(latency)
@@ -256,6 +153,36 @@ def _match_confident(answer: Answer, sample: LabelledImage, min_confidence: floa
     return match_detections([entry for entry in confident if not is_ignored(entry, sample)], sample)
 
 
+class AveragePrecision:
+    """Mean average precision (mAP) over all classes in the images."""
+
+    def __init__(self) -> None:
+        # The import takes half a second, for which the refusal of wrong inputs must not wait.
+        from supervision.metrics import MeanAveragePrecision
+
+        self._metric = MeanAveragePrecision()
+        self._class_ids: dict[str, int] = {}
+
+    def add(self, detections: Sequence[Detection], sample: LabelledImage) -> None:
+        """Add the detections in one image; the detections may have any confidence."""
+        boxes = [detection.box for detection in detections]
+        predicted = self._to_detections(boxes, [detection.label for detection in detections])
+        predicted.confidence = np.array([detection.confidence for detection in detections], dtype=float)
+        self._metric.update([predicted], [self._to_detections(sample.boxes, sample.labels)])
+
+    def compute(self) -> tuple[float, float]:
+        """Return mAP at IoU 0.5, and the mean of mAP over IoUs from 0.5 to 0.95; zeros without objects."""
+        result = self._metric.compute()
+        return max(float(result.map50), 0.0), max(float(result.map50_95), 0.0)
+
+    def _to_detections(self, boxes: Sequence[Box], labels: Sequence[str]) -> Any:
+        """Return boxes and labels as `supervision.Detections`."""
+        import supervision as sv  # See `__init__`.
+
+        ids = [self._class_ids.setdefault(label, len(self._class_ids)) for label in labels]
+        return sv.Detections(np.array(boxes, float).reshape(-1, 4), class_id=np.array(ids, dtype=int))
+
+
 class CellDetector:
     """Detector of a cell file for the evaluation of its accuracy.
 
@@ -281,8 +208,10 @@ class CellDetector:
         self._view = view if camera else "full"
         self._classes = classes
         self._now = 0.0
-        camera, clock = camera or WHOLE_IMAGE_CAMERA, StepClock(lambda: self._now)
-        self._detectors = build_detectors(configs, camera=camera, clock=clock, base=base, seed=0)
+        clock = StepClock(lambda: self._now)
+        self._detectors = build_detectors(
+            configs, camera=camera or WHOLE_IMAGE_CAMERA, clock=clock, base=base, seed=0
+        )
 
     def detect(self, frame: Frame) -> tuple[Answer, float]:
         """Return the answer of the detector to a frame, and its latency in wall time [ms].
@@ -290,7 +219,8 @@ class CellDetector:
         Raises:
             Unavailable: The detector gave no usable answer.
         """
-        start_time, request_time = time.perf_counter(), self._now
+        start_time = time.perf_counter()
+        request_time = self._now
         try:
             request = self._detectors[self._name].request(replace(frame, stamp=request_time), self._view)
             while not request.ready:
@@ -324,50 +254,106 @@ def make_model_config(model: Path, labels: Path) -> DetectorConfig:
     return DetectorConfig.model_validate({"kind": "rfdetr", "floor": MIN_CONFIDENCE, **files})
 
 
-def evaluate_model(
-    model: Path, labels: Path, images: Iterable[LabelledImage], threshold: float
-) -> Evaluation:
-    """Return the accuracy of an exported RF-DETR on labelled images.
+@dataclass(frozen=True, eq=False)
+class Mistake:
+    """Detection error: missed object, false detection, wrong class, or offset of a correct detection.
 
-    Args:
-        model: The ONNX file.
-        labels: The text file with the class names.
-        images: The images.
-        threshold: Minimum confidence of a detection.
-
-    Raises:
-        InputError: Model, labels or images cannot be read.
+    Attributes:
+        severity: Visible fraction of a missed object (halved if truncated), confidence of a wrong detection,
+            or offset of a correct box divided by the longer side of the true box; 0 to 1.
+        text: Short description of the mistake.
+        box: Box around the mistake [pixel].
+        sample: The labelled image.
+        detections: All detections in the image at or above the threshold.
     """
-    detector = CellDetector({MODEL_NAME: make_model_config(model, labels)}, MODEL_NAME, base=Path())
-    with contextlib.closing(detector):
-        return evaluate(detector, images, threshold=threshold)
+
+    severity: float
+    text: str
+    box: Box
+    sample: LabelledImage
+    detections: tuple[Detection, ...]
 
 
-class AveragePrecision:
-    """Mean average precision (mAP) over all classes in the images."""
+def collect_mistakes(
+    mistakes: list[Mistake], matches: Sequence[BoxMatch], sample: LabelledImage, max_count: int = 24
+) -> None:
+    """Add the mistakes in one image to `mistakes`, and keep the most severe `max_count`, sorted."""
+    mistakes += find_mistakes(matches, sample)
+    mistakes.sort(key=lambda mistake: -mistake.severity)
+    del mistakes[max_count:]
 
-    def __init__(self) -> None:
-        # The import takes half a second and 120 MB; only an evaluation needs the package.
-        from supervision.metrics import MeanAveragePrecision
 
-        self._metric = MeanAveragePrecision()
-        self._class_ids: dict[str, int] = {}
+def find_mistakes(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterator[Mistake]:
+    """Yield the mistakes in one image, including the position errors of correct detections."""
+    detections = tuple(match.detection for match in matches)
+    detected_objects = {match.object_index for match in matches}
+    for index, label in enumerate(sample.labels):
+        if index not in detected_objects:
+            fraction = sample.get_visible_fraction(index)
+            truncation = "" if sample.is_fully_inside(index) else ", truncated"
+            visibility = "" if fraction >= 0.995 else f", {fraction:.0%} visible"
+            text = f"{label} missed{visibility}{truncation}"
+            yield Mistake(fraction / (2 if truncation else 1), text, sample.boxes[index], sample, detections)
+    for match in matches:
+        severity = match.detection.confidence
+        text = f"{match.detection.label} {severity:.2f}"
+        if match.is_correct:
+            offset = float(np.hypot(*match.offset))
+            size = max(match.box[2] - match.box[0], match.box[3] - match.box[1], 1.0)
+            severity = min(offset / size, 1.0)
+            text = f"{match.detection.label} off by {offset:.1f} px"
+        elif match.object_index is None:
+            text = f"false detection: {text}"
+        else:
+            text = f"{sample.labels[match.object_index]} detected as {text}"
+        left, top, right, bottom = zip(match.box, match.detection.box, strict=True)
+        enclosing_box = (min(left), min(top), max(right), max(bottom))
+        yield Mistake(severity, text, enclosing_box, sample, detections)
 
-    def add(self, detections: Sequence[Detection], sample: LabelledImage) -> None:
-        """Add the detections in one image; the detections may have any confidence."""
-        boxes = [detection.box for detection in detections]
-        predicted = self._to_detections(boxes, [detection.label for detection in detections])
-        predicted.confidence = np.array([detection.confidence for detection in detections], dtype=float)
-        self._metric.update([predicted], [self._to_detections(sample.boxes, sample.labels)])
 
-    def compute(self) -> tuple[float, float]:
-        """Return mAP at IoU 0.5, and the mean of mAP over IoUs from 0.5 to 0.95; zeros without objects."""
-        result = self._metric.compute()
-        return max(float(result.map50), 0.0), max(float(result.map50_95), 0.0)
+def draw_sheet(mistakes: Sequence[Mistake], title: str) -> Picture:
+    """Return a picture with one tile per mistake; title and legend are in the header."""
+    column_count = min(MAX_COLUMN_COUNT, max(len(mistakes), 3))
+    row_count = max(math.ceil(len(mistakes) / column_count), 1)
+    column_width = TILE_SIZE + GAP
+    row_height = TILE_SIZE + CAPTION_HEIGHT + GAP
+    size = (HEADER_HEIGHT + row_count * row_height, GAP + column_count * column_width, 3)
+    sheet = np.full(size, BACKGROUND_COLOUR, np.uint8)
+    _write_text(sheet, f"{title}: {LEGEND if mistakes else 'no mistakes'}", GAP, HEADER_HEIGHT - GAP)
+    for index, mistake in enumerate(mistakes):
+        row, column = divmod(index, column_count)
+        left = GAP + column * column_width
+        top = HEADER_HEIGHT + row * row_height
+        bottom = top + TILE_SIZE
+        sheet[top:bottom, left : left + TILE_SIZE] = _draw_tile(mistake)
+        _write_text(sheet, f"{index + 1}. {mistake.text}"[:MAX_TEXT_LENGTH], left, bottom + 15)
+        _write_text(sheet, mistake.sample.file[:MAX_TEXT_LENGTH], left, bottom + 32)
+    return sheet
 
-    def _to_detections(self, boxes: Sequence[Box], labels: Sequence[str]) -> Any:
-        """Return boxes and labels as `supervision.Detections`."""
-        import supervision as sv
 
-        ids = [self._class_ids.setdefault(label, len(self._class_ids)) for label in labels]
-        return sv.Detections(np.array(boxes, float).reshape(-1, 4), class_id=np.array(ids, dtype=int))
+def _draw_tile(mistake: Mistake) -> Picture:
+    """Return a crop around a mistake with true and detected boxes, `(TILE_SIZE, TILE_SIZE, 3)` RGB."""
+    import supervision as sv  # See `AveragePrecision`.
+
+    left, top, right, bottom = mistake.box
+    crop_size = max(CROP_SCALE * max(right - left, bottom - top), MIN_CROP_SIZE)
+    crop_corner = np.array([left + right - crop_size, top + bottom - crop_size]) / 2
+    zoom = TILE_SIZE / crop_size
+    # The centre of pixel i is at i + 0.5 in the coordinates of boxes, and at i in the coordinates of OpenCV.
+    shift = zoom * (0.5 - crop_corner) - 0.5
+    matrix = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
+    image = mistake.sample.image[..., ::-1]  # The annotators expect BGR.
+    tile: Any = cv2.warpAffine(image, matrix, (TILE_SIZE, TILE_SIZE), flags=cv2.INTER_CUBIC)
+    detected_boxes = [detection.box for detection in mistake.detections]
+    for annotator, boxes, colour in (
+        (sv.BoxAnnotator, detected_boxes, DETECTED_COLOUR),
+        (sv.BoxCornerAnnotator, mistake.sample.boxes, TRUE_COLOUR),
+    ):
+        tile_boxes = ((np.array(boxes).reshape(-1, 2, 2) - crop_corner) * zoom).reshape(-1, 4)
+        detections = sv.Detections(tile_boxes, class_id=np.zeros(len(boxes), int))
+        tile = annotator(sv.Color.from_hex(colour), LINE_THICKNESS).annotate(tile, detections)
+    return np.asarray(tile[..., ::-1], dtype=np.uint8)
+
+
+def _write_text(picture: Picture, text: str, left: int, baseline: int) -> None:
+    cv2.putText(picture, text, (left, baseline), cv2.FONT_HERSHEY_SIMPLEX, 0.42, TEXT_COLOUR, 1, cv2.LINE_AA)

@@ -166,7 +166,8 @@ def restore_model(model: Path) -> Any:
     with tempfile.TemporaryDirectory() as folder:
         exported = export_model(detector, Path(folder))
     for initializer in exported.graph.initializer:
-        name, values = initializer.name, numpy_helper.to_array(initializer)
+        name = initializer.name
+        values = numpy_helper.to_array(initializer)
         if name not in stored_weights or stored_weights[name].shape != values.shape:
             raise InputError(
                 f"{model} cannot be trained further: its weight {name} is missing or has another shape than "
@@ -322,10 +323,11 @@ def transform_image(image: torch.Tensor, symmetry: int) -> torch.Tensor:
 
 def transform_boxes(boxes: torch.Tensor, symmetry: int) -> torch.Tensor:
     """Return `boxes` `(N, 4)` (centre x and y, width, height; 0 to 1), transformed by a symmetry, 0 to 7."""
-    x, y, width, height = boxes.unbind(-1)
     if symmetry % 2:
-        x = 1 - x
+        x, y, width, height = boxes.unbind(-1)
+        boxes = torch.stack((1 - x, y, width, height), dim=-1)
     for _ in range(symmetry // 2):
+        x, y, width, height = boxes.unbind(-1)
         # A quarter turn anticlockwise moves the right edge of the image to the top.
-        x, y, width, height = y, 1 - x, height, width
-    return torch.stack((x, y, width, height), dim=-1)
+        boxes = torch.stack((y, 1 - x, height, width), dim=-1)
+    return boxes

@@ -8,7 +8,7 @@ the mesh, including occluded parts.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import replace
 from functools import partial
@@ -75,13 +75,13 @@ MIN_CONTRAST = 5
 
 
 def generate_dataset(
-    configs: Mapping[str, CellConfig], out: Path, *, image_count: int, seed: int, layout: str,
+    cells: Sequence[CellConfig], out: Path, *, image_count: int, seed: int, layout: str,
     worker_count: int, valid_fraction: float, progress: ReportProgress,
 ) -> None:  # fmt: skip
     """Write a dataset of random scenes; the scenes alternate between the cells.
 
     Args:
-        configs: Cells by name.
+        cells: The cells.
         out: Folder of the dataset.
         image_count: Number of images.
         seed: Seed of the random scenes.
@@ -94,17 +94,16 @@ def generate_dataset(
         InputError: The cells differ in their classes, a model of an object is missing
             or has another size than in the cell file, or a file cannot be written.
     """
-    cells = list(configs.values())
     classes = list(cells[0].objects)
     if any(list(cell.objects) != classes for cell in cells):
-        found = "; ".join(f"{name} has {', '.join(cell.objects)}" for name, cell in configs.items())
+        found = "; ".join(f"{cell.cell} has {', '.join(cell.objects)}" for cell in cells)
         raise InputError(f"the cells of one dataset must have the same classes in the same order; {found}")
-    for name, cell in configs.items():
+    for cell in cells:
         for key, message in find_model_errors(cell):
-            raise InputError(f"{name}: {'.'.join(map(str, key))}: {message}")
+            raise InputError(f"{cell.cell}: {'.'.join(map(str, key))}: {message}")
     train_count = image_count - round(image_count * valid_fraction)
-    render = partial(_render_dataset_images, cells, out, layout, seed, train_count)
-    entries = _render_blocks(render, image_count, worker_count, progress)
+    render_block = partial(_render_dataset_images, cells, out, layout, seed, train_count)
+    entries = _render_blocks(render_block, image_count, worker_count, progress)
     write_annotations(out, layout, entries, classes)
 
 
@@ -124,34 +123,36 @@ def render_run_frames(
         progress: Called after each block of `BLOCK_SIZE` frames.
         scene: Differences of the simulated world from the cell file.
     """
-    return _render_blocks(partial(_render_frames, config, scene, seed), image_count, worker_count, progress)
+    render_block = partial(_render_images, [config], scene, seed)
+    return _render_blocks(render_block, image_count, worker_count, progress)
 
 
 def _render_blocks(
-    render: Callable[[range], dict[int, ResultT]], count: int, worker_count: int, progress: ReportProgress
+    render_block: Callable[[range], dict[int, ResultT]], count: int, workers: int, progress: ReportProgress
 ) -> list[ResultT]:
-    """Return the results of `render` for images 0 to `count` - 1, in order, from worker processes."""
-    image_numbers, results = range(count), dict[int, ResultT]()
+    """Return the results of `render_block` for images 0 to `count` - 1, in order, from worker processes."""
+    image_numbers = range(count)
+    results: dict[int, ResultT] = {}
     blocks = [image_numbers[start : start + BLOCK_SIZE] for start in image_numbers[::BLOCK_SIZE]]
-    with WorkerPool(worker_count) as pool:
-        for task in as_completed([pool.submit(render, block) for block in blocks]):
+    with WorkerPool(workers) as pool:
+        for task in as_completed([pool.submit(render_block, block) for block in blocks]):
             results.update(task.result())
             progress(len(results), count)
     return [results[number] for number in image_numbers]
 
 
 def _render_images(
-    cells: Sequence[CellConfig], seed: int, image_numbers: range, scene: SceneConfig | None = None
-) -> Iterator[tuple[int, LabelledImage]]:
-    """Yield number and labelled image of random scenes; without `scene`, scenes vary more."""
+    cells: Sequence[CellConfig], scene: SceneConfig | None, seed: int, image_numbers: range
+) -> dict[int, LabelledImage]:
+    """Return labelled images of random scenes by number; without `scene`, the scenes vary more."""
     cv2.setNumThreads(1)
+    images = {}
     with contextlib.ExitStack() as stack:
-        renderers = [SceneRenderer(cell, scene) for cell in cells]
-        for renderer in renderers:
-            stack.callback(renderer.close)
+        renderers = [stack.enter_context(contextlib.closing(SceneRenderer(cell, scene))) for cell in cells]
         for number in image_numbers:
             image_seed = int(np.random.SeedSequence([seed, number]).generate_state(1, np.uint64)[0])
-            yield number, renderers[number % len(cells)].render_image(image_seed, number)
+            images[number] = renderers[number % len(cells)].render_image(image_seed, number)
+    return images
 
 
 def _render_dataset_images(
@@ -159,8 +160,9 @@ def _render_dataset_images(
 ) -> dict[int, DatasetEntry]:
     """Render and save images in a worker process; return their dataset entries by image number."""
     entries = {}
-    for number, image in _render_images(cells, seed, image_numbers):
-        split, file = "train" if number < train_count else "valid", f"{image.file}.jpg"
+    for number, image in _render_images(cells, None, seed, image_numbers).items():
+        split = "train" if number < train_count else "valid"
+        file = f"{image.file}.jpg"
         save_image(build_image_path(out, layout, split, file), image.image)
         # The ground truth for evaluations is stored as JSON.
         truth = {**image.truth, "matrix": image.truth["matrix"].tolist()}
@@ -171,13 +173,6 @@ def _render_dataset_images(
             split, file, size, image.labels, image.boxes, image.ignored_boxes, truth
         )
     return entries
-
-
-def _render_frames(
-    config: CellConfig, scene: SceneConfig, seed: int, image_numbers: range
-) -> dict[int, LabelledImage]:
-    """Render frames in a worker process, and return them by image number."""
-    return dict(_render_images([config], seed, image_numbers, scene))
 
 
 class SceneRenderer:
@@ -243,11 +238,15 @@ class SceneRenderer:
         """Return the image of a random scene, or None if too many objects are heavily occluded."""
         world = self._world
         is_holding = arrangements.move_arm_randomly(world, self._camera, rng)
-        matrix, X_WC = self._camera_matrix, get_camera_pose(world, self._camera)
-        (colour, texture), light, noise = ((1.0, 1.0, 1.0), WOOD_TEXTURE), CELL_LIGHT, self._camera.noise
+        matrix = self._camera_matrix
+        X_WC = get_camera_pose(world, self._camera)
+        colour = (1.0, 1.0, 1.0)
+        texture = WOOD_TEXTURE
+        light = CELL_LIGHT
+        noise = self._camera.noise
         if rng.random() >= NOMINAL_SCENE_FRACTION:
             matrix, X_WC = arrangements.draw_camera(self._camera, matrix, X_WC, rng)
-            (colour, texture) = arrangements.draw_table_appearance(rng)
+            colour, texture = arrangements.draw_table_appearance(rng)
             light = arrangements.draw_light(rng)
             noise = arrangements.draw_noise(noise, rng)
         region = arrangements.draw_region(self._camera, rng)
@@ -264,11 +263,16 @@ class SceneRenderer:
         rendered = render(world, matrix, X_WC, region, light)
         scale = IMAGE_SIZE / (region[2] - region[0])
         labelled = self._label_image(rendered, MIN_CONTRAST * noise.read, objects_by_body, region[:2], scale)
-        return labelled and replace(labelled, image=_resize(add_noise(rendered.image, noise, rng)))
+        if labelled is None:
+            return None
+        image = add_noise(rendered.image, noise, rng)
+        resized_image = cv2.resize(image, (IMAGE_SIZE, IMAGE_SIZE), interpolation=cv2.INTER_AREA)
+        return replace(labelled, image=np.asarray(resized_image, np.uint8))
 
     def _render_initial(self, scene: SceneConfig, rng: np.random.Generator) -> LabelledImage | None:
         """Return the image of an initial scene, or None if too many objects are heavily occluded."""
-        world, camera = self._world, self._camera
+        world = self._world
+        camera = self._camera
         pose = np.radians(self._config.arm.poses_deg[str(rng.choice(camera.scan_poses))])
         world.set_joint_positions(pose)
         spawn_objects(world, int(rng.integers(2**32)), scene.unknown)
@@ -289,8 +293,9 @@ class SceneRenderer:
         repeated_image = add_noise(rendered.image, camera.noise, rng)
         left, top, right, bottom = region = camera.table_view
         pixels = np.s_[top:bottom, left:right]
-        view_image, segmentation = rendered.image[pixels], rendered.segmentation[pixels]
-        view = replace(rendered, image=view_image, segmentation=segmentation, region=region)
+        view = replace(
+            rendered, image=rendered.image[pixels], segmentation=rendered.segmentation[pixels], region=region
+        )
         # The minimum contrast depends on the declared noise, so that more noise does not reduce the labels.
         labelled = self._label_image(view, MIN_CONTRAST * self._nominal_camera.noise.read, objects)
         return labelled and replace(
@@ -315,8 +320,13 @@ class SceneRenderer:
             origin: Position in the camera image at which the boxes have the coordinates (0, 0) [pixel].
             scale: Factor from pixels of the camera image to pixels of the boxes.
         """
-        labels, boxes, fractions, positions, centres = [], list[Box](), [], [], []
-        ignored_boxes, heavily_occluded_count = list[Box](), 0
+        labels = []
+        boxes: list[Box] = []
+        ignored_boxes: list[Box] = []
+        fractions = []
+        positions = []
+        centres = []
+        heavily_occluded_count = 0
         for body, scene_object in objects.items():
             mask = rendered.segmentation == body
             if scene_object.label == UNKNOWN_LABEL or not mask.any():
@@ -373,8 +383,3 @@ def _measure_contrast(image: Image, mask: NDArray[np.bool_]) -> float:
         return 0.0
     background = np.median(image[ring], axis=0)
     return float(np.median(np.abs(image[mask] - background).max(axis=1)))
-
-
-def _resize(image: Image) -> Image:
-    """Return a square image in the size that a detector gets."""
-    return np.asarray(cv2.resize(image, (IMAGE_SIZE, IMAGE_SIZE), interpolation=cv2.INTER_AREA), np.uint8)

@@ -2,55 +2,37 @@
 
 from __future__ import annotations
 
-import codecs
 import math
 import os
-import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator
-from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Annotated, Any, TypeVar
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
 
-import cv2
 import numpy as np
-import yaml
-from numpy.typing import NDArray
-from PIL import ExifTags, Image
-from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter, ValidationError
+from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
 from executive.cell.frame import Box
 from executive.cell.paths import has_outside_link
 from executive.errors import MAX_QUOTATION_LENGTH, InputError
 from executive.geometry import Array
-from executive.training.dataset import LabelledImage
-
-IMAGE_SUFFIXES = (
-    ".jpg", ".jpeg", ".jpe", ".jfif", ".png", ".bmp", ".webp", ".tif", ".tiff", ".gif", ".avif", ".jp2",
-    ".ppm", ".heic", ".heif",
-)  # fmt: skip
-"""Suffixes of image files, in lower case; the reader refuses HEIC, rather than lose its objects silently."""
-SPLITS = ("test", "valid", "train", "")
-"""Names of splits, in the order in which they are preferred for an evaluation; "": images without a split."""
-SPLIT_NAME = re.compile("(?:^|_)(test|train|val)(?:ing|id|idation)?(?![a-z])", re.IGNORECASE)
-"""Name of a split in the name of a file or in a key."""
-SPLIT_FOLDER = re.compile(r"(?i)(?:obj_|images_)?(test|train|val)(ing|id|idation)?(\d*|.(data|images|set))")
-"""Name of the folder of a split; a folder such as `test_tubes` is none."""
-COCO_FILE = re.compile(
-    r"(^|/)(_?annotations[^/]*|instances[^/]*|annotations/(test|train|val)[^/]*|result)\.json$"
+from executive.training.dataset import (
+    MAX_LABEL_FILE_SIZE,
+    LabelledImage,
+    find_label_file,
+    find_splits,
+    parse_file,
+    read_class_file,
+    read_image,
+    read_image_header,
+    read_text,
 )
-"""Path of a COCO file, for instance of Roboflow, CVAT, or Label Studio."""
-YOLO_CLASS_FILES = ("data.yaml", "data.yml", "dataset.yaml", "classes.txt", "obj.names")
-"""Names of the file with the class names of a YOLO dataset: YAML, or one name per line."""
-MAX_CLASS_FILE_SIZE = 100_000
-"""Maximum size of a YOLO class file [byte]."""
-MAX_LABEL_FILE_SIZE = 10_000_000
-"""Maximum size of a YOLO label file, or of a text file with the paths of images [byte]."""
-ContentT = TypeVar("ContentT")
-MAX_OBJECT_COUNT = 1_000
-"""Maximum number of labelled objects in an image; RF-DETR detects at most 300 (its number of queries)."""
+
 MAX_COCO_FILE_SIZE = 500_000_000
 """Maximum size of a COCO file [byte]; the largest annotation file of COCO 2017 has 470 MB."""
+MAX_OBJECT_COUNT = 1_000
+"""Maximum number of labelled objects in an image; RF-DETR detects at most 300 (its number of queries)."""
 MAX_NORMALIZED = 2.0
 """Maximum absolute value of a normalized coordinate; 0 to 1 is inside of the image."""
 MAX_PIXELS = 1_000_000
@@ -77,9 +59,10 @@ KEYPOINT_FRACTIONS = (0.9, 0.75)
 labels may be boxes with keypoints."""
 MAX_FRACTION = 1.02
 """Maximum coordinate in an image, as a fraction of its width or height; annotation tools round."""
-OUTSIDE, SMALL = "boxes outside of the image dropped", "boxes smaller than a pixel dropped"
-"""Descriptions of dropped boxes in the summary of a dataset."""
-
+OUTSIDE = "boxes outside of the image dropped"
+"""Description of boxes without a part in the image, in the summary of a dataset."""
+SMALL = "boxes smaller than a pixel dropped"
+"""Description of boxes that show no object, in the summary of a dataset."""
 
 Length = Annotated[FiniteFloat, Field(ge=0, le=MAX_PIXELS)]
 """Width or height of a COCO box [pixel]."""
@@ -121,44 +104,6 @@ class _CocoFile(BaseModel):
     categories: list[_CocoCategory]
 
 
-class YoloFile(BaseModel, extra="allow"):
-    """A YOLO class file: class names by number, and shape of the keypoints; further keys name the splits.
-
-    The shape of the keypoints is (0, 0) for boxes and polygons, and None if the file does not state it.
-    """
-
-    names: dict[int, str] | list[str]
-    path: str = ""
-    kpt_shape: tuple[int, int] | None = None
-
-
-@dataclass(frozen=True)
-class Split:
-    """A part of a dataset, for instance the images for a training.
-
-    Attributes:
-        root: Folder of the dataset, which contains all images.
-        file: COCO file (suffix `.json`) or YOLO class file.
-        images: Paths of the images of a YOLO dataset.
-    """
-
-    root: Path
-    file: Path
-    images: list[Path] = field(default_factory=list)
-
-    def find_image(self, name: str, location: str) -> Path:
-        """Return the path of the image that an annotation file names.
-
-        Raises:
-            InputError: The image is missing; `location` (file and key) starts the message.
-        """
-        subfolder = self.file.stem.partition("_")[2]  # For instance `default` of `instances_default.json`.
-        folders = (f"images/{subfolder}", subfolder, "images", "")
-        if path := _find_path([self.file.parent, *(self.root / folder for folder in folders)], name):
-            return path
-        raise InputError(f'{location}: "{name}" is not a file in {self.file.parent}')
-
-
 @dataclass
 class ImageAnnotation:
     """The labelled objects of an image.
@@ -179,7 +124,7 @@ class LabelledDataset:
 
     Args:
         folder: Folder of the dataset, or of one split.
-        split: `train`, `valid` or `test`; "": the first existing split of `SPLITS`.
+        split: `train`, `valid` or `test`; "": the first existing split of `PREFERRED_SPLITS`.
 
     Attributes:
         folder: Folder of the dataset.
@@ -304,7 +249,7 @@ class LabelledDataset:
 
     def _read_yolo(self) -> list[str]:
         """Read the annotations of the images of a YOLO dataset, and return the classes."""
-        # The import takes half a second; only a YOLO dataset needs the package.
+        # The import takes half a second, for which the refusal of wrong inputs must not wait.
         from supervision.dataset.formats.yolo import yolo_annotations_to_detections
 
         content = read_class_file(self._source.file)
@@ -406,7 +351,8 @@ def _find_wrong_form(relative: Array, other_form: str) -> str:
     """
     if not len(relative):
         return ""
-    first, second = relative[:, :2], relative[:, 2:] - relative[:, :2]
+    first = relative[:, :2]
+    second = relative[:, 2:] - first
     fits = ((first <= second) & (second <= MAX_FRACTION)).all(axis=1)
     ends_outside = (np.abs(relative - 0.5) > MAX_FRACTION - 0.5).any(axis=1)
     if ([fits.mean(), ends_outside.mean()] >= np.array(CORNER_FRACTIONS)).all():
@@ -424,166 +370,3 @@ def read_image_properties(file: Path) -> dict[str, Any]:
     """
     parse = TypeAdapter(dict[str, Any]).validate_json
     return parse_file(file, MAX_COCO_FILE_SIZE, parse) if file.is_file() else {}
-
-
-def read_image_header(path: Path) -> tuple[tuple[int, int], bool]:
-    """Return width and height of the upright image, and True if the file contains upright RGB or grey pixels.
-
-    Raises:
-        InputError: The image cannot be read.
-    """
-    try:
-        with Image.open(path) as image:
-            orientation = image.getexif().get(ExifTags.Base.Orientation, 1)
-            width, height = image.size
-            is_plain = orientation == 1 and image.mode in ("RGB", "L")
-    except Exception as error:  # Pillow raises errors of many types for damaged files.
-        raise InputError(f"the image {path} cannot be read; write a sound JPEG or PNG file") from error
-    # The orientations 5 to 8 contain a quarter turn.
-    return ((height, width) if orientation in range(5, 9) else (width, height)), is_plain
-
-
-def read_image(path: Path) -> NDArray[np.uint8]:
-    """Return an image file as `(H, W, 3)` uint8, RGB, turned upright by its EXIF orientation.
-
-    Raises:
-        InputError: The image cannot be read.
-    """
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    if image is None:
-        raise InputError(f"the image {path} cannot be read; is it missing or damaged?")
-    return np.ascontiguousarray(image[..., ::-1], dtype=np.uint8)
-
-
-def find_splits(dataset: Path) -> dict[str, Split]:
-    """Return the splits of a dataset by name, in the order of `SPLITS`.
-
-    Raises:
-        InputError: A class file or a list of images is damaged, or a split has several COCO files.
-    """
-    splits: dict[str, Split] = {}
-    for file in sorted([*dataset.glob("*.json"), *dataset.glob("*/*.json")]):
-        if COCO_FILE.search(file.as_posix()):
-            split = splits.setdefault(_name_split(str(file.relative_to(dataset))), Split(dataset, file))
-            if split.file != file:
-                raise InputError(f"{split.file} and {file} are COCO files of one split; keep one of them")
-    folders = (dataset, *dataset.absolute().parents[:2])
-    class_files = (folder / name for folder in folders for name in YOLO_CLASS_FILES)
-    if not splits and (class_file := next(filter(os.path.isfile, class_files), None)):
-        for name, image in _list_yolo_images(dataset, class_file):
-            splits.setdefault(name, Split(dataset, class_file)).images.append(image)
-    return {name: splits[name] for name in SPLITS if name in splits}
-
-
-def find_label_file(image: Path) -> Path | None:
-    """Return the label file of a YOLO image: in the folder `labels` beside `images`, or beside the image."""
-    before, separator, after = str(image.absolute()).rpartition(f"{os.sep}images{os.sep}")
-    paths = (Path(before, "labels", after) if separator else image, image)
-    candidates = (path.with_suffix(suffix) for path in paths for suffix in (".txt", ".TXT"))
-    return next(filter(os.path.lexists, candidates), None)
-
-
-def read_class_file(file: Path) -> YoloFile:
-    """Return the content of a YOLO class file.
-
-    Raises:
-        InputError: The file is damaged.
-    """
-
-    def parse(text: str) -> YoloFile:
-        """Return the content; `BaseLoader` keeps a class name `no`, which YAML would convert to False."""
-        if file.suffix in (".yaml", ".yml"):
-            return YoloFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader))
-        return YoloFile(names=[line.strip() for line in text.strip().splitlines()])
-
-    return parse_file(file, MAX_CLASS_FILE_SIZE, parse)
-
-
-def read_text(file: Path, max_size: int) -> str:
-    """Return the text of a file of at most `max_size` [byte], without byte order mark.
-
-    Raises:
-        InputError: The file is too large or cannot be read.
-    """
-    if not os.path.isfile(file):
-        raise InputError(f"{file} is not a file")
-    if file.stat().st_size > max_size:
-        raise InputError(f"{file} has more than {max_size / 1e6:g} MB, the maximum for this kind of file")
-    try:
-        content = file.read_bytes()
-        is_utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-        return content.decode("utf-16" if is_utf16 else "utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{file} cannot be read: {error}") from error
-
-
-def parse_file(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> ContentT:
-    """Return the parsed content of a file of at most `max_size` [byte].
-
-    Raises:
-        InputError: The file is too large, cannot be read, is invalid, or lacks a required key; the message
-            names the line or the key.
-    """
-    try:
-        return parse(read_text(file, max_size))
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise InputError(f"{file}:{line}: invalid YAML: {error.problem}") from error
-    except ValidationError as error:
-        problem = error.errors()[0]
-        keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in problem["loc"])
-        raise InputError(f"{file}: {keys.removeprefix('.') or 'content'}: {problem['msg']}") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise InputError(f"{file} cannot be read: {error}") from error
-
-
-def _list_yolo_images(dataset: Path, class_file: Path) -> Iterator[tuple[str, Path]]:
-    """Yield split and path of each image of a YOLO dataset, as listed in its class file or by folder."""
-    content = read_class_file(class_file)
-    sources = []
-    for key, entries in (content.model_extra or {}).items():
-        for entry in [entries] if isinstance(entries, str) else entries:
-            source = _find_path([dataset], str(Path(content.path, str(entry))), _name_split(key))
-            if entry and source and _name_split(key):
-                sources.append((_name_split(key), source))
-    for name, source in sources:
-        if source.is_dir():
-            yield from ((name, path) for path in _list_images(source))
-        else:
-            lines = filter(str.strip, read_text(source, MAX_LABEL_FILE_SIZE).splitlines())
-            split = Split(dataset, class_file)
-            yield from ((name, split.find_image(line.strip(), str(source))) for line in lines)
-    if not sources:
-        for path in _list_images(dataset):
-            yield _name_split(f"{path.relative_to(dataset).parent.as_posix()}/"), path
-
-
-def _list_images(folder: Path) -> Iterator[Path]:
-    """Yield the paths of the image files in a folder and its subfolders, without hidden files."""
-    for path in folder.rglob("*"):
-        if path.suffix.lower() in IMAGE_SUFFIXES and not path.name.startswith("."):
-            yield path
-
-
-def _find_path(folders: list[Path], name: str, required_split: str = "") -> Path | None:
-    """Return the path in one of the folders whose end agrees most with the path `name`, or None.
-
-    `name` may be a path on another computer, a Windows path, or relative to another folder. A path of which
-    only the end agrees must name `required_split`.
-    """
-    for path in (PurePosixPath(name), PureWindowsPath(name)):
-        parts = [part for part in path.parts if part not in (path.anchor, "..")]
-        for start in range(max(len(parts), 1)):
-            end = Path(*parts[start:])
-            found = next((folder / end for folder in folders if os.path.exists(folder / end)), None)
-            if found and (not start or _name_split(str(end)) == (required_split or _name_split(str(end)))):
-                return found
-    return None
-
-
-def _name_split(path: str) -> str:
-    """Return the name of the split in a key or in a path, or ""; the path of a folder ends with "/"."""
-    *folders, name = path.split("/")
-    matches = [*map(SPLIT_FOLDER.fullmatch, folders), SPLIT_NAME.search(name)]
-    match = next(filter(None, matches), None)
-    return {"val": "valid"}.get(match[1].lower(), match[1].lower()) if match else ""

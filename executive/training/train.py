@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -11,10 +12,17 @@ from jinja2 import Environment, StrictUndefined
 
 from executive.errors import InputError
 from executive.perception.detectors.rfdetr import read_labels
-from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
-from executive.training.evaluate import evaluate_model, find_label_file
+from executive.training.dataset import (
+    DatasetEntry,
+    build_image_path,
+    read_image,
+    read_image_header,
+    save_image,
+    write_annotations,
+)
+from executive.training.evaluate import MODEL_NAME, CellDetector, evaluate, find_label_file, make_model_config
 from executive.training.metrics import Evaluation
-from executive.training.samples import LabelledDataset, read_image, read_image_header
+from executive.training.samples import LabelledDataset
 
 CARD_THRESHOLD = 0.5
 """Minimum confidence of the detections for precision and recall in a model card."""
@@ -77,7 +85,9 @@ def train(
         )  # fmt: skip
     model = out / "model.onnx"
     export_onnx(out / "checkpoint_best_total.pth", len(labels), model)
-    accuracy = evaluate_model(model, out / "labels.txt", splits["valid"], CARD_THRESHOLD)
+    config = make_model_config(model, out / "labels.txt")
+    with contextlib.closing(CellDetector({MODEL_NAME: config}, MODEL_NAME, base=Path())) as detector:
+        accuracy = evaluate(detector, splits["valid"], threshold=CARD_THRESHOLD)
     card = render_card(
         title=f"Small RF-DETR trained on {splits['train'].folder.name}",
         summary=f"Detects {', '.join(labels)} in square images.",

@@ -16,7 +16,7 @@ from executive.campaign.evaluation import (
     measure_detector,
 )
 from executive.cell.config import CellConfig
-from executive.cli.tables import show_progress
+from executive.cli.progress import show_progress
 from executive.training.metrics import NO_OBJECT, Evaluation
 from tests.benchmarks.outside_the_envelope import SCENES
 from tests.benchmarks.report import Figures, run_command, write_json

@@ -16,12 +16,10 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-from unittest.mock import patch
 
 import pytest
 
-from executive.campaign.cluster import run_jobs_on_cluster
-from executive.campaign.cluster_worker import (
+from executive.campaign.cluster_bundle import (
     FILES_KEY,
     PACKAGES_FOLDER,
     check_environment,
@@ -102,7 +100,7 @@ def test_an_absolute_path_to_a_file_is_refused(project: Path) -> None:
 @pytest.mark.slow
 def test_a_worker_runs_a_skill_of_another_package(project: Path, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    from executive.campaign.cluster_worker import BundlePlugin
+    from executive.campaign.cluster import BundlePlugin
 
     jobs = list_sweep_jobs(tmp_path / "runs")
     local = run_job(jobs[0])
@@ -131,14 +129,6 @@ def test_a_worker_with_other_software_is_described() -> None:
     differences = f"numpy {here['numpy']} instead of 1.0, .*{FILES_KEY} .* instead of 0, more missing instead"
     with pytest.raises(InputError, match=differences):
         check_environment(client, worker)
-
-
-def test_without_the_extra_the_error_names_it() -> None:
-    with (
-        patch.dict(sys.modules, {"distributed": None}),
-        pytest.raises(InputError, match="uv sync --extra cl"),
-    ):
-        run_jobs_on_cluster([], "tcp://127.0.0.1:1", JobOptions(), lambda *_: None)
 
 
 def start_dask(folder: Path, *words: str) -> subprocess.Popen[str]:
@@ -172,8 +162,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]
 
 def sweep(folder: Path, cluster: str | None = None, **options: Any) -> list[RunRow]:
     with closing(create_sweep(make_settings("sort_fruit", SEEDS, FAKE, {}, None, False), folder)) as database:
-        jobs = list_jobs(database.settings, database.path.parent)
-        run_sweep(jobs, database, JobOptions(**options), cluster)
+        run_sweep(database, JobOptions(**options), cluster)
         rows = database.read_runs()
         assert [row.run_index for row in rows if row.items.placed != row.items.seen] == []
         return rows
@@ -212,3 +201,10 @@ def test_a_scheduler_without_workers_and_none_at_all_are_explained(tmp_path: Pat
         scheduler.communicate()
     with pytest.raises(InputError, match=r"cannot be reached: .*; start it with `dask scheduler`"):
         sweep(tmp_path / "runs", address)
+
+
+def test_without_the_extra_the_error_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "executive.campaign.cluster", raising=False)
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match="uv sync --extra cl"):
+        sweep(tmp_path, "tcp://127.0.0.1:1")

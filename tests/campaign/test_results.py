@@ -11,23 +11,24 @@ from xml.etree import ElementTree
 
 import pytest
 
-from executive.campaign.requirement import describe_unmet_conditions, format_junit, parse_requirement
 from executive.campaign.results import (
+    FILE_NAME,
     ItemRow,
     ResultsDatabase,
     RunRecord,
     RunRow,
     SkillRow,
     SweepSettings,
-    get_database_path,
     make_record,
 )
-from executive.campaign.sweep import create_database, make_settings, open_sweep
+from executive.campaign.sweep import make_settings, open_sweep
+from executive.campaign.sweep_reports import describe_unmet_conditions, format_junit, parse_requirement
 from executive.campaign.sweep_summary import (
     Estimate,
     FailureGroup,
     SkillSummary,
     SummaryStatistics,
+    SweepResults,
     compute_differences,
     estimate_proportion,
     estimate_ratio,
@@ -68,8 +69,12 @@ def make_run(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, 
     return RunRow(**defaults | fields)
 
 
-def repeat(run: RunRow) -> str:
-    return f"repeat {run.seed}"
+def repeat(seed: int) -> str:
+    return f"executive run sort.yaml --seed {seed} --set attempts=3 --scene s.yaml"
+
+
+def make_results(*runs: RunRow) -> SweepResults:
+    return SweepResults("", SETTINGS, runs, summarize_runs(runs, [], SETTINGS))
 
 
 def test_an_item_takes_the_time_from_its_selections_to_its_end() -> None:
@@ -108,11 +113,11 @@ def test_an_item_takes_the_time_from_its_selections_to_its_end() -> None:
 
 def test_all_rows_are_read_as_they_were_stored(tmp_path: Path) -> None:
     plain = RunRow(run_index=0, seed=0, status="SUCCESS")
-    with closing(ResultsDatabase(tmp_path / "results.sqlite", SETTINGS)) as database:
+    with closing(ResultsDatabase(tmp_path / FILE_NAME, SETTINGS)) as database:
         database.append(RECORD)
         database.append(RunRecord(plain))
         # Another process can read the stored runs.
-        with closing(ResultsDatabase(get_database_path(tmp_path))) as reader:
+        with closing(ResultsDatabase(tmp_path / FILE_NAME)) as reader:
             assert reader.settings == SETTINGS
             assert reader.read_runs() == [plain, RUN]
             assert reader.read_skills() == [SKILL]
@@ -155,13 +160,13 @@ def test_a_sweep_is_resumed_by_one_process_and_only_with_its_inputs(
     tmp_path: Path, settings: SweepSettings
 ) -> None:
     with (
-        closing(create_database(tmp_path, settings)),
+        closing(ResultsDatabase(tmp_path / FILE_NAME, settings)),
         pytest.raises(InputError, match="another process executes the sweep"),
     ):
         open_sweep(tmp_path)
     open_sweep(tmp_path).close()
     (tmp_path / "changed").mkdir()
-    create_database(tmp_path / "changed", replace(settings, inputs_hash="other")).close()
+    ResultsDatabase(tmp_path / "changed" / FILE_NAME, replace(settings, inputs_hash="other")).close()
     with pytest.raises(InputError, match=r"changed after the sweep .*/changed\" began"):
         open_sweep(tmp_path / "changed")
 
@@ -170,7 +175,7 @@ def test_the_summary_counts_objects_and_groups_problems() -> None:
     wrong = make_run(2, right=3, audit=Audit(agrees=False, right=2, wrong_bin=1))
     fault = make_run(4, "FAULT", crashes=2)
     runs = [make_run(0), make_run(1, "FAILURE", right=3, left=1), wrong, make_run(3, "FAILURE"), fault]
-    (summary,) = summarize_runs(runs, [], repeat)
+    (summary,) = summarize_runs(runs, [], SETTINGS)
     assert [
         (share.numerator, share.denominator, share.value)
         for share in (summary.success, summary.correct_objects, summary.agreement)
@@ -181,9 +186,9 @@ def test_the_summary_counts_objects_and_groups_problems() -> None:
     message = summary.failure_groups[1].message
     assert message.startswith("THE AUDIT DISAGREES: 1 in a wrong bin")
     assert summary.failure_groups == (
-        FailureGroup("FAILURE", "Grasp.missed", "", (1, 3), "", "runs/1", "repeat 1"),
-        FailureGroup("SUCCESS", "disagreement", "", (2,), message, "runs/2", "repeat 2"),
-        FailureGroup("FAULT", "Grasp.missed", "", (4,), "", "runs/4", "repeat 4"),
+        FailureGroup("FAILURE", "Grasp.missed", "", (1, 3), "", "runs/1", repeat(1)),
+        FailureGroup("SUCCESS", "disagreement", "", (2,), message, "runs/2", repeat(2)),
+        FailureGroup("FAULT", "Grasp.missed", "", (4,), "", "runs/4", repeat(4)),
     )
 
 
@@ -194,7 +199,7 @@ def test_variants_and_their_skills_are_separate() -> None:
         SkillRow(run_index=job, skill=name, activations=2, failed_activations=job, robot_time_s=time)
         for job, name, time in ((0, "Grasp", 1.0), (0, "Transit", 5.0), (1, "Grasp", 2.0), (2, "Grasp", 7.0))
     ]
-    first, second = summarize_runs(runs, skills, repeat)
+    first, second = summarize_runs(runs, skills, SETTINGS)
     assert (first.variant, second.variant) == ({"a": "1"}, {"a": "2"})
     assert first.skills == (SkillSummary("Transit", 2, 0, 2.5), SkillSummary("Grasp", 4, 1, 1.5))
     assert second.skills == (SkillSummary("Grasp", 2, 2, 7.0),)
@@ -256,7 +261,7 @@ def test_one_pair_has_no_interval_and_other_seeds_are_omitted() -> None:
 
 
 def find_unmet(text: str, *runs: RunRow) -> list[str]:
-    return describe_unmet_conditions(parse_requirement(text), runs, summarize_runs(runs, [], repeat))
+    return describe_unmet_conditions(parse_requirement(text), make_results(*runs))
 
 
 @pytest.mark.parametrize(
@@ -305,7 +310,7 @@ def test_each_run_is_a_test_case_of_the_junit_report() -> None:
         make_run(2, "FAULT", reason="fault", message="it broke"),
         make_run(3, audit=Audit(agrees=False, wrong_bin=1), variant={"speed": "1"}),
     ]
-    root = ElementTree.fromstring(format_junit("sort", runs, repeat).encode())
+    root = ElementTree.fromstring(format_junit(make_results(*runs)).encode())
     (suite,) = root
     assert (root.tag, suite.tag, suite.get("name")) == ("testsuites", "testsuite", "executive sweep sort")
     assert [suite.get(name) for name in ("tests", "failures", "errors", "time")] == ["4", "2", "1", "10.000"]
@@ -313,7 +318,7 @@ def test_each_run_is_a_test_case_of_the_junit_report() -> None:
         ("testcase", "sort", "2.500")
     }
     assert [case.get("name") for case in suite] == ["seed 0", "seed 1", "seed 2", "seed 3 speed=1"]
-    assert [case.findtext("system-out") for case in suite] == [f"repeat {seed}" for seed in range(4)]
+    assert [case.findtext("system-out") for case in suite] == list(map(SETTINGS.make_repeat_command, runs))
     problems = [case[0] for case in suite if len(case) > 1]
     assert [(one.tag, one.get("type")) for one in problems] == [
         ("failure", "Grasp.missed"), ("error", "fault"), ("failure", "disagreement"),

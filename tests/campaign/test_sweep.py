@@ -17,7 +17,7 @@ import pytest
 
 from executive.campaign.jobs import JobOptions, SweepJob, list_jobs, make_fault_record, run_job, run_jobs
 from executive.campaign.results import ResultsDatabase, RunRecord, RunRow, SweepSettings, make_record
-from executive.campaign.sweep import make_repeat_command, run_sweep
+from executive.campaign.sweep import run_sweep
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
@@ -116,7 +116,7 @@ def store_runs(
     """Sweep without a mission: `run` makes the record of a job."""
     monkeypatch.setattr("executive.campaign.sweep.run_job", run)
     with closing(ResultsDatabase(folder / "a", SETTINGS)) as database:
-        run_sweep(list_jobs(SETTINGS, folder), database, JobOptions(**options))
+        run_sweep(database, JobOptions(**options))
         return database.read_runs()
 
 
@@ -129,7 +129,7 @@ def test_every_seed_is_run_with_every_combination() -> None:
         (0, 0, "1x"), (1, 1, "1x"), (2, 0, "1y"), (3, 1, "1y"),
         (4, 0, "2x"), (5, 1, "2x"), (6, 0, "2y"), (7, 1, "2y"),
     ]  # fmt: skip
-    assert make_repeat_command(settings, make_sweep_record(jobs[3]).run) == (
+    assert settings.make_repeat_command(make_sweep_record(jobs[3]).run) == (
         "executive run sort --seed 1 --set a=1 --set b=1 --set c=y --scene s.yaml"
     )
 

@@ -7,13 +7,13 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
 from test_sweep_command import make_record
 
 from executive.campaign.jobs import SweepJob
-from executive.campaign.results import ResultsDatabase
 from executive.cli.main import main
 
 
@@ -21,14 +21,14 @@ from executive.cli.main import main
 def compare(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Result]:
     """Function that compares; runs of a mission with `cell.table.objects=[1, 1]` fail for even seeds."""
 
-    def run_sweep(jobs: list[SweepJob], database: ResultsDatabase, *_: object) -> None:
+    def run_jobs(jobs: list[SweepJob], _run: Any, _fail: Any, _options: Any, store: Any) -> None:
         for job in jobs:
             has_loss = job.settings.overrides.get("cell.table.objects") == "[1, 1]" and job.seed % 2 == 0
             record = make_record(job, "FAILURE" if has_loss else "SUCCESS")
-            run = replace(record.run, run_directory=str(tmp_path / f"{database.path.parent.name}{job.seed}"))
-            database.append(replace(record, run=run))
+            run = replace(record.run, run_directory=str(tmp_path / f"{job.runs_folder.name}{job.seed}"))
+            store(job.index, replace(record, run=run), 0)
 
-    monkeypatch.setattr("executive.campaign.sweep.run_sweep", run_sweep)
+    monkeypatch.setattr("executive.campaign.sweep.run_jobs", run_jobs)
 
     def invoke(*words: str) -> Result:
         runs = () if "--resume" in words else ("--runs", str(tmp_path / "runs"))

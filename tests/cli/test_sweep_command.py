@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 from click.testing import CliRunner, Result
 
 from executive.campaign.jobs import SweepJob
-from executive.campaign.results import ResultsDatabase, RunRecord, RunRow, SkillRow
+from executive.campaign.results import RunRecord, RunRow, SkillRow
 from executive.cli.main import main
 from executive.record.result import Audit, ItemCounts
 
@@ -34,11 +35,11 @@ def sweep(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Resu
     """Function that sweeps; the run of each job has the next of the statuses, and no run follows the last."""
 
     def invoke(statuses: str, *words: str) -> Result:
-        def run_sweep(jobs: list[SweepJob], database: ResultsDatabase, *_: object) -> None:
+        def run_jobs(jobs: list[SweepJob], _run: Any, _fail: Any, _options: Any, store: Any) -> None:
             for job, status in zip(jobs, statuses.split(), strict=False):
-                database.append(make_record(job, status))
+                store(job.index, make_record(job, status), 0)
 
-        monkeypatch.setattr("executive.campaign.sweep.run_sweep", run_sweep)
+        monkeypatch.setattr("executive.campaign.sweep.run_jobs", run_jobs)
         folder = () if "--resume" in words else ("sort_fruit", "--runs", str(tmp_path / "runs"))
         return CliRunner().invoke(main, ("sweep", *folder, *words))
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.cli.tables import print_report
+from executive.cli.progress import print_report
 from executive.training.metrics import (
     ClassMetrics,
     CountedRate,

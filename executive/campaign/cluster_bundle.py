@@ -1,4 +1,7 @@
-"""Worker side of the cluster execution: bundle, software comparison, returned run, and plugin of dask."""
+"""Exchange with the workers of a cluster: bundle of files, versions of the software, and returned runs.
+
+This file needs no package of the extra `cluster`.
+"""
 
 from __future__ import annotations
 
@@ -6,50 +9,32 @@ import functools
 import hashlib
 import importlib.util
 import io
-import multiprocessing
 import os
 import os.path
 import re
 import shutil
-import sys
-import tempfile
-import threading
-import uuid
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass, replace
 from importlib.metadata import distributions
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from distributed import Worker, WorkerPlugin, get_worker
 from packaging.utils import canonicalize_name
 
 import executive
-from executive.campaign.jobs import SweepJob, make_fault_record, run_job
+from executive import plugins
+from executive.campaign.jobs import SweepJob
 from executive.campaign.results import RunRecord
 from executive.errors import InputError
 from executive.mission.file_search import find_mission, get_shipped_folder
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.envelope import MEASUREMENT_SUFFIX
-from executive.plugins import (
-    CELL_KIND_GROUP,
-    DISTRIBUTION,
-    SKILL_GROUP,
-    find_project,
-    find_version,
-    list_entries,
-    list_requirements,
-    list_versions,
-)
-from executive.processes import WorkerPool
 from executive.record.run_directory import convert_os_errors, make_unique_folder
 from executive.tree.node_registry import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
 
 if TYPE_CHECKING:
     from distributed import Worker
-
 
 PACKAGES_FOLDER = ".packages"
 """Folder of the packages with skills, control nodes, detectors and kinds of cells, in an unpacked bundle."""
@@ -57,12 +42,22 @@ TEXT_SUFFIXES = (".yaml", ".yml", ".urdf", ".obj", ".mtl")
 """Suffixes of files that name further files: libraries, cells, weights, labels, meshes and textures."""
 _FILE_NAME_PATTERN = re.compile(r""""([^"\n]+)"|'([^'\n]+)'|([^\s"'<>,\[\]{}]+)""")
 """Pattern of a possible file name in a text: a quoted text or a word."""
-PLUGIN_GROUPS = (SKILL_GROUP, CONTROL_NODE_GROUP, DETECTOR_GROUP, CELL_KIND_GROUP)
+PLUGIN_GROUPS = (plugins.SKILL_GROUP, CONTROL_NODE_GROUP, DETECTOR_GROUP, plugins.CELL_KIND_GROUP)
 """Groups of entry points with which a package extends this project."""
 PROJECT_PACKAGES = ("executive", "skills")
 """Top-level packages of this project, which each worker has."""
 METADATA_FILES = ("METADATA", "entry_points.txt")
 """Files of a `dist-info` folder from which Python reads the entry points of a package."""
+CLUSTER_EXTRA = "cluster"
+"""Extra of this project with the packages for the connection to a scheduler."""
+FILES_KEY = "hash of the files of executive"
+"""Key of the hash of this project's files, which differs for commits with the same version number."""
+HASHED_SUFFIXES = (".py", ".yaml", ".onnx", ".urdf")
+"""Suffixes of the hashed files: code, shipped missions and cells, models of detectors and of the tool."""
+INSTALLATION_ADVICE = "install the same versions there, and start the scheduler and its workers again"
+"""Advice to the user of a worker with other software."""
+RUN_TEXT_SUFFIXES = (".html", ".json", ".jsonl", ".yaml")
+"""Suffixes of the files that may contain paths."""
 
 
 def make_bundle(jobs: Sequence[SweepJob]) -> bytes:
@@ -81,7 +76,7 @@ def make_bundle(jobs: Sequence[SweepJob]) -> bytes:
     values = {text for job in jobs for text in (*job.settings.overrides.values(), *job.variant.values())}
     files = {f"{PACKAGES_FOLDER}/{name}": content for name, content in _list_plugin_files()}
     files |= {str(path): path.read_bytes() for path in _find_named_files(paths, values)}
-    if project := find_project():
+    if project := plugins.find_project():
         files[str(project.file)] = project.file.read_bytes()
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
@@ -129,18 +124,17 @@ def _list_plugin_files() -> Iterator[tuple[str, bytes]]:
     for distribution in distributions():
         name = canonicalize_name(distribution.name)
         is_plugin = any(entry.group in PLUGIN_GROUPS for entry in distribution.entry_points)
-        if is_plugin and name != DISTRIBUTION:
+        if is_plugin and name != plugins.DISTRIBUTION:
             folder = f"{name.replace('-', '_')}-{distribution.version}.dist-info"
             for file in METADATA_FILES:
                 yield f"{folder}/{file}", (distribution.read_text(file) or "").encode()
-    entries = (entry for group in PLUGIN_GROUPS for entry in list_entries(group, "plugin").values())
+    entries = (entry for group in PLUGIN_GROUPS for entry in plugins.list_entries(group, "plugin").values())
     modules = {entry.value.partition(":")[0].partition(".")[0] for entry in entries}
     for module in sorted(modules.difference(PROJECT_PACKAGES)):
         yield from _list_module_files(module)
 
 
 def _list_module_files(module: str) -> Iterator[tuple[str, bytes]]:
-    """Yield path and content of the files of a top-level module."""
     spec = importlib.util.find_spec(module)
     if spec is None:
         raise InputError(f'the module "{module}" of an entry point does not exist; install its package again')
@@ -152,21 +146,23 @@ def _list_module_files(module: str) -> Iterator[tuple[str, bytes]]:
         yield Path(spec.origin).name, Path(spec.origin).read_bytes()
 
 
-CLUSTER_EXTRA = "cluster"
-"""Extra of this project with the packages for the connection to a scheduler."""
-FILES_KEY = "hash of the files of executive"
-"""Key of the hash of this project's files, which differs for commits with the same version number."""
-HASHED_SUFFIXES = (".py", ".yaml", ".onnx", ".urdf")
-"""Suffixes of the hashed files: code, shipped missions and cells, models of detectors and of the tool."""
-INSTALLATION_ADVICE = "install the same versions there, and start the scheduler and its workers again"
-"""Advice to the user of a worker with other software."""
-
-
 @functools.cache
 def describe_environment() -> Mapping[str, str]:
     """Return versions by name, and a hash of the code, missions and models of this project."""
-    cluster_versions = {name: find_version(name) for name in list_requirements(CLUSTER_EXTRA)}
-    return {**list_versions(), **cluster_versions, FILES_KEY: _hash_files()}
+    cluster_versions = {name: plugins.find_version(name) for name in plugins.list_requirements(CLUSTER_EXTRA)}
+    return {**plugins.list_versions(), **cluster_versions, FILES_KEY: _hash_files()}
+
+
+def _hash_files() -> str:
+    """Return a hash of the files of this project; a wheel and a checkout of one commit have the same hash."""
+    package = Path(executive.__file__).parent
+    digest = hashlib.sha256()
+    for folder in (package, package.parent / "skills", get_shipped_folder()):
+        files = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*")}
+        for name in sorted(name for name in files if name.endswith(HASHED_SUFFIXES)):
+            if not name.startswith("shipped/"):
+                digest.update(f"{name}\0".encode() + files[name].read_bytes())
+    return digest.hexdigest()[:12]
 
 
 def check_environment(client_versions: Mapping[str, str], dask_worker: Worker) -> None:
@@ -184,22 +180,6 @@ def check_environment(client_versions: Mapping[str, str], dask_worker: Worker) -
     if differences:
         subject = f"the software of the worker {dask_worker.address} differs from this computer"
         raise InputError(f"{subject}: {', '.join(differences)}; {INSTALLATION_ADVICE}")
-
-
-def _hash_files() -> str:
-    """Return a hash of the files of this project; a wheel and a checkout of one commit have the same hash."""
-    package = Path(executive.__file__).parent
-    digest = hashlib.sha256()
-    for folder in (package, package.parent / "skills", get_shipped_folder()):
-        files = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*")}
-        for name in sorted(name for name in files if name.endswith(HASHED_SUFFIXES)):
-            if not name.startswith("shipped/"):
-                digest.update(f"{name}\0".encode() + files[name].read_bytes())
-    return digest.hexdigest()[:12]
-
-
-RUN_TEXT_SUFFIXES = (".html", ".json", ".jsonl", ".yaml")
-"""Suffixes of the files that may contain paths."""
 
 
 @dataclass(frozen=True)
@@ -252,91 +232,3 @@ def unpack_run(returned: ReturnedRun) -> RunRecord:
         message = message.replace(str(folder), str(path))
     directory = str(path) if run.run_directory else ""
     return replace(returned.record, run=replace(run, message=message, run_directory=directory))
-
-
-class BundlePlugin(WorkerPlugin):
-    """A plugin with a bundle; a worker that joins later also receives the plugin.
-
-    Args:
-        bundle: Zip file with the files that the jobs read.
-        client_versions: Software of the client.
-    """
-
-    def __init__(self, bundle: bytes, client_versions: Mapping[str, str]) -> None:
-        self.name = f"executive-{uuid.uuid4()}"
-        self.client_versions = client_versions
-        self._bundle, self._working_directory = bundle, Path.cwd()
-
-    def setup(self, worker: Worker) -> None:
-        """Unpack the bundle into a temporary folder of the worker."""
-        self._root = Path(tempfile.mkdtemp(prefix="executive-", dir=worker.local_directory)).resolve()
-        with zipfile.ZipFile(io.BytesIO(self._bundle)) as archive:
-            archive.extractall(self._root)
-        # A dask nanny starts its worker as a daemon process, and a daemon process may not start a process.
-        multiprocessing.current_process().daemon = False
-        # A run may crash its process; the worker survives. All threads of the worker share one process.
-        self._lock = threading.Lock()
-        self._pool: WorkerPool | None = WorkerPool(1)
-
-    def teardown(self, worker: Worker) -> None:
-        """Kill the process of the jobs, and delete the folder."""
-        del worker
-        pool, self._pool = self._pool, None
-        if pool is not None:
-            pool.kill()
-        shutil.rmtree(self._root, ignore_errors=True)
-
-    def execute(self, job: SweepJob) -> ReturnedRun:
-        """Execute a job in the process of the plugin.
-
-        Raises:
-            BrokenExecutor: The process died.
-        """
-        with self._lock:
-            assert self._pool is not None, "The plugin was removed."
-            try:
-                return self._pool.submit(_execute_job, job, self._root, self._working_directory).result()
-            except BrokenExecutor:
-                self._pool = self._pool and WorkerPool(1)
-                raise
-
-
-def execute_on_worker(plugin_name: str, job: SweepJob) -> ReturnedRun:
-    """Execute a job on this worker with the plugin of this name.
-
-    Raises:
-        BrokenExecutor: The process of the job died.
-        InputError: The software of this worker differs from the software of the client.
-    """
-    worker = get_worker()
-    plugin = worker.plugins[plugin_name]
-    assert isinstance(plugin, BundlePlugin)
-    check_environment(plugin.client_versions, worker)
-    return plugin.execute(job)
-
-
-def _execute_job(job: SweepJob, root: Path, working_directory: Path) -> ReturnedRun:
-    """Execute a job in the working directory of the client below `root`, the folder of the bundle."""
-    # In a process group of its own, the process receives no Ctrl-C from the terminal of the worker.
-    os.setpgid(0, 0)
-    worker_directory = _make_worker_path(root, working_directory)
-    worker_directory.mkdir(parents=True, exist_ok=True)
-    os.chdir(worker_directory)
-    packages = str(root / PACKAGES_FOLDER)
-    if packages not in sys.path:
-        sys.path.insert(0, packages)
-        search_path = filter(None, (packages, os.environ.get("PYTHONPATH")))
-        os.environ["PYTHONPATH"] = os.pathsep.join(search_path)
-    mission = str(_make_worker_path(root, Path(job.settings.mission)))
-    scene = job.settings.scene and _make_worker_path(root, job.settings.scene)
-    settings = replace(job.settings, mission=mission, scene=scene)
-    job = replace(job, settings=settings, runs_folder=_make_worker_path(root, job.runs_folder))
-    try:
-        return pack_run(run_job(job), root)
-    except Exception as error:
-        return pack_run(make_fault_record(job, error), root)
-
-
-def _make_worker_path(root: Path, path: Path) -> Path:
-    """Return `root` joined with an absolute path without its leading slash, or a relative path as it is."""
-    return root / path.relative_to(path.anchor) if path.is_absolute() else path
