@@ -27,7 +27,7 @@ from executive.mission.schema import make_mission_schema
 from executive.mission.yaml_text import parse_yaml
 from executive.plugins import load_cell_kind, load_skills
 from executive.run.assembly import RunOptions, assemble
-from executive.tree.node_registry import load_control_nodes
+from executive.tree.node import load_control_nodes
 from executive.tree.specification import Source
 
 LONGEST = 300.0

@@ -9,17 +9,13 @@ from typing import NamedTuple
 
 from executive.cell.config import CellConfig
 from executive.mission.findings import find_similar_word, suggest_choice
-from executive.mission.instance import get_mission_node, make_inspection_instance
 from executive.mission.mission_file import Mission
-from executive.mission.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.ports import Wire, find_control_node_inputs, find_wires, find_written_variables
 from executive.plugins import Skills
 from executive.skill import HALT, HOLDING, Direction, Port, Skill
 from executive.tree.flow import INITIAL_STATE, UNKNOWN_STATE, Flow, FlowState, PossibleFailure, join_states
-from executive.tree.keys import Child
-from executive.tree.node import ControlNode
-from executive.tree.node_registry import ControlNodes
-from executive.tree.specification import Reference, Span
+from executive.tree.node import ControlNode, ControlNodes
+from executive.tree.specification import Node, Reference, SkillNode, Span, SubtreeNode
 
 
 class FlowAnalysis:
@@ -46,9 +42,9 @@ class FlowAnalysis:
         self.entry_states: dict[str, FlowState] = {}
         self.flows: dict[str, Flow] = {}
         self.body_end_states: dict[str, FlowState | None] = {}
-        self._skills, self._is_first_tick = skills, is_first_tick
+        self._skills = skills
+        self._is_first_tick = is_first_tick
         self._flows_by_entry: dict[tuple[str, FlowState], Flow] = {}
-        self._instances: dict[str, ControlNode] = {}
         self.root_flow = self._analyse(tree, entry)
 
     def find_skill_or_most_similar(self, name: str) -> type[Skill] | None:
@@ -67,10 +63,8 @@ class FlowAnalysis:
 
     def _compute_flow(self, node: Node, state: FlowState) -> Flow:
         match node:
-            case InnerNode():
-                if node.path not in self._instances:
-                    self._instances[node.path] = make_inspection_instance(node)
-                return self._instances[node.path].compute_flow(self._analyse_child, state)
+            case ControlNode():
+                return node.compute_flow(self._analyse, state)
             case SkillNode():
                 return self._compute_skill_flow(node, state)
             case SubtreeNode(body=Node() as body):
@@ -78,9 +72,6 @@ class FlowAnalysis:
         for child in node.children:
             self._analyse(child, UNKNOWN_STATE)
         return Flow.make_unknown(node.path)
-
-    def _analyse_child(self, child: Child, state: FlowState) -> Flow:
-        return self._analyse(get_mission_node(child), state)
 
     def _compute_skill_flow(self, node: SkillNode, state: FlowState) -> Flow:
         skill = self.find_skill_or_most_similar(node.skill)
@@ -202,9 +193,9 @@ class CheckContext:
         for root in (self.tree, *self.unused_subtrees):
             yield from root.walk()
 
-    def iterate_control_nodes(self) -> Iterator[InnerNode]:
+    def iterate_control_nodes(self) -> Iterator[ControlNode]:
         """Yield every control node of the tree and of the unused subtrees."""
-        return (node for node in self.iterate_nodes() if isinstance(node, InnerNode))
+        return (node for node in self.iterate_nodes() if isinstance(node, ControlNode))
 
     def find_installed_skills(self, nodes: Iterable[Node]) -> Iterator[tuple[SkillNode, type[Skill]]]:
         """Yield every node in `nodes` that runs an installed skill, with the skill."""

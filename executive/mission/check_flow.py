@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations
 from typing import TypeAlias
 
 from executive.mission.analysis import CheckContext, FlowAnalysis, VariableRead
 from executive.mission.findings import Finding, make_error, make_warning
-from executive.mission.instance import get_mission_node, make_inspection_instance
-from executive.mission.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.ports import find_control_node_outputs
 from executive.skill import EMPTY, HOLDING, Direction
 from executive.tree.flow import PossibleToolState
-from executive.tree.specification import Span
+from executive.tree.node import ControlNode
+from executive.tree.specification import Node, SkillNode, Span, SubtreeNode
 
 
 def find_unreachable(context: CheckContext) -> Iterator[Finding]:
@@ -22,14 +21,13 @@ def find_unreachable(context: CheckContext) -> Iterator[Finding]:
 
 
 def _find_unreachable_below(node: Node, flow: FlowAnalysis) -> Iterator[Finding]:
-    instance = make_inspection_instance(node) if isinstance(node, InnerNode) else None
     for child in node.children:
         if child.path in flow.entry_states:
             yield from _find_unreachable_below(child, flow)
-        elif instance and instance.unreachable_reason:
+        elif isinstance(node, ControlNode) and (reason := node.explain_unreachable()):
             is_list = child.is_list and not child.label
             name = "this list" if is_list else child.path_name
-            message = f"{name} can never run: {instance.unreachable_reason}"
+            message = f"{name} can never run: {reason}"
             yield make_warning(child.span, "unreachable", message)
             return
 
@@ -130,19 +128,19 @@ def find_read_races(context: CheckContext) -> Iterator[Finding]:
                     yield make_error(read.span, "shared-variable", message, hint)
 
 
-def _list_concurrent_branches(context: CheckContext) -> Iterator[list[Node]]:
+def _list_concurrent_branches(context: CheckContext) -> Iterator[Sequence[Node]]:
     """Yield the concurrent children of each control node that has concurrent children."""
     for node in context.iterate_control_nodes():
-        if branches := make_inspection_instance(node).concurrent_children:
-            yield [get_mission_node(branch) for branch in branches]
+        if node.concurrent_children:
+            yield node.concurrent_children
 
 
 def _find_first_leaf(node: Node) -> Node:
     """Return the first node without children, usually a skill, that the execution of a node reaches."""
     if isinstance(node, SubtreeNode):
         return _find_first_leaf(node.body) if node.body else node
-    first_child = make_inspection_instance(node).first_child if isinstance(node, InnerNode) else None
-    return _find_first_leaf(get_mission_node(first_child)) if first_child else node
+    first_child = node.first_child if isinstance(node, ControlNode) else None
+    return _find_first_leaf(first_child) if first_child else node
 
 
 def _find_reads(context: CheckContext, branch: Node) -> Iterator[VariableRead]:
@@ -173,7 +171,7 @@ def _find_first_writes(context: CheckContext, branch: Node) -> dict[str, _Variab
     for node in branch.walk():
         for key, variable in find_control_node_outputs(node):
             hint = f"Let {node.type_name} write another variable: {key.name}: other."
-            writes.setdefault(variable.name, (node.type_name, variable.span, hint))
+            writes.setdefault(variable, (node.type_name, variable.span, hint))
         for wire in context.find_wires(node, Direction.OUT):
             hint = f"Let {wire.skill} write another variable: {wire.port.name}: $other."
             writes.setdefault(wire.variable, (wire.skill, wire.span, hint))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import cast
 
+from pydantic import TypeAdapter
+
 from executive.mission import grammar
 from executive.mission.analysis import CheckContext, FlowAnalysis
 from executive.mission.findings import (
@@ -15,33 +17,40 @@ from executive.mission.findings import (
     suggest_choice,
     suggest_word,
 )
-from executive.mission.instance import find_upper_bound, get_mission_node, make_inspection_instance
-from executive.mission.nodes import InnerNode, KeyValue, Node, NodeSection, SkillNode, SubtreeNode, list_nodes
 from executive.mission.ports import ValueProblem, convert_constant
 from executive.skill import Skill, list_condition_violations
 from executive.tree.flow import UNKNOWN_NAME, Flow, FlowState, PossibleFailure
-from executive.tree.inspection import NodeFinding
-from executive.tree.keys import PREDEFINED_LISTS, Child, Key, KeyKind
-from executive.tree.node import ControlNode
-from executive.tree.specification import Literal, LocatedReason, Reason, Reference, Span
+from executive.tree.keys import PREDEFINED_LISTS, Key, KeySection, KeyValue, list_nodes
+from executive.tree.node import ControlNode, NodeFinding
+from executive.tree.specification import (
+    Child,
+    Literal,
+    LocatedReason,
+    Node,
+    Reason,
+    Reference,
+    SkillNode,
+    Span,
+    SubtreeNode,
+)
 
 
 def check_constants(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every constant of a control node that is invalid or a reference to a variable."""
     for node in context.iterate_control_nodes():
-        yield from _check_keys(context, node, node.declaring_class.keyword)
+        yield from _check_keys(context, node, node.keyword)
 
 
-def _check_keys(context: CheckContext, owner: InnerNode | NodeSection, name: str) -> Iterator[Finding]:
+def _check_keys(context: CheckContext, owner: ControlNode | KeySection, name: str) -> Iterator[Finding]:
     for key, value in owner.iterate_keys():
         for item in value if isinstance(value, tuple) else (value,):
-            if isinstance(item, NodeSection):
+            if isinstance(item, KeySection):
                 yield from _check_keys(context, item, key.name)
-        if key.kind is KeyKind.CONSTANT:
-            max_value = find_upper_bound(owner, key)
-            yield from check_constant(context, f"{name}.{key.name}", key, value, max_value)
+        if key.is_constant:
+            validator = key.make_validator(owner.find_max(key, owner.__dict__))
+            yield from check_constant(context, f"{name}.{key.name}", validator, value)
         elif (
-            key.kind is KeyKind.ELEMENTS
+            key.is_plain
             and isinstance(value, Literal)
             and not isinstance(value.value, list)
             and value.value not in PREDEFINED_LISTS
@@ -56,7 +65,7 @@ def _check_keys(context: CheckContext, owner: InnerNode | NodeSection, name: str
 
 
 def check_constant(
-    context: CheckContext, name: str, key: Key, value: KeyValue, max_value: int | None = None
+    context: CheckContext, name: str, validator: TypeAdapter[object], value: KeyValue
 ) -> Iterator[Finding]:
     """Yield an error if `value` is a variable or no valid constant; `name` is the subject of the message."""
     if isinstance(value, Reference):
@@ -64,7 +73,7 @@ def check_constant(
         yield make_error(value.span, "unknown-param", message, context.make_unknown_param_hint(value))
     elif isinstance(value, Literal):
         try:
-            convert_constant(key, value.value, max_value)
+            convert_constant(validator, value.value)
         except ValueProblem as problem:
             is_param_name = isinstance(value.value, str) and value.value in context.mission.params
             is_missing_dollar = is_param_name and problem.code == "wrong-type"
@@ -84,7 +93,7 @@ def run_node_checks(context: CheckContext) -> Iterator[Finding]:
             yield from non_conditions
             continue
         analysis = CheckerAnalysis(context, node, node.path in halted_paths, node.path in concurrent_paths)
-        for node_finding in make_inspection_instance(node).check(analysis):
+        for node_finding in node.check(analysis):
             yield _convert_node_finding(node, node_finding)
 
 
@@ -92,19 +101,16 @@ def _find_paths_below(
     context: CheckContext, select_children: Callable[[ControlNode], Sequence[Child]]
 ) -> set[str]:
     """Return the paths of all nodes in and below the selected children of all control nodes."""
-    instances = map(make_inspection_instance, context.iterate_control_nodes())
-    roots = [get_mission_node(child) for instance in instances for child in select_children(instance)]
+    roots = [child for node in context.iterate_control_nodes() for child in select_children(node)]
     return {node.path for root in roots for node in root.walk()}
 
 
-def _convert_node_finding(node: InnerNode, node_finding: NodeFinding) -> Finding:
+def _convert_node_finding(node: ControlNode, node_finding: NodeFinding) -> Finding:
     """Return the finding at the position of the key, reason or child that it names, or else of `node`."""
     span, message = node.span, node_finding.message
-    if isinstance(node_finding.place, LocatedReason):
+    if isinstance(node_finding.place, LocatedReason | Node):
         span = node_finding.place.span
-    elif isinstance(node_finding.place, Child):
-        span = get_mission_node(node_finding.place).span
-    elif isinstance(value := node.values.get(str(node_finding.place)), Literal):
+    elif isinstance(value := node.settings.get(str(node_finding.place)), Literal):
         span, message = value.span, message + value.origin_note
     make_finding = make_warning if node_finding.is_warning else make_error
     return make_finding(span, node_finding.code, message, node_finding.hint)
@@ -114,23 +120,22 @@ class CheckerAnalysis:
     """Implementation of `NodeAnalysis` for one control node."""
 
     def __init__(
-        self, context: CheckContext, node: InnerNode, is_halted_by_sibling: bool, is_concurrent: bool
+        self, context: CheckContext, node: ControlNode, is_halted_by_sibling: bool, is_concurrent: bool
     ) -> None:
         self._context, self._node = context, node
         self.is_halted_by_sibling, self.is_concurrent = is_halted_by_sibling, is_concurrent
 
     def get_flow(self, child: Child) -> Flow | None:
         """Return the possible outcomes of a child; None if the child never runs."""
-        return self._context.flow_analysis.flows.get(get_mission_node(child).path)
+        return self._context.flow_analysis.flows.get(child.path)
 
     def compute_flow(self, child: Child, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
         """Return the possible outcomes of a child that starts in `entry`; optionally, of its first tick."""
-        node = get_mission_node(child)
-        return FlowAnalysis(node, self._context.skills, entry, is_first_tick=is_first_tick).root_flow
+        return FlowAnalysis(child, self._context.skills, entry, is_first_tick=is_first_tick).root_flow
 
     def get_name(self, child: Child) -> str:
         """Return the last part of the path of a child."""
-        return get_mission_node(child).path_name
+        return child.path_name
 
     def describe_place(self, reason: Reason, relative_to: Reason) -> str:
         """Return the line of `reason` as a text, with the file if `relative_to` is in another file."""
@@ -139,17 +144,17 @@ class CheckerAnalysis:
 
     def is_written_as_constant(self, key: str) -> bool:
         """Return True if the mission has a constant at a key of the node, not a param or an argument."""
-        value = self._node.values.get(key)
+        value = self._node.settings.get(key)
         return isinstance(value, Literal) and not value.origin
 
     def list_skills(self, child: Child | None = None) -> Mapping[str, type[Skill] | None]:
         """Return the class of each skill in the subtree of a child or of the node; None if not installed."""
-        root = self._node if child is None else get_mission_node(child)
+        root = self._node if child is None else child
         names = [node.skill for node in root.walk() if isinstance(node, SkillNode)]
         return {name: self._context.skills.get(name) for name in names}
 
 
-def find_non_conditions(context: CheckContext, parent: InnerNode) -> Iterator[Finding]:
+def find_non_conditions(context: CheckContext, parent: ControlNode) -> Iterator[Finding]:
     """Yield an error for each child that is not a condition although its key allows only conditions."""
     for key, value in parent.iterate_keys():
         for node in list_nodes(value) if key.requires_conditions else ():
@@ -168,7 +173,7 @@ def _find_problem(context: CheckContext, node: Node) -> str:
             skill = context.skills[node.skill]
             effects = [*list_condition_violations(skill), "is not declared as a condition (is_condition)"]
             return "" if skill.is_condition else f"{node.skill} {effects[0]}"
-        case InnerNode() if not node.declaring_class.is_condition:
+        case ControlNode() if not node.is_condition:
             return "a list runs as a sequence" if node.is_list else f"{node.type_name} is no condition"
     return ""
 
@@ -186,8 +191,7 @@ def check_labels(context: CheckContext) -> Iterator[Finding]:
     # Paths contain keywords and keys, so a label must differ from all of them.
     reserved_words = {grammar.USE_KEYWORD, *context.node_classes}
     for node_class in context.node_classes.values():
-        keys, kinds = node_class.keys.values(), (KeyKind.NODE, KeyKind.NODES, KeyKind.SECTIONS)
-        reserved_words |= {key.name for key in keys if key.kind in kinds}
+        reserved_words |= {key.name for key in node_class.keys.values() if key.has_nodes}
     for node in context.iterate_nodes():
         if not node.label:
             continue
@@ -227,20 +231,20 @@ def check_failure_names(context: CheckContext) -> Iterator[Finding]:
 
 def _find_names_with_bodies(node: Node) -> Iterator[tuple[LocatedReason, str, Node]]:
     """Yield every failure name of a node, the keyword of the node, and the child that may fail."""
-    if not isinstance(node, InnerNode):
+    if not isinstance(node, ControlNode):
         return
     for key, name in _find_failure_names(node):
-        for body in list_nodes(node.values.get(key.failing_nodes_key, ())):
-            yield name, node.declaring_class.keyword, body
+        for body in node.list_children(key.failing_nodes_key):
+            yield name, node.keyword, body
 
 
-def _find_failure_names(owner: InnerNode | NodeSection) -> Iterator[tuple[Key, LocatedReason]]:
+def _find_failure_names(owner: ControlNode | KeySection) -> Iterator[tuple[Key, LocatedReason]]:
     """Yield the names of failures in the keys of a node and of its sections."""
     for key, value in owner.iterate_keys():
         for item in value if isinstance(value, tuple) else (value,):
             if isinstance(item, LocatedReason):
                 yield key, item
-            elif isinstance(item, NodeSection):
+            elif isinstance(item, KeySection):
                 yield from _find_failure_names(item)
 
 
@@ -280,8 +284,8 @@ def _find_reasons(flow: FlowAnalysis, body: Node) -> dict[str, list[str]]:
         if isinstance(node, SkillNode):
             skill = flow.find_skill_or_most_similar(node.skill)
             reasons.setdefault(node.skill, []).extend(skill.reasons if skill else ())
-        elif isinstance(node, InnerNode) and node.declaring_class.reasons:
-            reasons.setdefault(node.declaring_class.keyword, []).extend(node.declaring_class.reasons)
+        elif isinstance(node, ControlNode) and node.reasons:
+            reasons.setdefault(node.keyword, []).extend(node.reasons)
         if node.label and node.path in flow.flows:
             failures = flow.flows[node.path].failures
             reasons.setdefault(node.label, []).extend(failure.reason for failure in failures)

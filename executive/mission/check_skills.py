@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from typing import Annotated
+
+from pydantic import Field, TypeAdapter
 
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.errors import InputError
@@ -14,12 +17,10 @@ from executive.mission.cell_file import CellFile
 from executive.mission.check_nodes import check_constant
 from executive.mission.findings import Finding, make_error, make_warning, suggest_choice
 from executive.mission.mission_file import Mission
-from executive.mission.nodes import SkillNode
 from executive.mission.ports import find_literals, find_problem
 from executive.motion.payload import MIN_LIFT_ACCELERATION, SAFETY_FACTOR
 from executive.skill import HOLDING, Direction, Param, Port, Skill
-from executive.tree.keys import Key
-from executive.tree.specification import Literal, LocatedName, Reference, Span
+from executive.tree.specification import Literal, LocatedName, Reference, SkillNode, Span
 
 
 def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
@@ -180,8 +181,8 @@ def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Span]]:
                 yield value.value, value.span
 
 
-_LIMIT_KEY = Key(doc="Maximum number of objects.", ge=1, value_type=int)
-"""Type and minimum of the limit of a quota, in the form that `check_constant` accepts."""
+_LIMIT: TypeAdapter[object] = TypeAdapter(Annotated[int, Field(ge=1)])
+"""Validator of the limit of a quota."""
 
 
 def check_names(context: CheckContext) -> Iterator[Finding]:
@@ -204,7 +205,7 @@ def check_quotas(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for each invalid quota or quota without a route, and a warning for too few slots."""
     for quota in context.mission.quotas:
         bin, label, limit = quota.bin, quota.label, quota.limit
-        yield from check_constant(context, str(quota), _LIMIT_KEY, limit)
+        yield from check_constant(context, str(quota), _LIMIT, limit)
         if context.cell is None or bin.name not in context.cell.bins:
             continue
         routes = [route for route in context.mission.routes if label is None or route.label == label.name]

@@ -10,7 +10,6 @@ from executive.cell.objects import Item
 from executive.mission.analysis import CheckContext, VariableRead
 from executive.mission.check_skills import find_unknown_names
 from executive.mission.findings import Finding, describe_value, make_error, make_warning, suggest_choice
-from executive.mission.nodes import InnerNode, KeyValue, Node, SkillNode, SubtreeNode
 from executive.mission.ports import (
     Wire,
     describe_type,
@@ -23,7 +22,9 @@ from executive.mission.ports import (
     is_assignable,
 )
 from executive.skill import Direction, Param
-from executive.tree.specification import Literal, Reference, Span
+from executive.tree.keys import KeyValue
+from executive.tree.node import ControlNode
+from executive.tree.specification import Literal, Node, Reference, SkillNode, Span, SubtreeNode
 
 
 def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
@@ -73,9 +74,9 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
     read_variables = {read.variable for read in context.iterate_reads(context.tree)}
     for node in context.tree.walk():
         for _, variable in find_control_node_outputs(node):
-            if variable.name not in read_variables | set(context.mission.params):
-                message = f"no node in this {node.type_name} reads ${variable.name}"
-                hint = f"Write ${variable.name} where a node needs the value."
+            if variable not in read_variables | set(context.mission.params):
+                message = f"no node in this {node.type_name} reads ${variable}"
+                hint = f"Write ${variable} where a node needs the value."
                 yield make_warning(variable.span, "unread", message, hint)
         for wire in context.find_wires(node, Direction.OUT):
             if wire.is_explicit and wire.variable not in read_variables:
@@ -97,12 +98,12 @@ def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
 
     def check_node_and_children(node: Node, loop_writes: Mapping[str, tuple[str, Span]]) -> Iterator[Finding]:
         for _, variable in find_control_node_outputs(node):
-            if write := skill_writes.get(variable.name, loop_writes.get(variable.name)):
+            if write := skill_writes.get(variable, loop_writes.get(variable)):
                 name, span = write
                 place = span.describe_place(variable.span.source)
-                message = f"{node.type_name} writes ${variable.name}, and so does {name} in {place}"
+                message = f"{node.type_name} writes ${variable}, and so does {name} in {place}"
                 yield make_error(variable.span, "shadowed-variable", message, "Rename the loop variable.")
-            loop_writes = {**loop_writes, variable.name: (f"another {node.type_name}", variable.span)}
+            loop_writes = {**loop_writes, variable: (f"another {node.type_name}", variable.span)}
         for child in node.children:
             yield from check_node_and_children(child, loop_writes)
 
@@ -198,12 +199,12 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
     def check_node_and_children(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
         for key, variable in find_control_node_outputs(node):
             all_writers = {**skill_writers, **loop_writers}
-            elements = node.values.get(key.list_key, ()) if isinstance(node, InnerNode) else ()
+            elements = node.settings.get(key.list_key, ()) if isinstance(node, ControlNode) else ()
             list_writers = _find_list_writers(node, elements, all_writers)
             if isinstance(elements, Reference):
                 yield from _check_field(node.type_name, elements, all_writers.get(elements.name, ()))
                 yield from _check_lists(f"{node.type_name}.{key.list_key}", elements, list_writers)
-            loop_writers = {**loop_writers, variable.name: [*_make_element_writers(node, list_writers)]}
+            loop_writers = {**loop_writers, variable: [*_make_element_writers(node, list_writers)]}
         for wire in context.find_wires(node, Direction.IN):
             writers = loop_writers.get(wire.variable, skill_writers.get(wire.variable, ()))
             yield from _check_field(str(wire), wire.reference, writers)

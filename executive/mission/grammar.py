@@ -1,65 +1,32 @@
-"""Grammar of mission files: keys, kinds of values and meanings, for parser, schema and documentation."""
+"""Keys of mission and library files, as pydantic models, for parser, schema and reference documentation.
+
+The keys of a control node are fields of its class (`executive.tree.keys`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
+from pydantic.fields import FieldInfo
 
 from executive.tree.keys import Key, KeyOwner
+from executive.tree.specification import Child
 
-
-@dataclass(frozen=True)
-class GrammarKey:
-    """A key of a mapping.
-
-    Attributes:
-        kind: Kind of the value: `node`, `number`, `text`, `name`, `label`, `list`, `value` (any YAML value),
-            or a list or mapping of such values: `names`, `values`, `variables`, `paths`, `params`, `routes`,
-            `quotas`, `trees`, `args`.
-        doc: Meaning of the key, one sentence.
-        is_required: True if the key is mandatory.
-    """
-
-    kind: str
-    doc: str
-    is_required: bool = False
-
-
-GrammarKeys = Mapping[str, GrammarKey]
-"""The keys of a mapping by name."""
-
-AllowedKeys = Mapping[str, Key | GrammarKey]
-"""The keys of a mapping or of a control node by name."""
-
-LABEL_PATTERN = "[a-z_][a-z0-9_]*"
+NAME_EXPRESSION = "[A-Za-z_][A-Za-z0-9_]*"
+"""Regular expression of the names of params, arguments, variables and subtrees."""
+LABEL_EXPRESSION = "[a-z_][a-z0-9_]*"
 """Regular expression that every label matches."""
-
-LABEL_KEY = GrammarKey("label", "Label of the node, for references in `on`, `until` and `catch`.")
-"""The key `as`, an optional sibling of the keyword of a node."""
-
 SEQUENCE_KEYWORD = "sequence"
 """Keyword that is assumed if a node is written as a plain list."""
-
 USE_KEYWORD = "use"
 """Keyword of a node that uses a subtree."""
-
-USE_SIBLINGS: GrammarKeys = {
-    "with": GrammarKey("values", "Values of the subtree's arguments."),
-    "returns": GrammarKey("variables", "Variable of the caller for each returned one: `pose: $grasp_pose`."),
-}
-"""Keys at the level of `use`."""
-
 BEHAVIOUR_KEYWORD = "PyTree"
 """Keyword of a node that runs a behaviour of py_trees."""
-
 BEHAVIOUR_CLASS = "class"
 """Key below `PyTree` for the import path of the behaviour; all other keys are its arguments and ports."""
-
-BEHAVIOUR_KEYS: GrammarKeys = {
-    BEHAVIOUR_CLASS: GrammarKey("text", "Import path of the behaviour: `module:Class`.", is_required=True),
-}
-"""The keys below `PyTree` that every behaviour has."""
-
 KEYWORD_HINTS: Mapping[str, str] = {
     "then": "Write nodes that run in sequence as a list.",
     "do": 'Only control nodes have the key "do"; write the node without "do".',
@@ -68,43 +35,121 @@ KEYWORD_HINTS: Mapping[str, str] = {
 }
 """Hints for words that authors write as keywords by mistake."""
 
-MISSION_KEYS: GrammarKeys = {
-    "mission": GrammarKey("name", "Name of the mission.", is_required=True),
-    "description": GrammarKey("text", "Purpose of the mission, one sentence."),
-    "cell": GrammarKey("text", "Cell file: a path relative to this or the shipped folder.", is_required=True),
-    "library": GrammarKey("paths", "Library files: paths relative to this or the shipped folder."),
-    "params": GrammarKey("params", "Constants, read as `$name`; `--set name=value` replaces a value."),
-    "routes": GrammarKey("routes", "Bin, or list of permitted bins, for each class of objects."),
-    "quotas": GrammarKey("quotas", "Maximum number of objects in a bin, in all or of each class."),
-    "tree": GrammarKey("node", "Root node of the tree.", is_required=True),
-    "trees": GrammarKey("trees", "Subtrees by name."),
-}
-"""The keys of a mission file."""
+Text: TypeAlias = str | float | bool
+"""A text; a number or a boolean is a text, too."""
+Name: TypeAlias = Annotated[str, Field(pattern=f"^{NAME_EXPRESSION}$")]
+"""Name of a param, an argument, a variable or a subtree."""
+TitleName: TypeAlias = Annotated[str, Field(pattern="^[A-Za-z_][A-Za-z0-9_-]*$")]
+"""Name of a mission or a library."""
+DollarName: TypeAlias = Annotated[str, Field(pattern=rf"^\$?{NAME_EXPRESSION}$")]
+"""Name of a variable, with or without `$`."""
+ReferenceText: TypeAlias = Annotated[str, WithJsonSchema({"definition": "reference"})]
+"""`$name` or `$name.field`."""
+Files: TypeAlias = str | Annotated[list[str], Field(min_length=1)]
+"""Path of a file, or a list of paths."""
+Limit: TypeAlias = Annotated[int, Field(ge=1)] | ReferenceText
+"""Maximum number of objects."""
 
-LIBRARY_KEYS: GrammarKeys = {
-    "library": GrammarKey("name", "Name of the library.", is_required=True),
-    "description": GrammarKey("text", "Content of the library, one sentence."),
-    "trees": GrammarKey("trees", "Subtrees by name.", is_required=True),
-}
-"""The keys of a library file."""
 
-SUBTREE_KEYS: GrammarKeys = {
-    "doc": GrammarKey("text", "Purpose of the subtree, one sentence."),
-    "args": GrammarKey("args", "Arguments of the subtree: a list of names, or names with defaults."),
-    "returns": GrammarKey("names", "Variables that the caller gets; all other variables are then local."),
-    "do": GrammarKey("node", "Root node of the subtree.", is_required=True),
-}
-"""The keys of a subtree."""
+class FileKeys(BaseModel):
+    """Base class of the keys of a mapping in a mission or library file; each field declares a key."""
 
-PARAM_KEYS: GrammarKeys = {
-    "default": GrammarKey("value", "Default value; a param without a default must be set with `--set`."),
-    "type": GrammarKey("name", "text, integer, number, boolean or list; by default the type of `default`."),
-    "min": GrammarKey("number", "Minimum value."),
-    "max": GrammarKey("number", "Maximum value."),
-    "choices": GrammarKey("list", "Allowed values."),
-    "doc": GrammarKey("text", "Meaning of the param, one sentence."),
-}
-"""The keys of a param whose declaration is a mapping."""
+    model_config = ConfigDict(extra="forbid", defer_build=True, arbitrary_types_allowed=True)
+
+    @classmethod
+    @cache
+    def get_keys(cls) -> Mapping[str, FieldInfo]:
+        """Return the fields by the names of the keys in the file."""
+        return {field.alias or name: field for name, field in cls.model_fields.items()}
+
+
+class NodeKeys(FileKeys):
+    """Key at the level of the keyword of every node."""
+
+    label: Annotated[str, Field(pattern=f"^{LABEL_EXPRESSION}$")] = Field(
+        "", alias="as", description="Label of the node, for references in `on`, `until` and `catch`."
+    )
+
+
+class UseKeys(FileKeys):
+    """Keys at the level of `use`."""
+
+    arguments: dict[Name, object] | None = Field(
+        None, alias="with", description="Values of the subtree's arguments."
+    )
+    returns: dict[Name, ReferenceText] | None = Field(
+        None, description="Variable of the caller for each returned one: `pose: $grasp_pose`."
+    )
+
+
+class BehaviourKeys(FileKeys):
+    """The key below `PyTree` that every behaviour has; all other keys are its arguments and ports."""
+
+    model_config = ConfigDict(extra="allow")
+
+    behaviour: Text = Field(
+        alias=BEHAVIOUR_CLASS, description="Import path of the behaviour: `module:Class`."
+    )
+
+
+class ParamKeys(FileKeys):
+    """Keys of a param; a value without keys is the default."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"type": ["object", "array", "string", "number", "boolean", "null"]}
+    )
+
+    default: object = Field(
+        None, description="Default value; a param without a default must be set with `--set`."
+    )
+    type: Literal["text", "integer", "number", "boolean", "list"] = Field(
+        "text", description="text, integer, number, boolean or list; by default the type of `default`."
+    )
+    min: float = Field(0.0, description="Minimum value.")
+    max: float = Field(0.0, description="Maximum value.")
+    choices: list[object] | ReferenceText = Field([], description="Allowed values.")
+    doc: Text = Field("", description="Meaning of the param, one sentence.")
+
+
+class SubtreeKeys(FileKeys):
+    """Keys of a subtree; a node without these keys is a subtree without arguments."""
+
+    doc: Text = Field("", description="Purpose of the subtree, one sentence.")
+    args: dict[Name, object] | list[TitleName] | None = Field(
+        None, description="Arguments of the subtree: a list of names, or names with defaults."
+    )
+    returns: DollarName | list[DollarName] = Field(
+        [], description="Variables that the caller gets; all other variables are then local."
+    )
+    do: Child = Field(description="Root node of the subtree.")
+
+
+class LibraryKeys(FileKeys):
+    """Keys of a library file."""
+
+    library: TitleName = Field(description="Name of the library.")
+    description: Text = Field("", description="Content of the library, one sentence.")
+    trees: dict[Name, Child | SubtreeKeys] | None = Field(description="Subtrees by name.")
+
+
+class MissionKeys(FileKeys):
+    """Keys of a mission file."""
+
+    mission: TitleName = Field(description="Name of the mission.")
+    description: Text = Field("", description="Purpose of the mission, one sentence.")
+    cell: Text = Field(description="Cell file: a path relative to this or the shipped folder.")
+    library: Files = Field([], description="Library files: paths relative to this or the shipped folder.")
+    params: dict[Name, ParamKeys] | None = Field(
+        None, description="Constants, read as `$name`; `--set name=value` replaces a value."
+    )
+    routes: dict[str, Files] | None = Field(
+        None, description="Bin, or list of permitted bins, for each class of objects."
+    )
+    quotas: dict[str, Limit | Annotated[dict[str, Limit], Field(min_length=1)]] | None = Field(
+        None, description="Maximum number of objects in a bin, in all or of each class."
+    )
+    tree: Child = Field(description="Root node of the tree.")
+    trees: dict[Name, Child | SubtreeKeys] | None = Field(None, description="Subtrees by name.")
 
 
 def find_shorthand_key(owner: type[KeyOwner]) -> Key | None:

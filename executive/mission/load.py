@@ -22,14 +22,13 @@ from executive.mission.file_search import find_file_below, find_mission, get_shi
 from executive.mission.findings import Finding, MissionError, make_warning, sort_findings
 from executive.mission.mission_file import Mission, Subtree, parse_library, parse_mission
 from executive.mission.node_parser import NodeParser
-from executive.mission.nodes import InvalidNode, Node
 from executive.mission.yaml_text import parse_yaml
 from executive.perception.camera_model import find_calibration_doubts
 from executive.perception.envelope import find_unmeasured_detectors
 from executive.plugins import Skills
 from executive.skill import Skill
-from executive.tree.node_registry import ControlNodes, load_control_nodes
-from executive.tree.specification import Literal, LocatedName, Source
+from executive.tree.node import ControlNodes, load_control_nodes
+from executive.tree.specification import InvalidNode, Literal, LocatedName, Node, Source
 
 Check = Callable[[CheckContext], Iterator[Finding]]
 """Function that yields the findings of one check."""
@@ -249,7 +248,7 @@ def load_mission(
             findings += check_skills.check_slots(cell, config, mission)
     expansion = expand(mission, skills, _make_predefined_lists(mission, config) if config else {})
     mission = replace(mission, quotas=expansion.quotas)
-    tree = assign_paths(expansion.tree or InvalidNode(files.source.make_span(), label=""))
+    tree = assign_paths(expansion.tree or InvalidNode(span=files.source.make_span()))
     context = CheckContext(
         mission, tree, expansion.unused_subtrees, skills, node_classes, config, classes_by_detector
     )

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from pydantic import JsonValue
+from pydantic.fields import FieldInfo
 
 from executive.mission.findings import Finding, make_error, suggest_choice
-from executive.mission.grammar import AllowedKeys
+from executive.mission.grammar import NAME_EXPRESSION
 from executive.mission.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, iterate_scalars
 from executive.tree.specification import InvalidValue, Literal, LocatedReason, Reference, Setting, Span, Value
 
-NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+NAME_PATTERN = re.compile(NAME_EXPRESSION)
 """Matches the names of params, arguments, variables and subtrees."""
 REFERENCE_PATTERN = re.compile(rf"\$({NAME_PATTERN.pattern})(?:\.({NAME_PATTERN.pattern}))?")
 """Matches `$name` and `$name.field`."""
@@ -33,9 +34,11 @@ class MappingReader:
     """
 
     def __init__(
-        self, owner: str, span: Span, node: YamlNode, keys: AllowedKeys, findings: list[Finding]
+        self, owner: str, span: Span, node: YamlNode, keys: Mapping[str, FieldInfo], findings: list[Finding]
     ) -> None:
-        self.owner, self.span, self.findings = owner, span, findings
+        self.owner = owner
+        self.span = span
+        self.findings = findings
         self._mapping = node if isinstance(node, YamlMapping) else YamlMapping(node.span, ())
         if not isinstance(node, YamlMapping):
             message = f"{owner} must be a mapping, not {node.description}"
@@ -46,7 +49,7 @@ class MappingReader:
                 hint = suggest_choice(entry.key.text, keys, "Allowed keys")
                 self.add_error(entry.key.span, "unknown-key", f'{owner} has no key "{entry.key.text}"', hint)
         for name, key in keys.items():
-            if key.is_required and self.get(name) is None:
+            if key.is_required() and self.get(name) is None:
                 self.add_error(span, "missing-key", f'{owner} needs the key "{name}"')
 
     def get(self, key: str) -> YamlNode | None:

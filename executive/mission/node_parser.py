@@ -10,23 +10,34 @@ from executive.errors import InputError
 from executive.mission import grammar
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_settings, read_value
-from executive.mission.nodes import (
-    InnerNode,
-    InvalidNode,
-    KeyValue,
-    Node,
-    NodeSection,
-    SkillNode,
-    SubtreeNode,
-    list_nodes,
-)
 from executive.mission.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.plugins import Skills, load_behaviour
 from executive.skill import Skill
-from executive.tree.keys import Key, KeyKind, KeyOwner
-from executive.tree.node import ControlNode
-from executive.tree.node_registry import ControlNodes
-from executive.tree.specification import InvalidValue, Literal, LocatedName, Reference, Span
+from executive.tree.keys import (
+    Children,
+    Key,
+    KeyOwner,
+    KeySection,
+    KeyValue,
+    OwnerT,
+    list_member_types,
+    list_nodes,
+)
+from executive.tree.node import ControlNode, ControlNodes
+from executive.tree.specification import (
+    Child,
+    InvalidNode,
+    InvalidValue,
+    Literal,
+    Node,
+    Reason,
+    Reference,
+    SkillNode,
+    Span,
+    SubtreeNode,
+    Value,
+    VariableName,
+)
 
 _SKILL_PATTERN = re.compile(r"[A-Z][A-Za-z0-9]*")
 """Matches the names of skills, also of skills that are not installed."""
@@ -55,7 +66,7 @@ class NodeParser:
         if yaml_node is None or is_empty(yaml_node):
             if yaml_node is not None:
                 self.add_error(span, "missing-node", "a node is missing here")
-            return InvalidNode(span, "")
+            return InvalidNode(span=span)
         if isinstance(yaml_node, YamlSequence):
             return self._read_list(yaml_node)
         if isinstance(yaml_node, YamlScalar):
@@ -79,23 +90,23 @@ class NodeParser:
     def _read_list(self, sequence: YamlSequence) -> Node:
         nodes = self.read_nodes(sequence, "a list of nodes")
         if not nodes:
-            return InvalidNode(sequence.span, "")
+            return InvalidNode(span=sequence.span)
         node_class = self._node_classes[grammar.SEQUENCE_KEYWORD]
-        return InnerNode(sequence.span, "", node_class, {"do": nodes}, is_list=True)
+        return node_class.make({}, span=sequence.span, do=nodes, is_list=True)
 
     def _read_scalar(self, scalar: YamlScalar) -> Node:
         """Return the mission node for a YAML scalar: a skill, or a keyword that needs no body."""
         word = scalar.text
         node_class = self._node_classes.get(word)
         if node_class is not None and grammar.is_value_optional(node_class):
-            return InnerNode(scalar.span, "", node_class, {})
+            return node_class.make({}, span=scalar.span)
         if word in self._keywords:
             self.add_error(scalar.span, "missing-node", f'"{word}" needs a body: write {word}: ...')
         elif isinstance(scalar.value, str) and _SKILL_PATTERN.fullmatch(word):
-            return SkillNode(scalar.span, "", word, {})
+            return SkillNode.model_construct(span=scalar.span, skill=word, settings={})
         else:
             self._add_keyword_error(scalar.span, word)
-        return InvalidNode(scalar.span, "")
+        return InvalidNode(span=scalar.span)
 
     def _read_mapping(self, mapping: YamlMapping) -> Node:
         """Return the node of a mapping, which has one entry with a keyword or skill, and sibling entries."""
@@ -109,7 +120,7 @@ class NodeParser:
             if not siblings:
                 message = "a node is missing here: the mapping names no node"
                 self.add_error(mapping.span, "missing-node", message)
-            return InvalidNode(mapping.span, "")
+            return InvalidNode(span=mapping.span)
         node_entry, *surplus_entries = node_entries
         name, span = node_entry.key.text, node_entry.key.span
         for entry in surplus_entries:
@@ -118,10 +129,12 @@ class NodeParser:
         if surplus_entries:
             # Errors in surplus nodes are discarded, because the author must correct the mapping first.
             parts = [self.make_silent_parser()._read_entry(mapping, entry, "") for entry in surplus_entries]
-            return InvalidNode(span, label, (self._read_entry(mapping, node_entry, ""), *parts))
+            return InvalidNode(
+                span=span, label=label, parts=(self._read_entry(mapping, node_entry, ""), *parts)
+            )
         node_class = self._node_classes.get(name)
         sibling_keys = grammar.find_sibling_keys(node_class) if node_class else {}
-        allowed_keys = ("as", *(grammar.USE_SIBLINGS if name == grammar.USE_KEYWORD else sibling_keys))
+        allowed_keys = ("as", *(grammar.UseKeys.get_keys() if name == grammar.USE_KEYWORD else sibling_keys))
         for entry in siblings:
             key = entry.key.text
             if key not in allowed_keys:
@@ -132,7 +145,7 @@ class NodeParser:
                 self.add_error(entry.key.span, "unknown-key", message, hint)
         node = self._read_entry(mapping, node_entry, label)
         label_node = mapping.get("as")
-        return replace(node, label_span=label_node.span) if label_node else node
+        return node.replace(label_span=label_node.span) if label_node else node
 
     def _is_node_name(self, word: str) -> bool:
         """Return True for a keyword, and for a word that is written like the name of a skill."""
@@ -149,18 +162,22 @@ class NodeParser:
             return read_control_node(self, mapping, entry, label, self._node_classes[name])
         params = self._skills[name].params if name in self._skills else {}
         settings = read_settings(entry.value, name, self.findings, next(iter(params), "name"))
-        return SkillNode(entry.key.span, label, name, settings)
+        return SkillNode.model_construct(span=entry.key.span, label=label, skill=name, settings=settings)
 
     def _read_use(self, mapping: YamlMapping, entry: YamlEntry, label: str) -> Node:
         """Return the use of a subtree, or an invalid node if the name of the subtree is no text."""
-        siblings = [(key, value) for key in grammar.USE_SIBLINGS if (value := mapping.get(key)) is not None]
+        siblings = [
+            (key, value) for key in grammar.UseKeys.get_keys() if (value := mapping.get(key)) is not None
+        ]
         settings = {key: read_settings(value, key, self.findings) for key, value in siblings}
         if not (isinstance(entry.value, YamlScalar) and isinstance(entry.value.value, str)):
             message = f"use must be the name of a subtree, not {entry.value.description}"
             self.add_error(entry.value.span, "wrong-type", message)
-            return InvalidNode(entry.key.span, "")
+            return InvalidNode(span=entry.key.span)
         arguments, returns = settings.get("with", {}), settings.get("returns", {})
-        return SubtreeNode(entry.value.span, label, entry.value.text, arguments, returns)
+        return SubtreeNode.model_construct(
+            span=entry.value.span, label=label, name=entry.value.text, arguments=arguments, returns=returns
+        )
 
     def _read_behaviour(self, entry: YamlEntry, label: str) -> Node:
         """Return the skill node for a behaviour, or an invalid node if a mission cannot use the behaviour."""
@@ -176,9 +193,9 @@ class NodeParser:
                     raise InputError(f'there is another skill "{name}"; {advice}')
             except InputError as error:
                 self.add_error(path.span, "unknown-behaviour", str(error))
-                return InvalidNode(span, label)
+                return InvalidNode(span=span, label=label)
             self.behaviours[name] = skill
-            return SkillNode(span, label, name, settings)
+            return SkillNode.model_construct(span=span, label=label, skill=name, settings=settings)
         if isinstance(path, Literal | Reference):
             message = (
                 f"{keyword}.{class_key} must be an import path, for example py_trees.behaviours:TickCounter"
@@ -186,7 +203,7 @@ class NodeParser:
             self.add_error(path.span, "wrong-type", message)
         elif path is None and (is_empty(entry.value) or isinstance(entry.value, YamlMapping)):
             self.add_error(span, "missing-key", f'{keyword} needs the key "{class_key}"')
-        return InvalidNode(span, label)
+        return InvalidNode(span=span, label=label)
 
     def _read_label(self, mapping: YamlMapping) -> str:
         value = mapping.get("as")
@@ -195,7 +212,7 @@ class NodeParser:
         description = value.description
         if isinstance(value, YamlScalar):
             description = f'"{value.text}"'
-            if isinstance(value.value, str) and re.fullmatch(grammar.LABEL_PATTERN, value.text):
+            if isinstance(value.value, str) and re.fullmatch(grammar.LABEL_EXPRESSION, value.text):
                 return value.text
         self.add_error(value.span, "bad-label", f"a label must be a lower-case word, not {description}")
         return ""
@@ -236,11 +253,25 @@ def read_control_node(
         level = f" at the level of {keyword}" if set(any_of) <= set(sibling_keys) else ""
         alternatives = " or ".join(f'"{name}"' for name in any_of)
         parser.add_error(span, "missing-key", f"{keyword} needs {alternatives}{level}")
-    missing = {key.kind for name, key in node_class.keys.items() if key.is_required and name not in values}
-    if missing & {KeyKind.NODES, KeyKind.VARIABLE}:
+    missing = [key for name, key in node_class.keys.items() if key.is_required and name not in values]
+    if any(key.value_type in (Children, VariableName) for key in missing):
         children = [node for value in values.values() for node in list_nodes(value)]
-        return InvalidNode(span, label, tuple(children))
-    return InnerNode(span, label, node_class, values)
+        return InvalidNode(span=span, label=label, parts=tuple(children))
+    return _make_owner(node_class, values, span=span, label=label)
+
+
+def _make_owner(owner: type[OwnerT], values: Mapping[str, KeyValue], **attributes: object) -> OwnerT:
+    """Return a control node or a section with the values of its keys."""
+    settings: dict[str, Value] = {}
+    for name, value in values.items():
+        if isinstance(value, Value):
+            settings[name] = value
+        else:
+            attributes[owner.keys[name].attribute] = value
+    for key in owner.keys.values():
+        if key.is_required and not key.is_plain:
+            attributes.setdefault(key.attribute, ())
+    return owner.make(settings, **attributes)
 
 
 def _read_inner_keys(
@@ -248,7 +279,7 @@ def _read_inner_keys(
 ) -> dict[str, KeyValue]:
     """Return the values of the keys of `owner`; `yaml_node` is below the keyword `name`."""
     shorthand_key, inner_keys = grammar.find_shorthand_key(owner), grammar.find_inner_keys(owner)
-    is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
+    is_list_required = shorthand_key is not None and shorthand_key.value_type == Children
     # If the owner has inner keys, a mapping contains these keys, and is no node in shorthand form. A scalar
     # in place of a list is treated like a mapping, so that `MappingReader` reports it and lists the keys.
     is_scalar_for_list = is_list_required and isinstance(yaml_node, YamlScalar)
@@ -267,15 +298,16 @@ def _read_keys(
 
     `InvalidNode` or `InvalidValue` stands for a required node or constant that the mapping lacks.
     """
-    reader = MappingReader(name, span, yaml_node, keys, parser.findings)
+    fields = {key.name: key.field for key in keys.values()}
+    reader = MappingReader(name, span, yaml_node, fields, parser.findings)
     values: dict[str, KeyValue] = {}
     for key in keys.values():
         if (value_node := reader.get(key.name)) is not None:
             value = _read_value(parser, reader, key, value_node)
             values |= {} if value is None else {key.name: value}
-        elif key.is_required and key.kind is KeyKind.NODE:
-            values[key.name] = InvalidNode(span, "")
-        elif key.is_required and key.kind in (KeyKind.CONSTANT, KeyKind.ELEMENTS):
+        elif key.is_required and key.value_type == Child:
+            values[key.name] = InvalidNode(span=span)
+        elif key.is_required and key.is_plain:
             values[key.name] = InvalidValue(span)
     return values
 
@@ -283,61 +315,65 @@ def _read_keys(
 def _read_value(parser: NodeParser, reader: MappingReader, key: Key, yaml_node: YamlNode) -> KeyValue | None:
     """Return the value of a key, or None after an error and for an omitted optional child."""
     span = reader.get_key_span(key.name)
-    match key.kind:
-        case KeyKind.NODE:
-            is_omitted = is_empty(yaml_node) and key.shorthand and not key.is_required
-            return None if is_omitted else parser.read_node(yaml_node, span)
-        case KeyKind.NODES:
-            nodes = parser.read_nodes(yaml_node, reader.owner)
-            if key.max_count is None or len(nodes) <= key.max_count:
-                return nodes or None
-            message = f"{reader.owner} has {len(nodes)} branches, but may have at most {key.max_count}"
-            parser.add_error(reader.span, "too-large", message)
-            return None
-        case KeyKind.REASONS:
-            return reader.read_reasons(key.name)
-        case KeyKind.REASONS_OR_SECTIONS:
-            names = reader.read_reasons(key.name, tuple(key.section.keys))
-            mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
-            return *names, *(_read_section(parser, key, item, item.span) for item in mappings)
-        case KeyKind.VARIABLE:
-            return _read_variable(parser, reader, key.name)
-        case KeyKind.SECTION:
-            return _read_section(parser, key, yaml_node, span)
-        case KeyKind.SECTIONS:
-            return tuple(_read_sections(parser, key, yaml_node))
-    return read_value(yaml_node, parser.findings)
+    if key.is_plain:
+        return read_value(yaml_node, parser.findings)
+    if key.value_type == Child:
+        is_omitted = is_empty(yaml_node) and key.shorthand and not key.is_required
+        return None if is_omitted else parser.read_node(yaml_node, span)
+    if key.value_type == Children:
+        nodes = parser.read_nodes(yaml_node, reader.owner)
+        if key.max_count is None or len(nodes) <= key.max_count:
+            return nodes or None
+        message = f"{reader.owner} has {len(nodes)} branches, but may have at most {key.max_count}"
+        parser.add_error(reader.span, "too-large", message)
+        return None
+    if key.value_type == VariableName:
+        return _read_variable(parser, reader, key.name)
+    section = key.section
+    if section is None:
+        return reader.read_reasons(key.name)
+    if key.value_type is section:
+        return _read_section(parser, key.name, section, yaml_node, span)
+    if Reason in list_member_types(key.value_type):
+        names = reader.read_reasons(key.name, tuple(section.keys))
+        mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
+        return *names, *(_read_section(parser, key.name, section, item, item.span) for item in mappings)
+    return tuple(_read_sections(parser, key.name, section, yaml_node))
 
 
-def _read_variable(parser: NodeParser, reader: MappingReader, key: str) -> LocatedName | None:
+def _read_variable(parser: NodeParser, reader: MappingReader, key: str) -> VariableName | None:
     """Return the output variable of a key; for `$name`, add an error and return the variable `name`."""
-    variable = LocatedName(reader.read_text(key), reader.get_value_span(key))
-    if NAME_PATTERN.fullmatch(variable.name):
-        return variable
+    text = reader.read_text(key)
+    span = reader.get_value_span(key)
+    if NAME_PATTERN.fullmatch(text):
+        return VariableName(text, span=span)
     hint = f"Write the name without $, for example {key}: target; $target is then the value."
-    message = f'"{variable.name}" is no valid name of a variable'
-    parser.add_error(variable.span, "bad-name", message, hint)
-    name = variable.name.removeprefix("$")
-    return LocatedName(name, variable.span) if NAME_PATTERN.fullmatch(name) else None
+    parser.add_error(span, "bad-name", f'"{text}" is no valid name of a variable', hint)
+    name = text.removeprefix("$")
+    return VariableName(name, span=span) if NAME_PATTERN.fullmatch(name) else None
 
 
-def _read_section(parser: NodeParser, key: Key, yaml_node: YamlNode, span: Span) -> NodeSection:
+def _read_section(
+    parser: NodeParser, key: str, section: type[KeySection], yaml_node: YamlNode, span: Span
+) -> KeySection:
     """Return the section below a key."""
-    values = _read_inner_keys(parser, key.name, span, yaml_node, key.section)
-    if key.section.any_of and isinstance(yaml_node, YamlMapping) and not yaml_node.entries:
-        alternatives = " or ".join(f'"{name}"' for name in key.section.any_of)
-        parser.add_error(span, "missing-key", f"{key.name} needs {alternatives}")
-    return NodeSection(key.section, span, values)
+    values = _read_inner_keys(parser, key, span, yaml_node, section)
+    if section.any_of and isinstance(yaml_node, YamlMapping) and not yaml_node.entries:
+        alternatives = " or ".join(f'"{name}"' for name in section.any_of)
+        parser.add_error(span, "missing-key", f"{key} needs {alternatives}")
+    return _make_owner(section, values, span=span)
 
 
-def _read_sections(parser: NodeParser, key: Key, yaml_node: YamlNode) -> Iterable[NodeSection]:
+def _read_sections(
+    parser: NodeParser, key: str, section: type[KeySection], yaml_node: YamlNode
+) -> Iterable[KeySection]:
     """Yield the sections of a list, or a single section."""
-    kind = "mapping with " + " and ".join(f'"{name}"' for name in key.section.keys)
+    kind = "mapping with " + " and ".join(f'"{name}"' for name in section.keys)
     if not isinstance(yaml_node, YamlSequence | YamlMapping):
-        message = f"{key.name} must be a {kind}, or a list of such mappings, not {yaml_node.description}"
+        message = f"{key} must be a {kind}, or a list of such mappings, not {yaml_node.description}"
         parser.add_error(yaml_node.span, "wrong-type", message)
         return
     if isinstance(yaml_node, YamlSequence) and not yaml_node.items:
-        parser.add_error(yaml_node.span, "empty-list", f"{key.name} needs at least one {kind}")
+        parser.add_error(yaml_node.span, "empty-list", f"{key} needs at least one {kind}")
     for item in yaml_node.items if isinstance(yaml_node, YamlSequence) else (yaml_node,):
-        yield _read_section(parser, key, item, item.span)
+        yield _read_section(parser, key, section, item, item.span)

@@ -15,10 +15,10 @@ from pydantic import TypeAdapter, ValidationError
 from executive.behaviours import find_mission_type
 from executive.cell.objects import KnownItem, RefersTo
 from executive.mission.findings import describe_validation_error, describe_value, suggest_word
-from executive.mission.nodes import InnerNode, Node, SkillNode
 from executive.skill import Direction, Param, Port, Skill
-from executive.tree.keys import Key, KeyKind
-from executive.tree.specification import Literal, LocatedName, Reference, Span
+from executive.tree.keys import Key
+from executive.tree.node import ControlNode
+from executive.tree.specification import Literal, Node, Reference, SkillNode, Span, VariableName
 
 _DESCRIPTIONS = {
     str: "a text",
@@ -164,24 +164,19 @@ def convert_value(value: object, declared_type: object) -> object:
     """
     if not is_plain_type(declared_type):
         raise ValueProblem(f"must be a variable, not {describe_value(value)}")
-    return _validate(_get_adapter(declared_type), value)
+    return convert_constant(_get_adapter(declared_type), value)
 
 
-def convert_constant(key: Key, value: object, max_value: int | None = None) -> object:
-    """Return a plain value converted to the type of a key; a number must not exceed `max_value`.
+def convert_constant(validator: TypeAdapter[object], value: object) -> object:
+    """Return a plain value converted by a validator.
 
     Raises:
         ValueProblem: The value cannot be converted, or is out of bounds.
     """
-    return _validate(key.make_validator(max_value), value)
-
-
-def _validate(adapter: TypeAdapter[object], value: object) -> object:
-    """Return the converted value, or raise ValueProblem."""
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueProblem(f"must be a finite number, not {value}")
     try:
-        return adapter.validate_json(json.dumps(value), strict=True)
+        return validator.validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
         # A union has one error per type. The most useful error is a violated bound, such as `less_than`.
         errors = sorted(error.errors(include_url=False), key=lambda details: "than" not in details["type"])
@@ -255,27 +250,27 @@ def find_literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
             yield name, setting.value
 
 
-def find_control_node_outputs(node: Node) -> Iterator[tuple[Key, LocatedName]]:
+def find_control_node_outputs(node: Node) -> Iterator[tuple[Key, VariableName]]:
     """Yield each key of a control node that names an output variable, and the variable."""
-    if isinstance(node, InnerNode):
+    if isinstance(node, ControlNode):
         for key, value in node.iterate_keys():
-            if isinstance(value, LocatedName):
+            if isinstance(value, VariableName):
                 yield key, value
 
 
 def find_control_node_inputs(node: Node) -> Iterator[Reference]:
     """Yield the variables that a control node reads as lists of elements."""
-    if isinstance(node, InnerNode):
+    if isinstance(node, ControlNode):
         for key, value in node.iterate_keys():
-            if key.kind is KeyKind.ELEMENTS and isinstance(value, Reference):
+            if key.is_plain and not key.is_constant and isinstance(value, Reference):
                 yield value
 
 
 def find_written_variables(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
     """Return the variables that the nodes of a tree may write."""
-    variables = set()
+    variables: set[str] = set()
     for node in root.walk():
-        variables |= {variable.name for _, variable in find_control_node_outputs(node)}
+        variables |= {variable for _, variable in find_control_node_outputs(node)}
         if isinstance(node, SkillNode) and node.skill in skills:
             variables |= {wire.variable for wire in find_wires(node, skills[node.skill], Direction.OUT)}
     return variables

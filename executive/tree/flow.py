@@ -8,8 +8,7 @@ from functools import reduce
 from typing import TypeAlias
 
 from executive.skill import ANY, EMPTY, HOLDING, ToolState
-from executive.tree.keys import Child
-from executive.tree.specification import Reason
+from executive.tree.specification import Node, Reason
 
 UNKNOWN_NAME = "*"
 """Placeholder for an unknown source or an unknown reason of a failure."""
@@ -199,12 +198,12 @@ class Flow:
         return replace(self, failures=failures)
 
 
-FlowFunction: TypeAlias = Callable[[Child, FlowState], Flow]
+FlowFunction: TypeAlias = Callable[[Node, FlowState], Flow]
 """Function that returns the possible outcomes of a child from a state."""
 
 
 def find_fixed_point(
-    get_flow: FlowFunction, child: Child, entry: FlowState, get_next_entry: Callable[[Flow], FlowState | None]
+    get_flow: FlowFunction, child: Node, entry: FlowState, get_next_entry: Callable[[Flow], FlowState | None]
 ) -> tuple[Flow, FlowState]:
     """Return the possible outcomes of a child that runs repeatedly, and the joined state of all entries.
 

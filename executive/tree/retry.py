@@ -8,10 +8,10 @@ from math import inf, isfinite
 
 from executive.skill import Seconds
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, find_fixed_point, join_states
-from executive.tree.inspection import Advice, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
-from executive.tree.keys import Child, KeySection, Reasons, key
-from executive.tree.loops import GeneratorNode, NodeRun
-from executive.tree.specification import Reason, format_reasons
+from executive.tree.keys import KeySection, Reasons, key
+from executive.tree.loops import GeneratorBehaviour, NodeRun
+from executive.tree.node import Advice, ControlNode, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
+from executive.tree.specification import Child, Node, Reason, format_reasons
 from executive.tree.tree_node import Failure
 
 _GIVE_UP = "give up: the recovery failed"
@@ -38,7 +38,7 @@ class Backoff(KeySection):
             return self.max
 
 
-class Retry(GeneratorNode):
+class Retry(ControlNode):
     """Run the body again after a failure.
 
     Failures that `on` does not list, and the failure of the last attempt, are passed on. Before every further
@@ -51,6 +51,7 @@ class Retry(GeneratorNode):
     """
 
     keyword = "retry"
+    symbol = "↻"
 
     attempts: int = key(ge=1, doc="Maximum number of attempts, including the first.")
     on: Reasons = key(default=(), doc="Failures after which the body runs again; every failure if not given.")
@@ -66,23 +67,6 @@ class Retry(GeneratorNode):
         reasons = format_reasons(self.on) or "any failure"
         backoff_text = "" if self.backoff is None else f", backoff {self.backoff}"
         return f"up to {self.attempts} attempts, on {reasons}{backoff_text}"
-
-    def run(self) -> NodeRun:
-        """Run the body until it succeeds or no attempt is left; between attempts, wait and run `recover`."""
-        attempt = 1
-        while True:
-            failure = yield from self.run_child(self.do)
-            if not failure or attempt == self.attempts or (self.on and not failure.matches(self.on)):
-                return failure
-            delay = 0.0 if self.backoff is None else self.backoff.compute_delay(attempt)
-            delay_text = f" in {delay:g} s" if delay else ""
-            attempt += 1
-            self.report_choice(f"attempt {attempt} of {self.attempts}{delay_text}", failure)
-            yield from self.clock.sleep(delay)
-            if self.recover and (recovery_failure := (yield from self.run_child(self.recover))):
-                self.report_choice(_GIVE_UP, recovery_failure)
-                return failure
-            yield from self.end_iteration()
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes, by fixed-point iteration over body and recovery."""
@@ -123,8 +107,7 @@ class Retry(GeneratorNode):
             message = "a retry with 1 attempt never runs its body again"
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
-    @property
-    def unreachable_reason(self) -> str:
+    def explain_unreachable(self) -> str:
         """Reason why the recovery never runs; "" if another finding explains this."""
         # `check_failure_names` reports failures in `on` that the body cannot have.
         if self.on and self.attempts > 1:
@@ -163,7 +146,7 @@ class Retry(GeneratorNode):
         elif attempt == attempts and (not self.on or failure.matches(self.on)):
             yield Advice(f"allow more than {attempts} attempt{'s' if attempts > 1 else ''}")
 
-    def list_contingencies(self) -> Iterator[tuple[str, Child]]:
+    def list_contingencies(self) -> Iterator[tuple[str, Node]]:
         """Yield the key `recover` and the node at this key, if the node has a recovery."""
         if self.recover is not None:
             yield "recover", self.recover
@@ -174,6 +157,32 @@ class Retry(GeneratorNode):
         if self.on or self.recover or self.backoff:
             return None
         return Counterpart("RetryUntilSuccessful", {"num_attempts": "attempts"})
+
+    class Behaviour(GeneratorBehaviour):
+        """Runs the node."""
+
+        node: Retry
+
+        def run(self) -> NodeRun:
+            """Run the body until it succeeds or no attempt is left; in between, wait and run `recover`."""
+            attempt = 1
+            while True:
+                failure = yield from self.run_child(self.node.do)
+                if (
+                    not failure
+                    or attempt == self.node.attempts
+                    or (self.node.on and not failure.matches(self.node.on))
+                ):
+                    return failure
+                delay = 0.0 if self.node.backoff is None else self.node.backoff.compute_delay(attempt)
+                delay_text = f" in {delay:g} s" if delay else ""
+                attempt += 1
+                self.report_choice(f"attempt {attempt} of {self.node.attempts}{delay_text}", failure)
+                yield from self.clock.sleep(delay)
+                if self.node.recover and (recovery_failure := (yield from self.run_child(self.node.recover))):
+                    self.report_choice(_GIVE_UP, recovery_failure)
+                    return failure
+                yield from self.end_iteration()
 
 
 def _format_counts(counts: Mapping[str, int]) -> str:
@@ -187,7 +196,7 @@ class Catch(KeySection):
     do: Child = key(doc="Node to run after one of the failures in `on`.")
 
 
-class TryCatch(GeneratorNode):
+class TryCatch(ControlNode):
     """Run the body, a handler if the body fails, and `finally` at the end.
 
     The node succeeds if the body or the handler succeeds. `finally` runs after success and failure, but not
@@ -211,21 +220,9 @@ class TryCatch(GeneratorNode):
         sibling=True, default=None, doc="Node to run at the end, after success and failure."
     )
 
-    def describe_trigger(self, child: Child) -> str:
+    def describe_trigger(self, child: Node) -> str:
         """Return the failures after which the handler `child` runs, as a text: `on Grasp.missed`."""
         return next((f"on {format_reasons(handler.on)}" for handler in self.catch if handler.do is child), "")
-
-    def run(self) -> NodeRun:
-        """Run the body, then the handler of its failure, then `finally`."""
-        failure = yield from self.run_child(self.do)
-        if failure and (handler := self._find_handler(failure)):
-            self.report_choice("catch", failure)
-            failure = yield from self.run_child(handler)
-        failure_of_finally = (yield from self.run_child(self.finally_)) if self.finally_ else None
-        return failure or failure_of_finally
-
-    def _find_handler(self, failure: Failure) -> Child | None:
-        return next((handler.do for handler in self.catch if failure.matches(handler.on)), None)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes.
@@ -269,7 +266,7 @@ class TryCatch(GeneratorNode):
             earlier_reasons.append(reason)
 
     @property
-    def first_child(self) -> Child | None:
+    def first_child(self) -> Node | None:
         """The body."""
         return self.do
 
@@ -288,15 +285,34 @@ class TryCatch(GeneratorNode):
         if failure.child is self.do:
             yield Advice("catch this failure in the try")
 
-    def list_contingencies(self) -> Iterator[tuple[str, Child]]:
+    def list_contingencies(self) -> Iterator[tuple[str, Node]]:
         """Yield the handlers with names such as `catch on Grasp.missed`, then `finally`."""
         for handler in self.catch:
             yield f"catch on {format_reasons(handler.on)}", handler.do
         if self.finally_ is not None:
             yield "finally", self.finally_
 
+    class Behaviour(GeneratorBehaviour):
+        """Runs the node."""
 
-def _append_finally(finally_child: Child, flow: Flow, get_flow: FlowFunction) -> Flow:
+        node: TryCatch
+
+        def run(self) -> NodeRun:
+            """Run the body, then the handler of its failure, then `finally`."""
+            failure = yield from self.run_child(self.node.do)
+            if failure and (handler := self._find_handler(failure)):
+                self.report_choice("catch", failure)
+                failure = yield from self.run_child(handler)
+            failure_of_finally = (
+                (yield from self.run_child(self.node.finally_)) if self.node.finally_ else None
+            )
+            return failure or failure_of_finally
+
+        def _find_handler(self, failure: Failure) -> Node | None:
+            return next((handler.do for handler in self.node.catch if failure.matches(handler.on)), None)
+
+
+def _append_finally(finally_child: Node, flow: Flow, get_flow: FlowFunction) -> Flow:
     """Return the possible outcomes of a node whose `finally_child` runs after each outcome in `flow`."""
     after_success = get_flow(finally_child, flow.success) if flow.success else Flow(None, {}, None)
     failures, halted = dict(after_success.failures), join_states((flow.halted, after_success.halted))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import UserDict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import cast
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -67,11 +66,6 @@ class NodeContext:
     blackboard: Blackboard
     label: str = ""
     emit: Emit = discard_event
-
-
-def make_inspection_context(path: str = "", label: str = "") -> NodeContext:
-    """Return a context without a run, for a node that is inspected but never executed."""
-    return NodeContext(path, cast("Clock", None), cast("Ledger", None), Blackboard(), label)
 
 
 class TreeNode(Behaviour):

@@ -16,7 +16,7 @@ from executive.mission.schema import make_cell_schema, make_library_schema, make
 from executive.mission.yaml_text import parse_yaml
 from executive.plugins import load_skills
 from executive.skill import Skill
-from executive.tree.node_registry import load_control_nodes
+from executive.tree.node import load_control_nodes
 from executive.tree.specification import Source
 
 MISSIONS = get_shipped_folder()

@@ -20,7 +20,7 @@ from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.envelope import MEASUREMENT_SUFFIX
 from executive.plugins import CELL_KIND_GROUP, SKILL_GROUP, find_project, list_entries
 from executive.run.versions import DISTRIBUTION
-from executive.tree.node_registry import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
+from executive.tree.node import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
 
 PACKAGES_FOLDER = ".packages"
 """Folder of the packages with skills, control nodes, detectors and kinds of cells, in an unpacked bundle."""

@@ -9,12 +9,12 @@ from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import detect_and_record_drop
-from executive.mission.nodes import SkillNode
 from executive.record.timeline import Activation
 from executive.skill import EMPTY, HOLDING, Skill
 from executive.testing import faults as effects
 from executive.testing.faults import Effect, ObjectChoice, ScheduledFault, after, between, during
 from executive.testing.substitutes import make_raising, make_substitute
+from executive.tree.specification import SkillNode
 
 FAULT_DURATIONS = (0.5, 5.0)
 """Durations of short faults of detectors and tool [s]."""
