@@ -36,7 +36,8 @@ def check_tool_states(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every skill that may start with the opposite of the required tool state."""
     flow = context.flow_analysis
     for node, skill in context.find_installed_skills(flow.nodes[path] for path in flow.entry_states):
-        required_state, entry_state = skill.tool_state[0], flow.entry_states[node.path]
+        required_state = skill.tool_state[0]
+        entry_state = flow.entry_states[node.path]
         name, span = context.locate_skill(node)
         if required_state is EMPTY and (tool := entry_state.find_tool_state(HOLDING)):
             message = f"{name} needs an empty tool, but the tool may hold an object here"
@@ -50,7 +51,8 @@ def check_tool_states(context: CheckContext) -> Iterator[Finding]:
 
 def check_tool_at_end(context: CheckContext) -> Iterator[Finding]:
     """Yield a warning if the mission may succeed with an object in the tool."""
-    flow, span = context.flow_analysis, context.tree.span
+    flow = context.flow_analysis
+    span = context.tree.span
     if flow.root_flow.success and (tool := flow.root_flow.success.find_tool_state(HOLDING)):
         message = "the mission may succeed with an object in the tool"
         yield make_warning(span, "tool-state", message, _explain_tool_state(flow, tool, span))
@@ -80,7 +82,8 @@ def find_shared_resources(context: CheckContext) -> Iterator[Finding]:
             shared_resources = [resource for resource in later_users if resource in users]
             conflicts = {(users[name].span, later_users[name].span): name for name in shared_resources}
             for resource in conflicts.values():
-                user, later_user = users[resource], later_users[resource]
+                user = users[resource]
+                later_user = later_users[resource]
                 name, span = context.locate_skill(later_user)
                 message = (
                     f"{name} uses the {resource}, and {user.skill} in "
@@ -130,7 +133,7 @@ def find_read_races(context: CheckContext) -> Iterator[Finding]:
 
 def _list_concurrent_branches(context: CheckContext) -> Iterator[Sequence[Node]]:
     """Yield the concurrent children of each control node that has concurrent children."""
-    for node in context.iterate_control_nodes():
+    for node in context.control_nodes:
         if node.concurrent_children:
             yield node.concurrent_children
 
@@ -145,7 +148,7 @@ def _find_first_leaf(node: Node) -> Node:
 
 def _find_reads(context: CheckContext, branch: Node) -> Iterator[VariableRead]:
     """Yield the reads below `branch`, except those that `find_unwritten_inputs` reports."""
-    for read in context.iterate_reads(branch):
+    for read in context.list_reads(branch):
         state = context.flow_analysis.entry_states.get(read.node.path)
         if state and not (read.is_required and state.may_be_unwritten(read.variable)):
             yield read

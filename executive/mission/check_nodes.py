@@ -37,12 +37,12 @@ from executive.tree.specification import (
 
 def check_constants(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every constant of a control node that is invalid or a reference to a variable."""
-    for node in context.iterate_control_nodes():
+    for node in context.control_nodes:
         yield from _check_keys(context, node, node.keyword)
 
 
 def _check_keys(context: CheckContext, owner: ControlNode | KeySection, name: str) -> Iterator[Finding]:
-    for key, value in owner.iterate_keys():
+    for key, value in owner.list_values():
         for item in value if isinstance(value, tuple) else (value,):
             if isinstance(item, KeySection):
                 yield from _check_keys(context, item, key.name)
@@ -88,7 +88,7 @@ def run_node_checks(context: CheckContext) -> Iterator[Finding]:
     """
     halted_paths = _find_paths_below(context, lambda node: node.children_halted_by_sibling)
     concurrent_paths = _find_paths_below(context, lambda node: node.concurrent_children)
-    for node in context.iterate_control_nodes():
+    for node in context.control_nodes:
         if non_conditions := list(find_non_conditions(context, node)):
             yield from non_conditions
             continue
@@ -101,17 +101,19 @@ def _find_paths_below(
     context: CheckContext, select_children: Callable[[ControlNode], Sequence[Child]]
 ) -> set[str]:
     """Return the paths of all nodes in and below the selected children of all control nodes."""
-    roots = [child for node in context.iterate_control_nodes() for child in select_children(node)]
+    roots = [child for node in context.control_nodes for child in select_children(node)]
     return {node.path for root in roots for node in root.walk()}
 
 
 def _convert_node_finding(node: ControlNode, node_finding: NodeFinding) -> Finding:
     """Return the finding at the position of the key, reason or child that it names, or else of `node`."""
-    span, message = node.span, node_finding.message
+    span = node.span
+    message = node_finding.message
     if isinstance(node_finding.place, LocatedReason | Node):
         span = node_finding.place.span
     elif isinstance(value := node.settings.get(str(node_finding.place)), Literal):
-        span, message = value.span, message + value.origin_note
+        span = value.span
+        message = message + value.origin_note
     make_finding = make_warning if node_finding.is_warning else make_error
     return make_finding(span, node_finding.code, message, node_finding.hint)
 
@@ -122,8 +124,10 @@ class CheckerAnalysis:
     def __init__(
         self, context: CheckContext, node: ControlNode, is_halted_by_sibling: bool, is_concurrent: bool
     ) -> None:
-        self._context, self._node = context, node
-        self.is_halted_by_sibling, self.is_concurrent = is_halted_by_sibling, is_concurrent
+        self._context = context
+        self._node = node
+        self.is_halted_by_sibling = is_halted_by_sibling
+        self.is_concurrent = is_concurrent
 
     def get_flow(self, child: Child) -> Flow | None:
         """Return the possible outcomes of a child; None if the child never runs."""
@@ -156,7 +160,7 @@ class CheckerAnalysis:
 
 def find_non_conditions(context: CheckContext, parent: ControlNode) -> Iterator[Finding]:
     """Yield an error for each child that is not a condition although its key allows only conditions."""
-    for key, value in parent.iterate_keys():
+    for key, value in parent.list_values():
         for node in list_nodes(value) if key.requires_conditions else ():
             if problem := _find_problem(context, node):
                 message = f"{problem}, but {parent.type_name}.{key.name} needs a condition"
@@ -192,7 +196,7 @@ def check_labels(context: CheckContext) -> Iterator[Finding]:
     reserved_words = {grammar.USE_KEYWORD, *context.node_classes}
     for node_class in context.node_classes.values():
         reserved_words |= {key.name for key in node_class.keys.values() if key.has_nodes}
-    for node in context.iterate_nodes():
+    for node in context.nodes:
         if not node.label:
             continue
         span = node.label_span or node.span
@@ -240,7 +244,7 @@ def _find_names_with_bodies(node: Node) -> Iterator[tuple[LocatedReason, str, No
 
 def _find_failure_names(owner: ControlNode | KeySection) -> Iterator[tuple[Key, LocatedReason]]:
     """Yield the names of failures in the keys of a node and of its sections."""
-    for key, value in owner.iterate_keys():
+    for key, value in owner.list_values():
         for item in value if isinstance(value, tuple) else (value,):
             if isinstance(item, LocatedReason):
                 yield key, item
@@ -257,7 +261,7 @@ def _make_impossible_error(context: CheckContext, name: LocatedReason, keyword: 
         message = f"{name} never leaves the body of this {keyword}"
         hint = f"Failures that leave it: {names}. A loop fails like its body, a fallback like its last child."
         return make_error(name.span, "impossible-reason", message, hint)
-    labels = {node.label for node in context.iterate_nodes() if node.label}
+    labels = {node.label for node in context.nodes if node.label}
     keywords = {word for word, node_class in context.node_classes.items() if node_class.reasons}
     if name.source in (*context.skills, *labels, *keywords):
         message = f"{name.source} is not in the body of this {keyword}, so the body cannot fail with {name}"

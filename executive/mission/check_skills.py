@@ -25,7 +25,7 @@ from executive.tree.specification import Literal, LocatedName, Reference, SkillN
 
 def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every skill that is not installed."""
-    for node in context.iterate_nodes():
+    for node in context.nodes:
         if isinstance(node, SkillNode) and node.skill not in context.skills:
             hint = suggest_choice(node.skill, context.skills, "Installed skills")
             yield make_error(node.span, "unknown-skill", f'there is no skill "{node.skill}"', hint)
@@ -33,7 +33,7 @@ def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
 
 def check_settings(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every setting of a skill that is unknown, missing, or has an invalid value."""
-    for node, skill in context.find_installed_skills(context.iterate_nodes()):
+    for node, skill in context.find_installed_skills(context.nodes):
         declarations: dict[str, Param | Port] = {**skill.params, **skill.ports}
         for name, setting in node.settings.items():
             if name not in declarations:
@@ -113,7 +113,7 @@ def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:
     routes = {route.label: route for route in context.mission.routes}
     bins = {label: {bin.name for bin in route.bins} for label, route in routes.items()}
     weighing_skills = [name for name, skill in context.skills.items() if _is_weighing(skill)]
-    skills = (skill for _, skill in context.find_installed_skills(context.iterate_nodes()))
+    skills = (skill for _, skill in context.find_installed_skills(context.nodes))
     is_weighed = any(map(_is_weighing, skills))
     for label, section in objects.items():
         detected = section.looks_like  # The detector reports this class for objects of the class `label`.
@@ -159,7 +159,7 @@ def _find_used_detectors(context: CheckContext) -> set[str]:
     """Return the names of the detectors that skills of the mission ask; a variable may name each detector."""
     names = list(context.classes_by_detector)
     used_names: set[str] = set()
-    for node, skill in context.find_installed_skills(context.iterate_nodes()):
+    for node, skill in context.find_installed_skills(context.nodes):
         for param in skill.params.values():
             if param.refers_to == "detector":
                 value = node.settings[param.name].value if param.name in node.settings else param.default
@@ -174,7 +174,7 @@ def _find_used_detectors(context: CheckContext) -> set[str]:
 def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Span]]:
     """Yield every class in the routes and in the settings of skills, with its position."""
     yield from ((route.label, route.label_span) for route in context.mission.routes)
-    for node, skill in context.find_installed_skills(context.iterate_nodes()):
+    for node, skill in context.find_installed_skills(context.nodes):
         for name, value in find_literals(node):
             declaration = skill.params.get(name) or skill.ports.get(name)
             if declaration is not None and declaration.refers_to == "class" and isinstance(value.value, str):
@@ -189,7 +189,8 @@ def check_names(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every class and every bin in routes and quotas that the cell lacks."""
     if context.cell is None:
         return
-    routes, quotas = context.mission.routes, context.mission.quotas
+    routes = context.mission.routes
+    quotas = context.mission.quotas
     labels = [LocatedName(route.label, route.label_span) for route in routes]
     labels += [quota.label for quota in quotas if quota.label is not None]
     bins = [bin for route in routes for bin in route.bins] + [quota.bin for quota in quotas]
@@ -204,7 +205,9 @@ def check_names(context: CheckContext) -> Iterator[Finding]:
 def check_quotas(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for each invalid quota or quota without a route, and a warning for too few slots."""
     for quota in context.mission.quotas:
-        bin, label, limit = quota.bin, quota.label, quota.limit
+        bin = quota.bin
+        label = quota.label
+        limit = quota.limit
         yield from check_constant(context, str(quota), _LIMIT, limit)
         if context.cell is None or bin.name not in context.cell.bins:
             continue
@@ -259,7 +262,8 @@ def check_slots(cell: CellFile, config: CellConfig, mission: Mission) -> Iterato
     # `list_obstacles` represents each object in a bin by a cylinder for the largest class.
     obstacle_radius = max(section.radius for section in config.objects.values()) + MAX_ROLL_DISTANCE
     for label, name in [(route.label, bin.name) for route in mission.routes for bin in route.bins]:
-        bin, section = config.bins.get(name), config.objects.get(label)
+        bin = config.bins.get(name)
+        section = config.objects.get(label)
         if bin is None or section is None:
             continue  # `routes.check_names` reports the name
         radius = section.radius + section.ring + config.motion.margin

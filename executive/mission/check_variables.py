@@ -36,7 +36,8 @@ def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
             problem = "is not written on every path to this node"
             hint = f"${name_in_file} is written by {_describe_writers(context, read.variable, read.span)}."
         else:
-            problem, hint = "no node writes", _make_unwritten_hint(context, read)
+            problem = "no node writes"
+            hint = _make_unwritten_hint(context, read)
         message = f"{read.input_name} reads ${name_in_file}, which {problem}"
         yield make_error(read.span, "unwritten", message, hint)
 
@@ -60,8 +61,9 @@ def find_unwritten_library_inputs(context: CheckContext) -> Iterator[Finding]:
 
 def _find_unwritten_reads(context: CheckContext, in_libraries: bool) -> Iterator[VariableRead]:
     """Yield the reads of possibly unwritten variables, either in libraries or in the mission file."""
-    mission_source, uses = context.tree.span.source, context.library_uses_by_path
-    for read in context.iterate_reads(context.tree):
+    mission_source = context.tree.span.source
+    uses = context.library_uses_by_path
+    for read in context.list_reads(context.tree):
         state = context.flow_analysis.entry_states.get(read.node.path)
         if state and state.may_be_unwritten(read.variable) and (read.is_explicit or read.is_required):
             is_in_library = read.node.path in uses and read.span.source is not mission_source
@@ -71,7 +73,7 @@ def _find_unwritten_reads(context: CheckContext, in_libraries: bool) -> Iterator
 
 def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
     """Yield a warning for every variable that the mission assigns to an output by name, but no node reads."""
-    read_variables = {read.variable for read in context.iterate_reads(context.tree)}
+    read_variables = {read.variable for read in context.list_reads(context.tree)}
     for node in context.tree.walk():
         for _, variable in find_control_node_outputs(node):
             if variable not in read_variables | set(context.mission.params):
@@ -137,9 +139,7 @@ def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
 
 def _describe_writers(context: CheckContext, variable: str, span: Span) -> str:
     """Return the skills that write a variable, for a message at `span`: `Grasp in line 3`."""
-    wires = [
-        (node, wire) for node in context.iterate_nodes() for wire in context.find_wires(node, Direction.OUT)
-    ]
+    wires = [(node, wire) for node in context.nodes for wire in context.find_wires(node, Direction.OUT)]
     nodes = [(node.span, wire.skill) for node, wire in wires if wire.variable == variable]
     nodes.sort(key=lambda node: node[0].line)
     writers = dict.fromkeys(f"{skill} in {place.describe_place(span.source)}" for place, skill in nodes)
@@ -284,7 +284,8 @@ def _select_field(writers: Iterable[Writer], field: str) -> Iterator[Writer]:
 
 def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iterator[Finding]:
     """Yield an error for each value or type of a writer that does not fit the input `wire`."""
-    port, choices = wire.port, (wire.port.choices or ()) if isinstance(wire.port, Param) else ()
+    port = wire.port
+    choices = (wire.port.choices or ()) if isinstance(wire.port, Param) else ()
     port_type = describe_values(port.type, port.refers_to)
     if choices and not port.refers_to:
         port_type = " or ".join(map(str, choices))

@@ -15,7 +15,7 @@ from executive.mission.mission_file import Mission, Quota, Subtree
 from executive.mission.ports import find_control_node_outputs, find_written_variables
 from executive.plugins import Skills
 from executive.skill import Direction
-from executive.tree.keys import Children, Elements, KeyOwner, KeySection, KeyValue, map_parts
+from executive.tree.keys import Children, Elements, KeyOwner, KeySection, KeyValue, Part, map_parts
 from executive.tree.node import ControlNode
 from executive.tree.specification import (
     InvalidNode,
@@ -150,12 +150,10 @@ class _Expander:
             self._add_error(self._outermost_span or node.span, "too-large", message)
             raise _TooLargeError
 
-        def expand_part(part: object) -> object:
+        def expand_part(part: Part) -> object:
             if isinstance(part, Node):
                 return self._expand_node(part, values, callers, depth + 1)
-            if isinstance(part, Reference):
-                return self._resolve_name(part, values, callers)
-            return map_parts(part, expand_part)
+            return self._resolve_name(part, values, callers) if isinstance(part, Reference) else part
 
         self.findings += self._find_shadowed_names(node, values)
         expanded = self._expand_predefined_lists(map_parts(node, expand_part))
@@ -166,7 +164,7 @@ class _Expander:
         if not isinstance(node, ControlNode):
             return node
         lists: dict[str, Value] = {}
-        for key, value in node.iterate_keys():
+        for key, value in node.list_values():
             if key.value_type == Elements and isinstance(value, Literal) and isinstance(value.value, str):
                 names = self._predefined_lists.get(value.value)
                 if names is not None:
@@ -254,7 +252,7 @@ class _Expander:
                 return returns[name]
             return prefix + name if name in written_variables else name
 
-        def rename_part(part: object) -> object:
+        def rename_part(part: Part) -> Part:
             if isinstance(part, Reference):
                 return replace(part, name=rename(part.name))
             if isinstance(part, VariableName):
@@ -340,7 +338,7 @@ def _assign_key_paths(owner: KeyOwner, path: str, section_path: str = "") -> dic
     `backoff` or `cases/2`; "" if `owner` is the control node.
     """
     values: dict[str, KeyValue] = {}
-    for key, value in owner.iterate_keys():
+    for key, value in owner.list_values():
         # In the path of a child below `do` of a section, the key `do` is omitted.
         key_path = section_path if section_path and key.name == "do" else _join(section_path, key.name)
         if isinstance(value, Node):

@@ -141,10 +141,13 @@ def _add_library(
             continue
         # The position is in the mission file: the subtree of this name, or the path of the library.
         if first_subtree.library:
-            span, other_span = reference.span, first_subtree.span
+            span = reference.span
+            other_span = first_subtree.span
             hint = "Delete one of the libraries from the list."
         else:
-            span, other_span, hint = first_subtree.span, subtree.span, "Rename one of them."
+            span = first_subtree.span
+            other_span = subtree.span
+            hint = "Rename one of them."
         message = f'there are two subtrees "{name}"; the other is in {other_span.describe_place(span.source)}'
         parser.add_error(span, "duplicate-tree", message, hint)
     return source.text
@@ -223,12 +226,16 @@ def load_mission(
         MissionError: The mission or the cell has errors; the exception contains every finding.
         InputError: The mission does not exist.
     """
-    mission_path, node_classes = find_mission(path), load_control_nodes()
+    mission_path = find_mission(path)
+    node_classes = load_control_nodes()
     files = read_mission(mission_path, overrides or {}, skills, node_classes, recorded_cell)
-    mission, cell, findings = files.mission, files.cell, list(files.findings)
+    mission = files.mission
+    cell = files.cell
+    findings = list(files.findings)
     skills = {**skills, **files.behaviours}
     config = cell.config if cell else None
-    cell_kind, classes_by_detector = None, {}
+    cell_kind = None
+    classes_by_detector = {}
     if cell is not None and config is not None:
         findings += _warn_about_calibration(cell, config)
     if cell is not None and config is not None and find_cell_kind is not None:

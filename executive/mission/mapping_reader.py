@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.grammar import NAME_EXPRESSION
-from executive.mission.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, iterate_scalars
+from executive.mission.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, list_scalars
 from executive.tree.specification import InvalidValue, Literal, LocatedReason, Reference, Setting, Span, Value
 
 NAME_PATTERN = re.compile(NAME_EXPRESSION)
@@ -171,7 +171,7 @@ def make_literal(node: YamlNode) -> Literal:
 
 def _find_misplaced_dollars(node: YamlNode) -> Iterator[Finding]:
     """Yield an error for each text with a `$`, not escaped as `$$`, at the start or before a letter."""
-    for scalar in iterate_scalars(node):
+    for scalar in list_scalars(node):
         if isinstance(scalar.value, str) and _REFERENCE_START.search(scalar.value.replace("$$", "")):
             rule = "a reference is a whole value, as in key: $name or key: $name.field"
             message = f'"{scalar.text}" is no reference: {rule}'

@@ -144,7 +144,8 @@ def parse_params(reader: MappingReader, overrides: Mapping[str, str]) -> dict[st
 
 def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> MissionParam:
     """Return the param that a mapping with keys such as `default` and `min` declares."""
-    default, items = reader.get("default"), reader.list_items("choices")
+    default = reader.get("default")
+    items = reader.list_items("choices")
     reader.read_text("doc")
     declaration = param(
         ge=_read_bound(reader, "min"),

@@ -51,7 +51,9 @@ class NodeParser:
     """
 
     def __init__(self, findings: list[Finding], skills: Skills, node_classes: ControlNodes) -> None:
-        self.findings, self._skills, self._node_classes = findings, skills, node_classes
+        self.findings = findings
+        self._skills = skills
+        self._node_classes = node_classes
         self.behaviours: dict[str, type[Skill]] = {}
         self._keywords = [*node_classes, grammar.USE_KEYWORD, grammar.BEHAVIOUR_KEYWORD]
 
@@ -122,7 +124,8 @@ class NodeParser:
                 self.add_error(mapping.span, "missing-node", message)
             return InvalidNode(span=mapping.span)
         node_entry, *surplus_entries = node_entries
-        name, span = node_entry.key.text, node_entry.key.span
+        name = node_entry.key.text
+        span = node_entry.key.span
         for entry in surplus_entries:
             message = f'"{name}" and "{entry.key.text}" are two nodes in one mapping'
             self.add_error(entry.key.span, "two-nodes", message, "Write a list to run one after the other.")
@@ -174,14 +177,17 @@ class NodeParser:
             message = f"use must be the name of a subtree, not {entry.value.description}"
             self.add_error(entry.value.span, "wrong-type", message)
             return InvalidNode(span=entry.key.span)
-        arguments, returns = settings.get("with", {}), settings.get("returns", {})
+        arguments = settings.get("with", {})
+        returns = settings.get("returns", {})
         return SubtreeNode.model_construct(
             span=entry.value.span, label=label, name=entry.value.text, arguments=arguments, returns=returns
         )
 
     def _read_behaviour(self, entry: YamlEntry, label: str) -> Node:
         """Return the skill node for a behaviour, or an invalid node if a mission cannot use the behaviour."""
-        keyword, class_key, span = entry.key.text, grammar.BEHAVIOUR_CLASS, entry.key.span
+        keyword = entry.key.text
+        class_key = grammar.BEHAVIOUR_CLASS
+        span = entry.key.span
         settings = read_settings(entry.value, keyword, self.findings, class_key)
         path = settings.pop(class_key).value if class_key in settings else None
         if isinstance(path, Literal) and isinstance(path.value, str):
@@ -239,7 +245,9 @@ def read_control_node(
 
     `entry` is the entry of the mapping with the keyword; the other entries have sibling keys.
     """
-    keyword, span, sibling_keys = entry.key.text, entry.key.span, grammar.find_sibling_keys(node_class)
+    keyword = entry.key.text
+    span = entry.key.span
+    sibling_keys = grammar.find_sibling_keys(node_class)
     siblings = tuple(sibling for sibling in mapping.entries if sibling.key.text in sibling_keys)
     values = {
         **_read_inner_keys(parser, keyword, span, entry.value, node_class),
@@ -278,7 +286,8 @@ def _read_inner_keys(
     parser: NodeParser, name: str, span: Span, yaml_node: YamlNode, owner: type[KeyOwner]
 ) -> dict[str, KeyValue]:
     """Return the values of the keys of `owner`; `yaml_node` is below the keyword `name`."""
-    shorthand_key, inner_keys = grammar.find_shorthand_key(owner), grammar.find_inner_keys(owner)
+    shorthand_key = grammar.find_shorthand_key(owner)
+    inner_keys = grammar.find_inner_keys(owner)
     is_list_required = shorthand_key is not None and shorthand_key.value_type == Children
     # If the owner has inner keys, a mapping contains these keys, and is no node in shorthand form. A scalar
     # in place of a list is treated like a mapping, so that `MappingReader` reports it and lists the keys.

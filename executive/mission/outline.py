@@ -103,7 +103,8 @@ def list_child_indices(nodes: Sequence[OutlineNode]) -> list[list[int]]:
 def _iterate_outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) -> Iterator[OutlineNode]:
     path = _get_path(node)
     relative_path = path.removeprefix(f"{_get_path(parent) if parent else 'tree'}/")
-    label, detail = getattr(node, "label", ""), getattr(node, "detail", "")
+    label = getattr(node, "label", "")
+    detail = getattr(node, "detail", "")
     kind = _get_kind(node)
     if label and kind != SKILL_KIND:
         detail = ", ".join(filter(None, (kind, detail)))
@@ -140,7 +141,8 @@ def _get_kind(node: Behaviour) -> str:
 def _format_name(relative_path: str) -> str:
     """Return the name of a node below its parent, from its path relative to the parent."""
     keys, _, name = relative_path.rpartition("/")
-    keys, name = keys.replace("/", " "), _INDEX_PATTERN.sub("", name)
+    keys = keys.replace("/", " ")
+    name = _INDEX_PATTERN.sub("", name)
     # The path of a list without a label ends with a key and an index, such as "catch/2".
     return f"{keys} {name}" if name.isdigit() else f"{keys}: {name}" if keys else name
 
@@ -166,7 +168,9 @@ def _find_parent_key(
 
 def _describe_skill(node: OutlineNode, leaf: SkillLeaf) -> OutlineNode:
     """Return `node` with the declarations and connections of the skill of `leaf`."""
-    skill, wiring, ports = leaf.skill_type, leaf.wiring, leaf.skill_type.ports
+    skill = leaf.skill_type
+    wiring = leaf.wiring
+    ports = leaf.skill_type.ports
 
     def make_connections(variables_by_port: Mapping[str, str]) -> tuple[Connection, ...]:
         pairs = ((name, name in ports and ports[name].default is not ...) for name in variables_by_port)

@@ -82,7 +82,8 @@ def make_type_schema(declared_type: object) -> Schema:
 def make_cell_schema() -> Schema:
     """Return the schema of a cell file; with `base`, other keys and all keys of detectors are optional."""
     cell = CellConfig.model_json_schema(schema_generator=Draft07, ref_template="#/definitions/{model}")
-    sections, required = cell.pop("$defs"), cell.pop("required")
+    sections = cell.pop("$defs")
+    required = cell.pop("required")
     detector = sections["DetectorConfig"]
     complete_detector = {"type": detector["type"], "required": detector.pop("required")}
     detector["type"] = [complete_detector["type"], "null"]

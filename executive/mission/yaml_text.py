@@ -123,12 +123,11 @@ class YamlMapping(_Node):
 YamlNode = YamlScalar | YamlSequence | YamlMapping
 
 
-def iterate_scalars(node: YamlNode) -> Iterator[YamlScalar]:
-    """Yield every scalar of a node in the order of the text, without keys."""
+def list_scalars(node: YamlNode) -> list[YamlScalar]:
+    """Return every scalar of a node in the order of the text, without keys."""
     if isinstance(node, YamlScalar):
-        yield node
-    for child in list_children(node):
-        yield from iterate_scalars(child)
+        return [node]
+    return [scalar for child in list_children(node) for scalar in list_scalars(child)]
 
 
 def list_children(node: YamlNode) -> tuple[YamlNode, ...]:
@@ -140,7 +139,7 @@ def list_children(node: YamlNode) -> tuple[YamlNode, ...]:
 
 def flatten(node: YamlNode) -> YamlNode:
     """Return a list of lists as the list of their scalars, in order; return other nodes unchanged."""
-    return replace(node, items=tuple(iterate_scalars(node))) if isinstance(node, YamlSequence) else node
+    return replace(node, items=tuple(list_scalars(node))) if isinstance(node, YamlSequence) else node
 
 
 def parse_yaml(source: Source, text: str | None = None) -> tuple[YamlNode | None, list[Finding]]:
@@ -239,7 +238,8 @@ class _Composer:
         return self._read_mapping(event, depth)
 
     def _read_scalar(self, event: yaml.ScalarEvent) -> YamlScalar:
-        text, span = event.value, self._make_span(event)
+        text = event.value
+        span = self._make_span(event)
         if _SURROGATE.search(text):
             self._add_error(span, "yaml", "a surrogate (U+D800 to U+DFFF) is no character")
             text = _SURROGATE.sub("?", text)
@@ -265,7 +265,8 @@ class _Composer:
 
     def _make_span(self, event: yaml.Event, length: int = 0) -> Span:
         """Return the span of an event; if `length` is 0, the span covers the first line of the event."""
-        start, end = event.start_mark, event.end_mark
+        start = event.start_mark
+        end = event.end_mark
         assert start is not None and end is not None, "PyYAML locates every event"
         if not length:
             length = max(1, end.column - start.column) if start.line == end.line else _LINE_LENGTH

@@ -6,7 +6,7 @@ import json
 import math
 import sys
 import types
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from inspect import get_annotations
@@ -18,7 +18,6 @@ from pydantic.fields import FieldInfo
 
 from executive.tree.specification import (
     Child,
-    InvalidValue,
     Literal,
     Node,
     Reason,
@@ -231,14 +230,19 @@ class KeyOwner(Specification):
             values |= self._interpret(values["settings"], {**self.__dict__, **values})
         return super().replace(**values)
 
-    def iterate_keys(self) -> Iterator[tuple[Key, KeyValue]]:
-        """Yield every key that has a value, and the value, in the order of the declarations."""
+    def list_values(self) -> Sequence[tuple[Key, KeyValue]]:
+        """Return every key that has a value, and the value, in the order of the declarations."""
+        values: list[tuple[Key, KeyValue]] = []
         for name, key in self.keys.items():
-            if key.is_plain:
-                if name in self.settings:
-                    yield key, self.settings[name]
-            elif (value := getattr(self, key.attribute)) is not None and value != ():
-                yield key, value
+            value = self.settings.get(name) if key.is_plain else getattr(self, key.attribute)
+            if value is not None and value != ():
+                values.append((key, value))
+        return values
+
+    def list_children(self, key_name: str = "") -> Sequence[Node]:
+        """Return the nodes under a key or, without a name, under all keys, including those in sections."""
+        keys = [self.keys[key_name]] if key_name else self.keys.values()
+        return [node for key in keys for node in list_nodes(getattr(self, key.attribute))]
 
 
 class KeySection(KeyOwner):
@@ -247,8 +251,10 @@ class KeySection(KeyOwner):
 
 KeyValue: TypeAlias = Value | VariableName | Node | KeySection | tuple[Node | Reason | KeySection, ...]
 """Value of a key of a control node."""
-PartT = TypeVar("PartT")
-"""Type of a node or of a part of a node."""
+Part: TypeAlias = Node | Reference | VariableName
+"""A part of a node that the expansion of a mission changes."""
+PartT = TypeVar("PartT", bound=Specification)
+"""Class of a node or section."""
 
 
 def list_nodes(value: object) -> list[Node]:
@@ -258,35 +264,44 @@ def list_nodes(value: object) -> list[Node]:
     if isinstance(value, tuple):
         return [node for item in value for node in list_nodes(item)]
     if isinstance(value, KeySection):
-        return [node for _, inner_value in value.iterate_keys() for node in list_nodes(inner_value)]
+        return list(value.list_children())
     return []
 
 
-def map_parts(part: PartT, change: Callable[[object], object]) -> PartT:
-    """Return a copy of `part` with `change(value)` in place of every value that `part` directly contains.
+def map_parts(owner: PartT, change: Callable[[Part], object]) -> PartT:
+    """Return a copy of a node or section with `change(part)` in place of every part that it contains.
 
-    If nothing changes, the result is `part` itself.
+    Parts are nodes without their descendants, references and names of variables. If no part changes, the
+    result is `owner` itself.
     """
-    mapped: object = part
-    if isinstance(part, tuple):
-        items = tuple([change(item) for item in part])
-        mapped = part if _are_identical(items, part) else items
-    elif isinstance(part, dict):
-        values = {name: change(value) for name, value in part.items()}
-        mapped = part if _are_identical(values.values(), part.values()) else values
-    elif isinstance(part, Setting):
-        value = change(part.value)
-        mapped = part if value is part.value else replace(part, value=cast("Value", value))
-    elif isinstance(part, Node | KeySection):
-        attributes = part.__dict__
-        new = {name: change(value) for name, value in attributes.items() if isinstance(value, _PART_TYPES)}
-        changed = {name: value for name, value in new.items() if value is not attributes[name]}
-        mapped = part.replace(**changed) if changed else part
-    return cast("PartT", mapped)
+    changed: dict[str, object] = {}
+    for name, value in owner.__dict__.items():
+        if isinstance(value, _CONTAINER_TYPES):
+            new_value = _map_value(value, change)
+            if new_value is not value:
+                changed[name] = new_value
+    return owner.replace(**changed) if changed else owner
 
 
-_PART_TYPES = (tuple, dict, Specification, Setting, Literal, Reference, InvalidValue, VariableName)
-"""Types of the values that `map_parts` changes."""
+def _map_value(value: object, change: Callable[[Part], object]) -> object:
+    if isinstance(value, Node | Reference | VariableName):
+        return change(value)
+    if isinstance(value, Setting):
+        new_value = _map_value(value.value, change)
+        return value if new_value is value.value else replace(value, value=cast("Value", new_value))
+    if isinstance(value, KeySection):
+        return map_parts(value, change)
+    if isinstance(value, tuple):
+        items = tuple([_map_value(item, change) for item in value])
+        return value if _are_identical(items, value) else items
+    if isinstance(value, dict):
+        values = {name: _map_value(item, change) for name, item in value.items()}
+        return value if _are_identical(values.values(), value.values()) else values
+    return value
+
+
+_CONTAINER_TYPES = (tuple, dict, Specification, VariableName)
+"""Types of the attributes of a node that contain parts."""
 
 
 def _are_identical(values: Iterable[object], others: Iterable[object]) -> bool:

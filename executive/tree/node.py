@@ -21,7 +21,7 @@ from executive.events import BranchChosen, NodeEnded, NodeStarted
 from executive.plugins import PluginEntry, list_entries
 from executive.skill import Skill
 from executive.tree.flow import Flow, FlowFunction, FlowState
-from executive.tree.keys import KeyOwner, list_nodes
+from executive.tree.keys import KeyOwner
 from executive.tree.specification import Node, Reason
 from executive.tree.tree_node import Failure, NodeContext, TreeNode, halt
 
@@ -169,11 +169,7 @@ class ControlNode(KeyOwner, Node):
     @cached_property
     def children(self) -> Sequence[Node]:
         """The nodes in the values of the keys and in sections."""
-        return [child for name in self.keys for child in self.list_children(name)]
-
-    def list_children(self, key_name: str) -> Sequence[Node]:
-        """Return the nodes under a key, including those in the sections of the key."""
-        return list_nodes(getattr(self, self.keys[key_name].attribute))
+        return self.list_children()
 
     @property
     def detail(self) -> str:

@@ -77,7 +77,8 @@ class Parallel(ControlNode):
         """The number of children that must succeed, and the option `halt`, as a text."""
         if self.has_lead:
             return "wait for the lead"
-        child_count, required_count = len(self.do), self.required_count
+        child_count = len(self.do)
+        required_count = self.required_count
         required = "all" if required_count == child_count else f"{required_count} of {child_count}"
         return f"wait for {required}, halt" if self.halt else f"wait for {required}"
 
@@ -88,10 +89,12 @@ class Parallel(ControlNode):
         halted = join_states(flow.halted for flow in flows)
         halted = halted and halted.with_tool_states(combine_tool_states(state.tool_states, halted_ends))
         if self.has_lead:
-            lead, others = flows[0], halted_ends[1:]
+            lead = flows[0]
+            others = halted_ends[1:]
             failures = {cause: _with_siblings(state, end, others) for cause, end in lead.failures.items()}
             return Flow(lead.success and _with_siblings(state, lead.success, others), failures, halted)
-        failures, can_be_halted = {}, self.halt or self.required_count < len(flows)
+        failures = {}
+        can_be_halted = self.halt or self.required_count < len(flows)
         ends = [find_end_tool_states(flow, state, can_be_halted) for flow in flows]
         can_fail = len([flow for flow in flows if flow.failures]) > len(flows) - self.required_count
         for index, flow in enumerate(flows if can_fail else ()):
@@ -137,7 +140,8 @@ class Parallel(ControlNode):
     @property
     def counterpart(self) -> Counterpart | None:
         """`ParallelAll` or `Parallel` of BehaviorTree.CPP; None if no node ends under the same conditions."""
-        child_count, required_count = len(self.do), self.required_count
+        child_count = len(self.do)
+        required_count = self.required_count
         if not self.has_lead and (self.halt or required_count == 1):
             failure_count = child_count - required_count + 1
             return Counterpart("Parallel", {"success_count": required_count, "failure_count": failure_count})

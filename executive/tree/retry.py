@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from math import inf, isfinite
 
 from executive.skill import Seconds
-from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, find_fixed_point, join_states
+from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.keys import KeySection, Reasons, key
 from executive.tree.loops import GeneratorBehaviour, NodeRun
 from executive.tree.node import Advice, ControlNode, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
@@ -71,27 +71,24 @@ class Retry(ControlNode):
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes, by fixed-point iteration over body and recovery."""
 
-        def can_retry(failure: PossibleFailure) -> bool:
-            return not self.on or failure.may_match(self.on)
-
-        def compute_retry_state(body: Flow) -> FlowState | None:
-            failures = body.failures.items() if self.attempts != 1 else ()
-            return join_states(end.with_handled_failure(cause) for cause, end in failures if can_retry(cause))
-
         def compute_recovery_flow(body: Flow) -> Flow:
-            retry_state = compute_retry_state(body)
+            retry_state = body.join_handled(self.on) if self.attempts != 1 else None
             if retry_state is None or self.recover is None:
                 return Flow(retry_state, {}, None)
             return get_flow(self.recover, retry_state)
 
         body, _ = find_fixed_point(get_flow, self.do, state, lambda body: compute_recovery_flow(body).success)
         recovery = compute_recovery_flow(body)
+        failures = body.failures
         state_after_failed_recovery = join_states(recovery.failures.values())
-        failures = {
-            failure: end.join(state_after_failed_recovery or end) if can_retry(failure) else end
-            for failure, end in body.failures.items()
-        }
-        delay_state = compute_retry_state(body) if self.backoff else None
+        if state_after_failed_recovery is not None:
+            failures = {
+                failure: end.join(state_after_failed_recovery)
+                if not self.on or failure.may_match(self.on)
+                else end
+                for failure, end in body.failures.items()
+            }
+        delay_state = body.join_handled(self.on) if self.backoff and self.attempts != 1 else None
         return Flow(body.success, failures, join_states((body.halted, recovery.halted, delay_state)))
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
@@ -230,7 +227,9 @@ class TryCatch(ControlNode):
         Each handler starts after the failures that it catches; `finally` starts after body and handlers.
         """
         body = get_flow(self.do, state)
-        success, halted, failures = body.success, body.halted, dict(body.failures)
+        success = body.success
+        halted = body.halted
+        failures = dict(body.failures)
         earlier_reasons: list[Reason] = []
         for handler in self.catch:
             caught_ends = {
@@ -246,7 +245,8 @@ class TryCatch(ControlNode):
                 if failure.must_match(handler.on):
                     failures.pop(failure, None)
             flow = get_flow(handler.do, entry)
-            success, halted = join_states((success, flow.success)), join_states((halted, flow.halted))
+            success = join_states((success, flow.success))
+            halted = join_states((halted, flow.halted))
             failures.update(flow.failures)
         flow = Flow(success, failures, halted)
         return flow if self.finally_ is None else _append_finally(self.finally_, flow, get_flow)
@@ -315,7 +315,8 @@ class TryCatch(ControlNode):
 def _append_finally(finally_child: Node, flow: Flow, get_flow: FlowFunction) -> Flow:
     """Return the possible outcomes of a node whose `finally_child` runs after each outcome in `flow`."""
     after_success = get_flow(finally_child, flow.success) if flow.success else Flow(None, {}, None)
-    failures, halted = dict(after_success.failures), join_states((flow.halted, after_success.halted))
+    failures = dict(after_success.failures)
+    halted = join_states((flow.halted, after_success.halted))
     for failure, entry in flow.failures.items():
         after_failure = get_flow(finally_child, entry)
         halted = join_states((halted, after_failure.halted))

@@ -126,7 +126,7 @@ class OrderedNode(ControlNode):
         """Return the entry state of the next child; None if the child never ends with `continue_status`."""
         if self.continue_status is Status.SUCCESS:
             return flow.success
-        return join_states(end.with_handled_failure(failure) for failure, end in flow.failures.items())
+        return flow.join_handled()
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield a warning if `memory: false` has no effect, halts a child, or repeats an action."""

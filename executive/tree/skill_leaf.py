@@ -128,7 +128,10 @@ class SkillLeaf(TreeNode):
         self, context: NodeContext, name: str, skill: type[Skill], wiring: Wiring, cell: Cell
     ) -> None:
         super().__init__(context, name)
-        self.skill_name, self.skill_type, self.wiring, self._cell = name, skill, wiring, cell
+        self.skill_name = name
+        self.skill_type = skill
+        self.wiring = wiring
+        self._cell = cell
         self._run: SkillRun | None = None
         self._item = ""
         # A required port names the item on which the skill acts; an optional port limits the selection.
@@ -177,7 +180,9 @@ class SkillLeaf(TreeNode):
         if self.status is not Status.RUNNING:
             self.status = new_status
             return
-        run, self._run, self.status = self._run, None, new_status
+        run = self._run
+        self._run = None
+        self.status = new_status
         try:
             if run is not None:
                 run.halt()
@@ -235,7 +240,8 @@ class SkillLeaf(TreeNode):
         message: str = "",
         outputs: Mapping[str, JsonValue] | None = None,
     ) -> None:
-        self.status, self._run = status, None
+        self.status = status
+        self._run = None
         event = NodeEnded(self.path, status.value, self.skill_name, self._item, reason, message, "", outputs)
         self.emit(event)
 

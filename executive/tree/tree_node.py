@@ -82,7 +82,9 @@ class TreeNode(Behaviour):
 
     def __init__(self, context: NodeContext, name: str) -> None:
         super().__init__(context.label or name)
-        self.path, self.label, self.blackboard = context.path, context.label, context.blackboard
+        self.path = context.path
+        self.label = context.label
+        self.blackboard = context.blackboard
         self._failure: Failure | None = None
         self._emit_without_parent = context.emit
 

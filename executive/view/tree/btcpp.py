@@ -11,13 +11,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
-from typing import cast
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from executive.mission.mission_file import Mission, Subtree
 from executive.mission.ports import find_written_variables
 from executive.skill import Direction, Param, Port, Skill
-from executive.tree.keys import Children, Key, KeyOwner, KeySection, KeyValue, PartT, map_parts
+from executive.tree.keys import Children, Key, KeyOwner, KeySection, KeyValue, Part, map_parts
 from executive.tree.node import ControlNode, load_control_nodes
 from executive.tree.specification import (
     Child,
@@ -146,11 +145,11 @@ class _Exporter:
         """Add a custom node for `part`, which is a control node, or a section that contains nodes."""
         keys = part.keys.values()
         ports = [key for key in keys if not key.has_nodes]
-        values = {key.name: _format(value) for key, value in part.iterate_keys() if key in ports}
+        values = {key.name: _format(value) for key, value in part.list_values() if key in ports}
         kinds = [(key.value_type, key.is_required) for key in keys if key.has_nodes]
         kind = "Decorator" if kinds == [(Child, True)] else "Control"
         element = self._add_element(parent, kind, name, ports, values)
-        for key, value in part.iterate_keys():
+        for key, value in part.list_values():
             key_element = element
             if key.value_type in (Child, Children) and key.name != "do":
                 kind = "Decorator" if key.value_type == Child else "Control"
@@ -176,11 +175,15 @@ class _Exporter:
         return element
 
 
-def _replace_params(part: PartT, values: Mapping[str, Value]) -> PartT:
-    """Return a part of a mission with the values of params in place of references to the params."""
-    if isinstance(part, Reference):
-        return cast("PartT", values.get(part.name, part))
-    return map_parts(part, lambda inner_part: _replace_params(inner_part, values))
+def _replace_params(node: Node, values: Mapping[str, Value]) -> Node:
+    """Return a node with the values of params in place of references to the params."""
+
+    def replace(part: Part) -> object:
+        if isinstance(part, Node):
+            return _replace_params(part, values)
+        return values.get(part.name, part) if isinstance(part, Reference) else part
+
+    return map_parts(node, replace)
 
 
 def _format(value: KeyValue) -> str:
@@ -195,7 +198,7 @@ def _format(value: KeyValue) -> str:
         case VariableName():
             return _format_pointer(value)
         case KeySection() as section:
-            return ",".join(f"{key.name}={_format(one)}" for key, one in section.iterate_keys())
+            return ",".join(f"{key.name}={_format(one)}" for key, one in section.list_values())
         case tuple() as items:
             return ";".join(str(one) if isinstance(one, Reason) else _format(one) for one in items)
     raise TypeError(f"{value} cannot be written as the value of a port")
