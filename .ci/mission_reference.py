@@ -15,7 +15,6 @@ from executive.cell.config import CellConfig, Section
 from executive.cells.sim.scene_file import SceneConfig
 from executive.cli.main import main as command_line
 from executive.cli.skills import Declaration, collect_declarations
-from executive.mission import grammar
 from executive.mission.file_search import list_shipped_missions
 from executive.mission.findings import MEANING_BY_CODE
 from executive.mission.grammar import LibraryKeys, MissionKeys, NodeKeys, ParamKeys, SubtreeKeys, UseKeys
@@ -114,7 +113,7 @@ def _key_rows(owner: str, node: type[KeyOwner], prefix: str = "") -> Iterator[li
     for name, key in node.keys.items():
         written = f"`{prefix}{name}`" + (f", beside `{owner}`" if key.sibling else "")
         if key.shorthand:
-            written = (f"{written}, or " if grammar.find_inner_keys(node) else "") + f"the value of `{owner}`"
+            written = (f"{written}, or " if node.inner_keys else "") + f"the value of `{owner}`"
         schema = key.make_validator().json_schema() if key.is_constant else make_key_schema(key, {})
         value = _value(schema)
         value = value.replace("node", "condition") if key.requires_conditions else value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import cast
+from dataclasses import dataclass
 
 from pydantic import TypeAdapter
 
@@ -23,9 +23,7 @@ from executive.tree.flow import UNKNOWN_NAME, Flow, FlowState, PossibleFailure
 from executive.tree.keys import PREDEFINED_LISTS, Key, KeySection, KeyValue, list_nodes
 from executive.tree.node import ControlNode, NodeFinding
 from executive.tree.specification import (
-    Child,
-    Literal,
-    LocatedReason,
+    Constant,
     Node,
     Reason,
     Reference,
@@ -51,7 +49,7 @@ def _check_keys(context: CheckContext, owner: ControlNode | KeySection, name: st
             yield from check_constant(context, f"{name}.{key.name}", validator, value)
         elif (
             key.is_plain
-            and isinstance(value, Literal)
+            and isinstance(value, Constant)
             and not isinstance(value.value, list)
             and value.value not in PREDEFINED_LISTS
         ):
@@ -71,7 +69,7 @@ def check_constant(
     if isinstance(value, Reference):
         message = f"{name} must be a constant, but ${value.name} is neither a param nor an argument"
         yield make_error(value.span, "unknown-param", message, context.make_unknown_param_hint(value))
-    elif isinstance(value, Literal):
+    elif isinstance(value, Constant):
         try:
             convert_constant(validator, value.value)
         except ValueProblem as problem:
@@ -92,13 +90,13 @@ def run_node_checks(context: CheckContext) -> Iterator[Finding]:
         if non_conditions := list(find_non_conditions(context, node)):
             yield from non_conditions
             continue
-        analysis = CheckerAnalysis(context, node, node.path in halted_paths, node.path in concurrent_paths)
+        analysis = CheckerAnalysis(context, node.path in halted_paths, node.path in concurrent_paths)
         for node_finding in node.check(analysis):
             yield _convert_node_finding(node, node_finding)
 
 
 def _find_paths_below(
-    context: CheckContext, select_children: Callable[[ControlNode], Sequence[Child]]
+    context: CheckContext, select_children: Callable[[ControlNode], Sequence[Node]]
 ) -> set[str]:
     """Return the paths of all nodes in and below the selected children of all control nodes."""
     roots = [child for node in context.control_nodes for child in select_children(node)]
@@ -109,53 +107,35 @@ def _convert_node_finding(node: ControlNode, node_finding: NodeFinding) -> Findi
     """Return the finding at the position of the key, reason or child that it names, or else of `node`."""
     span = node.span
     message = node_finding.message
-    if isinstance(node_finding.place, LocatedReason | Node):
+    if isinstance(node_finding.place, Reason | Node):
         span = node_finding.place.span
-    elif isinstance(value := node.settings.get(str(node_finding.place)), Literal):
+    elif isinstance(value := node.settings.get(str(node_finding.place)), Constant):
         span = value.span
         message = message + value.origin_note
     make_finding = make_warning if node_finding.is_warning else make_error
     return make_finding(span, node_finding.code, message, node_finding.hint)
 
 
+@dataclass
 class CheckerAnalysis:
     """Implementation of `NodeAnalysis` for one control node."""
 
-    def __init__(
-        self, context: CheckContext, node: ControlNode, is_halted_by_sibling: bool, is_concurrent: bool
-    ) -> None:
-        self._context = context
-        self._node = node
-        self.is_halted_by_sibling = is_halted_by_sibling
-        self.is_concurrent = is_concurrent
+    context: CheckContext
+    is_halted_by_sibling: bool
+    is_concurrent: bool
 
-    def get_flow(self, child: Child) -> Flow | None:
+    def get_flow(self, child: Node) -> Flow | None:
         """Return the possible outcomes of a child; None if the child never runs."""
-        return self._context.flow_analysis.flows.get(child.path)
+        return self.context.flow_analysis.flows.get(child.path)
 
-    def compute_flow(self, child: Child, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
+    def compute_flow(self, child: Node, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
         """Return the possible outcomes of a child that starts in `entry`; optionally, of its first tick."""
-        return FlowAnalysis(child, self._context.skills, entry, is_first_tick=is_first_tick).root_flow
+        return FlowAnalysis(child, self.context.skills, entry, is_first_tick=is_first_tick).root_flow
 
-    def get_name(self, child: Child) -> str:
-        """Return the last part of the path of a child."""
-        return child.path_name
-
-    def describe_place(self, reason: Reason, relative_to: Reason) -> str:
-        """Return the line of `reason` as a text, with the file if `relative_to` is in another file."""
-        source = cast("LocatedReason", relative_to).span.source
-        return cast("LocatedReason", reason).span.describe_place(source)
-
-    def is_written_as_constant(self, key: str) -> bool:
-        """Return True if the mission has a constant at a key of the node, not a param or an argument."""
-        value = self._node.settings.get(key)
-        return isinstance(value, Literal) and not value.origin
-
-    def list_skills(self, child: Child | None = None) -> Mapping[str, type[Skill] | None]:
-        """Return the class of each skill in the subtree of a child or of the node; None if not installed."""
-        root = self._node if child is None else child
-        names = [node.skill for node in root.walk() if isinstance(node, SkillNode)]
-        return {name: self._context.skills.get(name) for name in names}
+    def list_skills(self, node: Node) -> Mapping[str, type[Skill] | None]:
+        """Return the class of each skill in and below a node, by name; None if not installed."""
+        names = [node.skill for node in node.walk() if isinstance(node, SkillNode)]
+        return {name: self.context.skills.get(name) for name in names}
 
 
 def find_non_conditions(context: CheckContext, parent: ControlNode) -> Iterator[Finding]:
@@ -233,7 +213,7 @@ def check_failure_names(context: CheckContext) -> Iterator[Finding]:
                 yield make_error(name.span, "ambiguous", message, hint)
 
 
-def _find_names_with_bodies(node: Node) -> Iterator[tuple[LocatedReason, str, Node]]:
+def _find_names_with_bodies(node: Node) -> Iterator[tuple[Reason, str, Node]]:
     """Yield every failure name of a node, the keyword of the node, and the child that may fail."""
     if not isinstance(node, ControlNode):
         return
@@ -242,17 +222,17 @@ def _find_names_with_bodies(node: Node) -> Iterator[tuple[LocatedReason, str, No
             yield name, node.keyword, body
 
 
-def _find_failure_names(owner: ControlNode | KeySection) -> Iterator[tuple[Key, LocatedReason]]:
+def _find_failure_names(owner: ControlNode | KeySection) -> Iterator[tuple[Key, Reason]]:
     """Yield the names of failures in the keys of a node and of its sections."""
     for key, value in owner.list_values():
         for item in value if isinstance(value, tuple) else (value,):
-            if isinstance(item, LocatedReason):
+            if isinstance(item, Reason):
                 yield key, item
             elif isinstance(item, KeySection):
                 yield from _find_failure_names(item)
 
 
-def _make_impossible_error(context: CheckContext, name: LocatedReason, keyword: str, body: Node) -> Finding:
+def _make_impossible_error(context: CheckContext, name: Reason, keyword: str, body: Node) -> Finding:
     """Return the error if no failure of `body` has the name; `keyword` is the keyword of the parent."""
     reasons = _find_reasons(context.flow_analysis, body)
     if name.source in reasons:
@@ -271,7 +251,7 @@ def _make_impossible_error(context: CheckContext, name: LocatedReason, keyword: 
     return make_error(name.span, "unknown-skill", f'there is no skill or label "{name.source}"', hint)
 
 
-def _find_unknown_reason(context: CheckContext, name: LocatedReason, body: Node) -> Finding | None:
+def _find_unknown_reason(context: CheckContext, name: Reason, body: Node) -> Finding | None:
     """Return an error if the skill or label exists, but never fails with the reason; otherwise None."""
     skill = context.skills.get(name.source)
     reasons = skill.reasons if skill else _find_reasons(context.flow_analysis, body).get(name.source)
@@ -296,7 +276,7 @@ def _find_reasons(flow: FlowAnalysis, body: Node) -> dict[str, list[str]]:
     return {source: list(dict.fromkeys(duplicates)) for source, duplicates in reasons.items()}
 
 
-def _find_named_nodes(flow: FlowAnalysis, name: LocatedReason, matching: list[PossibleFailure]) -> list[Node]:
+def _find_named_nodes(flow: FlowAnalysis, name: Reason, matching: list[PossibleFailure]) -> list[Node]:
     """Return the nodes whose failures `name` denotes; none for a label, because labels are unambiguous."""
     if any(name.source in failure.labels for failure in matching):
         return []

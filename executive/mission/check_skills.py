@@ -20,7 +20,7 @@ from executive.mission.mission_file import Mission
 from executive.mission.ports import find_literals, find_problem
 from executive.motion.payload import MIN_LIFT_ACCELERATION, SAFETY_FACTOR
 from executive.skill import HOLDING, Direction, Param, Port, Skill
-from executive.tree.specification import Literal, LocatedName, Reference, SkillNode, Span
+from executive.tree.specification import Constant, LocatedName, Reference, SkillNode, Span
 
 
 def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
@@ -42,7 +42,7 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
                     hint = f"A condition writes no output. Skills that write ${name}: {writers}."
                 message = f'{node.skill} has no param or port "{name}"'
                 yield make_error(setting.name_span, "unknown-param", message, hint)
-            elif isinstance(setting.value, Literal):
+            elif isinstance(setting.value, Constant):
                 yield from _check_value(context, node, declarations[name], setting.value)
                 yield from find_unknown_names(context, node.skill, declarations[name], setting.value)
             elif isinstance(setting.value, Reference):
@@ -75,7 +75,7 @@ def _check_reference(
 
 
 def _check_value(
-    context: CheckContext, node: SkillNode, declaration: Param | Port, value: Literal
+    context: CheckContext, node: SkillNode, declaration: Param | Port, value: Constant
 ) -> Iterator[Finding]:
     """Yield an error if the constant `value` does not fit the param or port of `declaration`."""
     name = f"{node.skill}.{declaration.name}"
@@ -90,7 +90,7 @@ def _check_value(
 
 
 def find_unknown_names(
-    context: CheckContext, skill: str, declaration: Param | Port, value: Literal
+    context: CheckContext, skill: str, declaration: Param | Port, value: Constant
 ) -> Iterator[Finding]:
     """Yield an error for each constant that names a bin, class, pose or detector that the cell lacks."""
     if declaration.refers_to not in context.names_in_cell_by_kind or value.value == declaration.default:
@@ -163,7 +163,7 @@ def _find_used_detectors(context: CheckContext) -> set[str]:
         for param in skill.params.values():
             if param.refers_to == "detector":
                 value = node.settings[param.name].value if param.name in node.settings else param.default
-                name = value.value if isinstance(value, Literal) else value
+                name = value.value if isinstance(value, Constant) else value
                 if isinstance(name, str):
                     used_names.update([name] if name else names[:1])  # The first detector is the default.
                 else:
@@ -219,7 +219,7 @@ def check_quotas(context: CheckContext) -> Iterator[Finding]:
             hint = suggest_choice(bin.name, routed_bins, f"Bins in the routes of {classes}")
             yield make_error((label or bin).span, "no-route", message, hint)
         slot_count = math.prod(context.cell.bins[bin.name].slots)
-        if isinstance(limit, Literal) and isinstance(limit.value, int) and limit.value > slot_count:
+        if isinstance(limit, Constant) and isinstance(limit.value, int) and limit.value > slot_count:
             message = f"the quota exceeds the {slot_count} slots of {bin.name}, so objects would be stacked"
             hint = f"Lower the quota to {slot_count} or less, or add slots to the bin in the cell file."
             yield make_warning(limit.span, "large-quota", message + limit.origin_note, hint)

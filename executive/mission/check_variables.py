@@ -24,7 +24,7 @@ from executive.mission.ports import (
 from executive.skill import Direction, Param
 from executive.tree.keys import KeyValue
 from executive.tree.node import ControlNode
-from executive.tree.specification import Literal, Node, Reference, SkillNode, Span, SubtreeNode
+from executive.tree.specification import Constant, Node, Reference, SkillNode, Span, SubtreeNode
 
 
 def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
@@ -177,7 +177,7 @@ class Writer:
     span: Span
     type: object
     refers_to: str
-    constants: tuple[Literal, ...] | None = None
+    constants: tuple[Constant, ...] | None = None
 
     def describe(self, span: Span) -> str:
         """Return name and position of the writer, for a message at `span`."""
@@ -221,7 +221,7 @@ def _find_list_writers(node: Node, elements: KeyValue, writers: WritersByVariabl
     """Return the writers of a list; a node with a constant list counts as the writer of the list."""
     if isinstance(elements, Reference):
         return list(_select_field(writers.get(elements.name, ()), elements.field))
-    if not isinstance(elements, Literal):
+    if not isinstance(elements, Constant):
         return []
     if elements.value == "items":
         return [Writer(node.type_name, node.span, list[Item], "item")]
@@ -247,7 +247,7 @@ def _make_element_writers(node: Node, list_writers: Iterable[Writer]) -> Iterato
     for writer in list_writers:
         if writer.constants is not None:
             elements = [
-                Literal(element, constant.get_element_span(index))
+                Constant(element, constant.get_element_span(index))
                 for constant in writer.constants
                 if isinstance(constant.value, list)
                 for index, element in enumerate(constant.value)

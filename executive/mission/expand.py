@@ -18,9 +18,9 @@ from executive.skill import Direction
 from executive.tree.keys import Children, Elements, KeyOwner, KeySection, KeyValue, Part, map_parts
 from executive.tree.node import ControlNode
 from executive.tree.specification import (
+    Constant,
     InvalidNode,
     InvalidValue,
-    Literal,
     Node,
     Reference,
     SkillNode,
@@ -165,7 +165,7 @@ class _Expander:
             return node
         lists: dict[str, Value] = {}
         for key, value in node.list_values():
-            if key.value_type == Elements and isinstance(value, Literal) and isinstance(value.value, str):
+            if key.value_type == Elements and isinstance(value, Constant) and isinstance(value.value, str):
                 names = self._predefined_lists.get(value.value)
                 if names is not None:
                     lists[key.name] = replace(value, value=list(names))
@@ -198,7 +198,7 @@ class _Expander:
         self._referenced_names.add((callers[-1] if is_argument else "", name or ""))
         if value is None or isinstance(value, InvalidValue):
             return value or reference
-        if reference.field and (isinstance(value, Literal) or value.field):
+        if reference.field and (isinstance(value, Constant) or value.field):
             text = "a constant"
             if isinstance(value, Reference):
                 text = f"the field {value}".replace(_CALLER_PREFIX, "")

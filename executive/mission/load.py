@@ -28,7 +28,7 @@ from executive.perception.envelope import find_unmeasured_detectors
 from executive.plugins import Skills
 from executive.skill import Skill
 from executive.tree.node import ControlNodes, load_control_nodes
-from executive.tree.specification import InvalidNode, Literal, LocatedName, Node, Source
+from executive.tree.specification import Constant, InvalidNode, LocatedName, Node, Source
 
 Check = Callable[[CheckContext], Iterator[Finding]]
 """Function that yields the findings of one check."""
@@ -190,7 +190,7 @@ class LoadedMission:
     @property
     def params(self) -> dict[str, JsonValue]:
         """Values of the mission's params, with overrides."""
-        return {name: cast("Literal", param.value).value for name, param in self.mission.params.items()}
+        return {name: cast("Constant", param.value).value for name, param in self.mission.params.items()}
 
     @property
     def routes(self) -> dict[str, tuple[str, ...]]:
@@ -202,7 +202,7 @@ class LoadedMission:
         """Maximum numbers of objects in the bins."""
         quotas = self.mission.quotas
         keys = [(quota.bin.name, quota.label.name if quota.label else None) for quota in quotas]
-        limits = [cast("int", cast("Literal", quota.limit).value) for quota in quotas]
+        limits = [cast("int", cast("Constant", quota.limit).value) for quota in quotas]
         return dict(zip(keys, limits, strict=True))
 
 

@@ -10,14 +10,23 @@ from typing import Any, cast, get_origin
 from pydantic import JsonValue
 
 from executive.mission.findings import suggest_choice
-from executive.mission.grammar import LibraryKeys, MissionKeys, ParamKeys, SubtreeKeys
-from executive.mission.mapping_reader import NAME_PATTERN, MappingReader, is_empty, make_literal, read_value
+from executive.mission.grammar import (
+    NAME_PATTERN,
+    LibraryKeys,
+    MappingReader,
+    MissionKeys,
+    ParamKeys,
+    SubtreeKeys,
+    is_empty,
+    make_literal,
+    read_value,
+)
 from executive.mission.node_parser import NodeParser
 from executive.mission.ports import ValueProblem, convert_setting, convert_value
 from executive.mission.validate import CELL_PREFIX, make_override_source, parse_override
 from executive.mission.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.skill import Param, param
-from executive.tree.specification import InvalidValue, Literal, LocatedName, Node, Span, Value
+from executive.tree.specification import Constant, InvalidValue, LocatedName, Node, Span, Value
 
 
 @dataclass(frozen=True)
@@ -61,7 +70,7 @@ class MissionParam:
     """
 
     span: Span
-    value: Literal | InvalidValue
+    value: Constant | InvalidValue
     declaration: Param
 
 
@@ -195,7 +204,7 @@ def _read_bound(reader: MappingReader, key: str) -> float | None:
     return None
 
 
-def _replace_value(name: str, param: MissionParam, value: Literal, reader: MappingReader) -> MissionParam:
+def _replace_value(name: str, param: MissionParam, value: Constant, reader: MappingReader) -> MissionParam:
     """Return the param with a value; if the value is not allowed, add an error and return the old param."""
     try:
         converted = cast("JsonValue", convert_setting(value.value, param.declaration))

@@ -9,7 +9,7 @@ from dataclasses import replace
 from executive.errors import InputError
 from executive.mission import grammar
 from executive.mission.findings import Finding, make_error, suggest_choice
-from executive.mission.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_settings, read_value
+from executive.mission.grammar import NAME_PATTERN, MappingReader, is_empty, read_settings, read_value
 from executive.mission.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.plugins import Skills, load_behaviour
 from executive.skill import Skill
@@ -26,9 +26,9 @@ from executive.tree.keys import (
 from executive.tree.node import ControlNode, ControlNodes
 from executive.tree.specification import (
     Child,
+    Constant,
     InvalidNode,
     InvalidValue,
-    Literal,
     Node,
     Reason,
     Reference,
@@ -100,7 +100,7 @@ class NodeParser:
         """Return the mission node for a YAML scalar: a skill, or a keyword that needs no body."""
         word = scalar.text
         node_class = self._node_classes.get(word)
-        if node_class is not None and grammar.is_value_optional(node_class):
+        if node_class is not None and node_class.is_value_optional():
             return node_class.make({}, span=scalar.span)
         if word in self._keywords:
             self.add_error(scalar.span, "missing-node", f'"{word}" needs a body: write {word}: ...')
@@ -136,12 +136,12 @@ class NodeParser:
                 span=span, label=label, parts=(self._read_entry(mapping, node_entry, ""), *parts)
             )
         node_class = self._node_classes.get(name)
-        sibling_keys = grammar.find_sibling_keys(node_class) if node_class else {}
+        sibling_keys = node_class.sibling_keys if node_class else {}
         allowed_keys = ("as", *(grammar.UseKeys.get_keys() if name == grammar.USE_KEYWORD else sibling_keys))
         for entry in siblings:
             key = entry.key.text
             if key not in allowed_keys:
-                is_inner_key = node_class is not None and key in grammar.find_inner_keys(node_class)
+                is_inner_key = node_class is not None and key in node_class.inner_keys
                 hint = f"Indent {key}: it is a key below {name}." if is_inner_key else ""
                 hint = hint or suggest_choice(key, allowed_keys, f"Keys at the level of {name}")
                 message = f'"{key}" is not allowed at the level of "{name}"'
@@ -162,7 +162,7 @@ class NodeParser:
         if name == grammar.BEHAVIOUR_KEYWORD:
             return self._read_behaviour(entry, label)
         if name in self._node_classes:
-            return read_control_node(self, mapping, entry, label, self._node_classes[name])
+            return self._read_control_node(mapping, entry, label, self._node_classes[name])
         params = self._skills[name].params if name in self._skills else {}
         settings = read_settings(entry.value, name, self.findings, next(iter(params), "name"))
         return SkillNode.model_construct(span=entry.key.span, label=label, skill=name, settings=settings)
@@ -190,7 +190,7 @@ class NodeParser:
         span = entry.key.span
         settings = read_settings(entry.value, keyword, self.findings, class_key)
         path = settings.pop(class_key).value if class_key in settings else None
-        if isinstance(path, Literal) and isinstance(path.value, str):
+        if isinstance(path, Constant) and isinstance(path.value, str):
             try:
                 skill = load_behaviour(path.value)
                 name = skill.__name__
@@ -202,7 +202,7 @@ class NodeParser:
                 return InvalidNode(span=span, label=label)
             self.behaviours[name] = skill
             return SkillNode.model_construct(span=span, label=label, skill=name, settings=settings)
-        if isinstance(path, Literal | Reference):
+        if isinstance(path, Constant | Reference):
             message = (
                 f"{keyword}.{class_key} must be an import path, for example py_trees.behaviours:TickCounter"
             )
@@ -229,7 +229,7 @@ class NodeParser:
         skill = skills_by_lower_case.get(word.replace("_", "").replace(" ", "").lower())
         hints = dict(grammar.KEYWORD_HINTS)
         for name, node_class in self._node_classes.items():
-            keys = grammar.find_sibling_keys(node_class)
+            keys = node_class.sibling_keys
             hints |= {key: f"Write {key} at the level of {name}, not below {name}." for key in keys}
         hint = hints.get(word) or (f'Did you mean the skill "{skill}"?' if skill else "")
         if not hint:
@@ -237,35 +237,134 @@ class NodeParser:
             hint = f"{keywords} A subtree is written as use: NAME."
         self.add_error(span, "unknown-node", f'there is no control node "{word}"', hint)
 
+    def _read_control_node(
+        self, mapping: YamlMapping, entry: YamlEntry, label: str, node_class: type[ControlNode]
+    ) -> Node:
+        """Return the control node of a mapping, or an invalid node if the children or a variable are invalid.
 
-def read_control_node(
-    parser: NodeParser, mapping: YamlMapping, entry: YamlEntry, label: str, node_class: type[ControlNode]
-) -> Node:
-    """Return the control node of a mapping, or an invalid node if the children or a variable are invalid.
+        `entry` is the entry of the mapping with the keyword; the other entries have sibling keys.
+        """
+        keyword = entry.key.text
+        span = entry.key.span
+        sibling_keys = node_class.sibling_keys
+        siblings = tuple(sibling for sibling in mapping.entries if sibling.key.text in sibling_keys)
+        values = {
+            **self._read_inner_keys(keyword, span, entry.value, node_class),
+            **self._read_keys(keyword, span, replace(mapping, entries=siblings), sibling_keys),
+        }
+        any_of = node_class.any_of
+        inner_keys = entry.value.keys if isinstance(entry.value, YamlMapping) else ()
+        # `MappingReader` reports a value that is not a mapping although it must be one.
+        is_form_valid = isinstance(entry.value, YamlMapping) or node_class.shorthand_key is not None
+        if any_of and is_form_valid and not {*mapping.keys, *inner_keys} & {*any_of}:
+            level = f" at the level of {keyword}" if set(any_of) <= set(sibling_keys) else ""
+            alternatives = " or ".join(f'"{name}"' for name in any_of)
+            self.add_error(span, "missing-key", f"{keyword} needs {alternatives}{level}")
+        missing = [key for name, key in node_class.keys.items() if key.is_required and name not in values]
+        if any(key.value_type in (Children, VariableName) for key in missing):
+            children = [node for value in values.values() for node in list_nodes(value)]
+            return InvalidNode(span=span, label=label, parts=tuple(children))
+        return _make_owner(node_class, values, span=span, label=label)
 
-    `entry` is the entry of the mapping with the keyword; the other entries have sibling keys.
-    """
-    keyword = entry.key.text
-    span = entry.key.span
-    sibling_keys = grammar.find_sibling_keys(node_class)
-    siblings = tuple(sibling for sibling in mapping.entries if sibling.key.text in sibling_keys)
-    values = {
-        **_read_inner_keys(parser, keyword, span, entry.value, node_class),
-        **_read_keys(parser, keyword, span, replace(mapping, entries=siblings), sibling_keys),
-    }
-    any_of = node_class.any_of
-    inner_keys = entry.value.keys if isinstance(entry.value, YamlMapping) else ()
-    # `MappingReader` reports a value that is not a mapping although it must be one.
-    is_form_valid = isinstance(entry.value, YamlMapping) or grammar.find_shorthand_key(node_class) is not None
-    if any_of and is_form_valid and not {*mapping.keys, *inner_keys} & {*any_of}:
-        level = f" at the level of {keyword}" if set(any_of) <= set(sibling_keys) else ""
-        alternatives = " or ".join(f'"{name}"' for name in any_of)
-        parser.add_error(span, "missing-key", f"{keyword} needs {alternatives}{level}")
-    missing = [key for name, key in node_class.keys.items() if key.is_required and name not in values]
-    if any(key.value_type in (Children, VariableName) for key in missing):
-        children = [node for value in values.values() for node in list_nodes(value)]
-        return InvalidNode(span=span, label=label, parts=tuple(children))
-    return _make_owner(node_class, values, span=span, label=label)
+    def _read_inner_keys(
+        self, name: str, span: Span, yaml_node: YamlNode, owner: type[KeyOwner]
+    ) -> dict[str, KeyValue]:
+        """Return the values of the keys of `owner`; `yaml_node` is below the keyword `name`."""
+        shorthand_key = owner.shorthand_key
+        inner_keys = owner.inner_keys
+        is_list_required = shorthand_key is not None and shorthand_key.value_type == Children
+        # If the owner has inner keys, a mapping contains these keys, and is no node in shorthand form. A
+        # scalar in place of a list is treated like a mapping: `MappingReader` reports it and lists the keys.
+        is_scalar_for_list = is_list_required and isinstance(yaml_node, YamlScalar)
+        reads_inner_keys = isinstance(yaml_node, YamlMapping) or is_scalar_for_list
+        if shorthand_key is not None and not (reads_inner_keys and inner_keys):
+            key_node = YamlScalar(span, name, shorthand_key.name)
+            yaml_node = YamlMapping(span, (YamlEntry(key_node, yaml_node),))
+            inner_keys = {shorthand_key.name: shorthand_key}
+        return self._read_keys(name, span, yaml_node, inner_keys)
+
+    def _read_keys(
+        self, name: str, span: Span, yaml_node: YamlNode, keys: Mapping[str, Key]
+    ) -> dict[str, KeyValue]:
+        """Return the valid values of `keys` in a mapping.
+
+        `InvalidNode` or `InvalidValue` stands for a required node or constant that the mapping lacks.
+        """
+        fields = {key.name: key.field for key in keys.values()}
+        reader = MappingReader(name, span, yaml_node, fields, self.findings)
+        values: dict[str, KeyValue] = {}
+        for key in keys.values():
+            if (value_node := reader.get(key.name)) is not None:
+                value = self._read_value(reader, key, value_node)
+                values |= {} if value is None else {key.name: value}
+            elif key.is_required and key.value_type == Child:
+                values[key.name] = InvalidNode(span=span)
+            elif key.is_required and key.is_plain:
+                values[key.name] = InvalidValue(span)
+        return values
+
+    def _read_value(self, reader: MappingReader, key: Key, yaml_node: YamlNode) -> KeyValue | None:
+        """Return the value of a key, or None after an error and for an omitted optional child."""
+        span = reader.get_key_span(key.name)
+        if key.is_plain:
+            return read_value(yaml_node, self.findings)
+        if key.value_type == Child:
+            is_omitted = is_empty(yaml_node) and key.shorthand and not key.is_required
+            return None if is_omitted else self.read_node(yaml_node, span)
+        if key.value_type == Children:
+            nodes = self.read_nodes(yaml_node, reader.owner)
+            if key.max_count is None or len(nodes) <= key.max_count:
+                return nodes or None
+            message = f"{reader.owner} has {len(nodes)} branches, but may have at most {key.max_count}"
+            self.add_error(reader.span, "too-large", message)
+            return None
+        if key.value_type == VariableName:
+            return self._read_variable(reader, key.name)
+        section = key.section
+        if section is None:
+            return reader.read_reasons(key.name)
+        if key.value_type is section:
+            return self._read_section(key.name, section, yaml_node, span)
+        if Reason in list_member_types(key.value_type):
+            names = reader.read_reasons(key.name, tuple(section.keys))
+            mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
+            return *names, *(self._read_section(key.name, section, item, item.span) for item in mappings)
+        return tuple(self._read_sections(key.name, section, yaml_node))
+
+    def _read_variable(self, reader: MappingReader, key: str) -> VariableName | None:
+        """Return the output variable of a key; for `$name`, add an error and return the variable `name`."""
+        text = reader.read_text(key)
+        span = reader.get_value_span(key)
+        if NAME_PATTERN.fullmatch(text):
+            return VariableName(text, span=span)
+        hint = f"Write the name without $, for example {key}: target; $target is then the value."
+        self.add_error(span, "bad-name", f'"{text}" is no valid name of a variable', hint)
+        name = text.removeprefix("$")
+        return VariableName(name, span=span) if NAME_PATTERN.fullmatch(name) else None
+
+    def _read_section(
+        self, key: str, section: type[KeySection], yaml_node: YamlNode, span: Span
+    ) -> KeySection:
+        """Return the section below a key."""
+        values = self._read_inner_keys(key, span, yaml_node, section)
+        if section.any_of and isinstance(yaml_node, YamlMapping) and not yaml_node.entries:
+            alternatives = " or ".join(f'"{name}"' for name in section.any_of)
+            self.add_error(span, "missing-key", f"{key} needs {alternatives}")
+        return _make_owner(section, values, span=span)
+
+    def _read_sections(
+        self, key: str, section: type[KeySection], yaml_node: YamlNode
+    ) -> Iterable[KeySection]:
+        """Yield the sections of a list, or a single section."""
+        kind = "mapping with " + " and ".join(f'"{name}"' for name in section.keys)
+        if not isinstance(yaml_node, YamlSequence | YamlMapping):
+            message = f"{key} must be a {kind}, or a list of such mappings, not {yaml_node.description}"
+            self.add_error(yaml_node.span, "wrong-type", message)
+            return
+        if isinstance(yaml_node, YamlSequence) and not yaml_node.items:
+            self.add_error(yaml_node.span, "empty-list", f"{key} needs at least one {kind}")
+        for item in yaml_node.items if isinstance(yaml_node, YamlSequence) else (yaml_node,):
+            yield self._read_section(key, section, item, item.span)
 
 
 def _make_owner(owner: type[OwnerT], values: Mapping[str, KeyValue], **attributes: object) -> OwnerT:
@@ -280,109 +379,3 @@ def _make_owner(owner: type[OwnerT], values: Mapping[str, KeyValue], **attribute
         if key.is_required and not key.is_plain:
             attributes.setdefault(key.attribute, ())
     return owner.make(settings, **attributes)
-
-
-def _read_inner_keys(
-    parser: NodeParser, name: str, span: Span, yaml_node: YamlNode, owner: type[KeyOwner]
-) -> dict[str, KeyValue]:
-    """Return the values of the keys of `owner`; `yaml_node` is below the keyword `name`."""
-    shorthand_key = grammar.find_shorthand_key(owner)
-    inner_keys = grammar.find_inner_keys(owner)
-    is_list_required = shorthand_key is not None and shorthand_key.value_type == Children
-    # If the owner has inner keys, a mapping contains these keys, and is no node in shorthand form. A scalar
-    # in place of a list is treated like a mapping, so that `MappingReader` reports it and lists the keys.
-    is_scalar_for_list = is_list_required and isinstance(yaml_node, YamlScalar)
-    reads_inner_keys = isinstance(yaml_node, YamlMapping) or is_scalar_for_list
-    if shorthand_key is not None and not (reads_inner_keys and inner_keys):
-        key_node = YamlScalar(span, name, shorthand_key.name)
-        yaml_node = YamlMapping(span, (YamlEntry(key_node, yaml_node),))
-        inner_keys = {shorthand_key.name: shorthand_key}
-    return _read_keys(parser, name, span, yaml_node, inner_keys)
-
-
-def _read_keys(
-    parser: NodeParser, name: str, span: Span, yaml_node: YamlNode, keys: Mapping[str, Key]
-) -> dict[str, KeyValue]:
-    """Return the valid values of `keys` in a mapping.
-
-    `InvalidNode` or `InvalidValue` stands for a required node or constant that the mapping lacks.
-    """
-    fields = {key.name: key.field for key in keys.values()}
-    reader = MappingReader(name, span, yaml_node, fields, parser.findings)
-    values: dict[str, KeyValue] = {}
-    for key in keys.values():
-        if (value_node := reader.get(key.name)) is not None:
-            value = _read_value(parser, reader, key, value_node)
-            values |= {} if value is None else {key.name: value}
-        elif key.is_required and key.value_type == Child:
-            values[key.name] = InvalidNode(span=span)
-        elif key.is_required and key.is_plain:
-            values[key.name] = InvalidValue(span)
-    return values
-
-
-def _read_value(parser: NodeParser, reader: MappingReader, key: Key, yaml_node: YamlNode) -> KeyValue | None:
-    """Return the value of a key, or None after an error and for an omitted optional child."""
-    span = reader.get_key_span(key.name)
-    if key.is_plain:
-        return read_value(yaml_node, parser.findings)
-    if key.value_type == Child:
-        is_omitted = is_empty(yaml_node) and key.shorthand and not key.is_required
-        return None if is_omitted else parser.read_node(yaml_node, span)
-    if key.value_type == Children:
-        nodes = parser.read_nodes(yaml_node, reader.owner)
-        if key.max_count is None or len(nodes) <= key.max_count:
-            return nodes or None
-        message = f"{reader.owner} has {len(nodes)} branches, but may have at most {key.max_count}"
-        parser.add_error(reader.span, "too-large", message)
-        return None
-    if key.value_type == VariableName:
-        return _read_variable(parser, reader, key.name)
-    section = key.section
-    if section is None:
-        return reader.read_reasons(key.name)
-    if key.value_type is section:
-        return _read_section(parser, key.name, section, yaml_node, span)
-    if Reason in list_member_types(key.value_type):
-        names = reader.read_reasons(key.name, tuple(section.keys))
-        mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
-        return *names, *(_read_section(parser, key.name, section, item, item.span) for item in mappings)
-    return tuple(_read_sections(parser, key.name, section, yaml_node))
-
-
-def _read_variable(parser: NodeParser, reader: MappingReader, key: str) -> VariableName | None:
-    """Return the output variable of a key; for `$name`, add an error and return the variable `name`."""
-    text = reader.read_text(key)
-    span = reader.get_value_span(key)
-    if NAME_PATTERN.fullmatch(text):
-        return VariableName(text, span=span)
-    hint = f"Write the name without $, for example {key}: target; $target is then the value."
-    parser.add_error(span, "bad-name", f'"{text}" is no valid name of a variable', hint)
-    name = text.removeprefix("$")
-    return VariableName(name, span=span) if NAME_PATTERN.fullmatch(name) else None
-
-
-def _read_section(
-    parser: NodeParser, key: str, section: type[KeySection], yaml_node: YamlNode, span: Span
-) -> KeySection:
-    """Return the section below a key."""
-    values = _read_inner_keys(parser, key, span, yaml_node, section)
-    if section.any_of and isinstance(yaml_node, YamlMapping) and not yaml_node.entries:
-        alternatives = " or ".join(f'"{name}"' for name in section.any_of)
-        parser.add_error(span, "missing-key", f"{key} needs {alternatives}")
-    return _make_owner(section, values, span=span)
-
-
-def _read_sections(
-    parser: NodeParser, key: str, section: type[KeySection], yaml_node: YamlNode
-) -> Iterable[KeySection]:
-    """Yield the sections of a list, or a single section."""
-    kind = "mapping with " + " and ".join(f'"{name}"' for name in section.keys)
-    if not isinstance(yaml_node, YamlSequence | YamlMapping):
-        message = f"{key} must be a {kind}, or a list of such mappings, not {yaml_node.description}"
-        parser.add_error(yaml_node.span, "wrong-type", message)
-        return
-    if isinstance(yaml_node, YamlSequence) and not yaml_node.items:
-        parser.add_error(yaml_node.span, "empty-list", f"{key} needs at least one {kind}")
-    for item in yaml_node.items if isinstance(yaml_node, YamlSequence) else (yaml_node,):
-        yield _read_section(parser, key, section, item, item.span)

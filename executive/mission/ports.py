@@ -18,7 +18,7 @@ from executive.mission.findings import describe_validation_error, describe_value
 from executive.skill import Direction, Param, Port, Skill
 from executive.tree.keys import Elements, Key
 from executive.tree.node import ControlNode
-from executive.tree.specification import Literal, Node, Reference, SkillNode, Span, VariableName
+from executive.tree.specification import Constant, Node, Reference, SkillNode, Span, VariableName
 
 _DESCRIPTIONS = {
     str: "a text",
@@ -240,7 +240,7 @@ def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Seq
             wires.append(Wire(node.skill, declaration, value.name, value.span, True, value.field))
         # `check_settings` reports a constant for an output.
         elif isinstance(declaration, Port) and (
-            (direction is Direction.OUT and isinstance(value, Literal))
+            (direction is Direction.OUT and isinstance(value, Constant))
             or (value is None and declaration.name not in skill.one_of)
         ):
             variable = node.variables_by_port.get(declaration.name, declaration.name)
@@ -248,10 +248,10 @@ def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Seq
     return wires
 
 
-def find_literals(node: SkillNode) -> Sequence[tuple[str, Literal]]:
+def find_literals(node: SkillNode) -> Sequence[tuple[str, Constant]]:
     """Return the name and the constant of every param and port that has a constant."""
     values = [(name, setting.value) for name, setting in node.settings.items()]
-    return [(name, value) for name, value in values if isinstance(value, Literal)]
+    return [(name, value) for name, value in values if isinstance(value, Constant)]
 
 
 def find_control_node_outputs(node: Node) -> Sequence[tuple[Key, VariableName]]:

@@ -277,12 +277,12 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes, definitions: d
     nodes_without_body = [
         {"const": word, "title": word, "description": _get_first_line(node_class), **NO_ITEM_SUGGESTION}
         for word, node_class in node_classes.items()
-        if grammar.is_value_optional(node_class)
+        if node_class.is_value_optional()
     ]
     siblings: dict[str, Schema] = {grammar.USE_KEYWORD: make_schema(UseKeys, definitions)["properties"]}
     requirements: dict[str, Schema] = {}
     for word, node_class in node_classes.items():
-        keys = grammar.find_sibling_keys(node_class)
+        keys = node_class.sibling_keys
         siblings[word] = _make_properties(keys, definitions)
         requirements[word] = _require_any_of(node_class.any_of) if set(node_class.any_of) & set(keys) else {}
     return {
@@ -320,8 +320,8 @@ def _make_control_node_schema(node_class: type[ControlNode], definitions: dict[s
 
 def _make_owner_schema(owner: type[KeyOwner], definitions: dict[str, Schema]) -> Schema:
     """Return the schema of the value of a control node or of a section: its keys, or one value."""
-    shorthand = grammar.find_shorthand_key(owner)
-    inner_keys = grammar.find_inner_keys(owner)
+    shorthand = owner.shorthand_key
+    inner_keys = owner.inner_keys
     alternatives = [make_key_schema(shorthand, definitions)] if shorthand else []
     if inner_keys:
         mapping = {

@@ -10,15 +10,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from inspect import get_annotations
-from typing import Annotated, Any, ClassVar, TypeAlias, TypeVar, Union, cast, get_args, get_origin
-from typing import Literal as OneOf
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar, Union, cast, get_args, get_origin
 
 from pydantic import Field, TypeAdapter, ValidationError, WithJsonSchema
 from pydantic.fields import FieldInfo
 
 from executive.tree.specification import (
     Child,
-    Literal,
+    Constant,
     Node,
     Reason,
     Reference,
@@ -36,7 +35,7 @@ Children: TypeAlias = tuple[Child, ...]
 Reasons: TypeAlias = tuple[Reason, ...]
 """Type of a key with a list of reasons."""
 Elements: TypeAlias = Annotated[
-    tuple[object, ...] | VariableName | OneOf["items"],
+    tuple[object, ...] | VariableName | Literal["items"],
     WithJsonSchema({"anyOf": [{"type": "array"}, {"enum": list(PREDEFINED_LISTS)}]}),
 ]
 """Type of a key with a list of values, the name of a variable that holds a list, or `items`: the items that
@@ -115,8 +114,8 @@ class Key:
             constraints.append(Field(le=max_value))
         members = get_args(self.value_type) if _is_union(self.value_type) else (self.value_type,)
         bounded = [
-            # A bound applies to numbers only; the words of a `Literal` have none.
-            member if get_origin(member) is OneOf or not constraints else Annotated[(member, *constraints)]
+            # A bound applies to numbers only; the words of a `Constant` have none.
+            member if get_origin(member) is Literal or not constraints else Annotated[(member, *constraints)]
             for member in members
         ]
         return TypeAdapter(cast("type[object]", Union[tuple(bounded)]))  # noqa: UP007
@@ -138,10 +137,10 @@ class Key:
         if self.value_type == Elements:
             if isinstance(value, Reference):
                 return VariableName(value.name, value.field, value.span)
-            elements = value.value if isinstance(value, Literal) else None
+            elements = value.value if isinstance(value, Constant) else None
             return tuple(elements) if isinstance(elements, list) else "items"
         try:
-            return self.convert(value.value if isinstance(value, Literal) else None, max_value)
+            return self.convert(value.value if isinstance(value, Constant) else None, max_value)
         except ValidationError:
             if self.value_type in (int, float):
                 return sys.maxsize if self.value_type is int else math.inf
@@ -178,11 +177,17 @@ class KeyOwner(Specification):
 
     Attributes:
         keys: Declarations of the keys, by their names in the mission file.
+        shorthand_key: Key whose value may directly follow the keyword, or None.
+        inner_keys: Keys of the mapping below the keyword; empty if the value must not be a mapping.
+        sibling_keys: Keys at the level of the keyword.
         any_of: Names of keys; a mission must give at least one of them. Empty if there is no such rule.
         settings: Constants and references as the mission writes them, by key.
     """
 
     keys: ClassVar[Mapping[str, Key]] = {}
+    shorthand_key: ClassVar[Key | None] = None
+    inner_keys: ClassVar[Mapping[str, Key]] = {}
+    sibling_keys: ClassVar[Mapping[str, Key]] = {}
     any_of: ClassVar[tuple[str, ...]] = ()
 
     settings: Mapping[str, Value] = {}
@@ -199,6 +204,10 @@ class KeyOwner(Specification):
                 key_type = _find_type(field.annotation)
                 keys[name] = replace(mark, name=name, attribute=attribute, value_type=key_type, field=field)
         cls.keys = keys
+        cls.shorthand_key = next((key for key in keys.values() if key.shorthand), None)
+        cls.sibling_keys = {name: key for name, key in keys.items() if key.sibling}
+        inner_keys = {name: key for name, key in keys.items() if not key.sibling}
+        cls.inner_keys = {} if all(key.shorthand for key in inner_keys.values()) else inner_keys
 
     @classmethod
     def make(cls: type[OwnerT], settings: Mapping[str, Value], **values: Any) -> OwnerT:
@@ -229,6 +238,16 @@ class KeyOwner(Specification):
         if "settings" in values:
             values |= self._interpret(values["settings"], {**self.__dict__, **values})
         return super().replace(**values)
+
+    @classmethod
+    def is_value_optional(cls) -> bool:
+        """Return True if the keyword of a node may stand alone, without a value."""
+        return cls.shorthand_key is not None and not cls.shorthand_key.is_required
+
+    def is_written_as_constant(self, key_name: str) -> bool:
+        """Return True if the mission has a constant at a key, not a param or an argument."""
+        value = self.settings.get(key_name)
+        return isinstance(value, Constant) and not value.origin
 
     def list_values(self) -> Sequence[tuple[Key, KeyValue]]:
         """Return every key that has a value, and the value, in the order of the declarations."""

@@ -117,7 +117,7 @@ class While(ControlNode):
         """Yield an error if the loop never ends because its condition cannot fail."""
         condition = analysis.get_flow(self.condition)
         if condition is not None and not condition.failures and not analysis.is_halted_by_sibling:
-            message = f"this loop never ends: its condition, {analysis.get_name(self.condition)}, cannot fail"
+            message = f"this loop never ends: its condition, {self.condition.path_name}, cannot fail"
             yield NodeFinding("", "endless", message, "Use `repeat` with `times` or `until`.")
 
     def explain(self, failure: PropagatedFailure) -> str:
@@ -221,7 +221,7 @@ class Repeat(ControlNode):
         has_only_placed = {name for name, _ in self.limits} == {"placed"} and not self.expected_reasons
         if not has_only_placed or self.is_empty or self.times or analysis.is_concurrent:
             return
-        skills = analysis.list_skills().values()
+        skills = analysis.list_skills(self).values()
         if not any(skill is None or skill.tool_state in ((HOLDING, EMPTY), (ANY, EMPTY)) for skill in skills):
             message = "this loop never succeeds: its body releases no object, so `placed` does not increase"
             hint = "Add a failure reason or `elapsed` to `until`, or add `times`."

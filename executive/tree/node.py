@@ -66,20 +66,8 @@ class NodeAnalysis(Protocol):
         If `is_first_tick` is True, only outcomes in the first tick of the child are possible.
         """
 
-    def get_name(self, child: Node) -> str:
-        """Return the last part of the path of a child: its label, or its skill, subtree or keyword."""
-
-    def describe_place(self, reason: Reason, relative_to: Reason) -> str:
-        """Return the line of `reason` as a text, with the file if `relative_to` is in another file."""
-
-    def is_written_as_constant(self, key: str) -> bool:
-        """Return True if the value of a key is written at the node itself, not in a param or an argument."""
-
-    def list_skills(self, child: Node | None = None) -> Mapping[str, type[Skill] | None]:
-        """Return the class of each skill in the subtree of `child`, by name; None if not installed.
-
-        If `child` is None, the skills are those in the subtree of the node itself.
-        """
+    def list_skills(self, node: Node) -> Mapping[str, type[Skill] | None]:
+        """Return the class of each skill in and below a node, by name; None if not installed."""
 
 
 @dataclass(frozen=True)
@@ -108,8 +96,7 @@ class PropagatedFailure:
 
     def matches(self, reasons: Sequence[Reason]) -> bool:
         """Return True if one of `reasons` denotes the failure."""
-        # A `LocatedReason` of the checker is a `Reason` with a position, and equals no plain `Reason`.
-        return any(Reason(reason.source, reason.reason) in self.reasons for reason in reasons)
+        return any(reason in self.reasons for reason in reasons)
 
 
 @dataclass(frozen=True)

@@ -93,14 +93,14 @@ class Retry(ControlNode):
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield a warning if nothing changes between the attempts, or if there is only one attempt."""
-        skills = analysis.list_skills().values()
+        skills = analysis.list_skills(self).values()
         may_change = any(skill is None or skill.senses or skill.moves or skill.waits for skill in skills)
         if not self.backoff and skills and not may_change:
             message = "this retry changes nothing between its attempts: no node in it looks, moves or waits"
             hint = "Put a look or a motion into `do` or `recover`, or wait with `backoff`."
             yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
         # A param with the value 1 is no mistake, because the param may have another value in another run.
-        if self.attempts == 1 and analysis.is_written_as_constant("attempts"):
+        if self.attempts == 1 and self.is_written_as_constant("attempts"):
             message = "a retry with 1 attempt never runs its body again"
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
@@ -260,7 +260,7 @@ class TryCatch(ControlNode):
             caught = [failure for failure in failures if failure.may_match([reason])]
             if caught and all(failure.must_match(earlier_reasons) for failure in caught):
                 earlier_reason = next(name for name in earlier_reasons if caught[0].must_match([name]))
-                place = analysis.describe_place(earlier_reason, reason)
+                place = earlier_reason.span.describe_place(reason.span.source)
                 message = f"{reason} is caught already, as {earlier_reason} in {place}"
                 yield NodeFinding(reason, "unreachable", message, is_warning=True)
             earlier_reasons.append(reason)

@@ -141,11 +141,11 @@ class OrderedNode(ControlNode):
         # `blocker` is the first slow child that cannot end with `continue_status` in its first tick; if there
         # is none, the last slow child. Each tick of `blocker` halts a running child after it.
         blocker = next((child for child in slow if not self._may_continue_at_once(child, analysis)), slow[-1])
-        name = analysis.get_name(blocker)
+        name = blocker.path_name
         for child in slow[slow.index(blocker) + 1 :]:
             message = (
-                f"{analysis.get_name(child)} takes time, and so does {name}: without memory, every tick "
-                f"runs {name} again, which halts {analysis.get_name(child)}"
+                f"{child.path_name} takes time, and so does {name}: without memory, every tick "
+                f"runs {name} again, which halts {child.path_name}"
             )
             hint = "Only one child may take time: combine these nodes into one child (a list)."
             yield NodeFinding(child, "two-running", message, hint, is_warning=True)
@@ -338,7 +338,7 @@ class Guard(ControlNode):
         body = analysis.get_flow(self.do)
         if condition is None:
             return
-        name = analysis.get_name(self.holds)
+        name = self.holds.path_name
         if body is None:
             message = f"{name} cannot succeed here, so the body of this guard never runs"
             yield NodeFinding(self.holds, "never-holds", message)
@@ -346,7 +346,7 @@ class Guard(ControlNode):
             message = f"{name} cannot fail here, so this guard never stops its body"
             yield NodeFinding(self.holds, "useless-guard", message, is_warning=True)
         elif body.halted is None:
-            message = f"this guard cannot stop its body: {analysis.get_name(self.do)} ends in its first tick"
+            message = f"this guard cannot stop its body: {self.do.path_name} ends in its first tick"
             hint = "Use a sequence (a list) of the condition and the body instead of a guard."
             yield NodeFinding(self.do, "useless-guard", message, hint, is_warning=True)
         elif body.success and self._fails_after_release(analysis, body.success):

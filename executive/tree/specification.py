@@ -6,7 +6,7 @@ Control nodes, which declare their keys, are in `executive.tree.node`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, TypeVar
 
@@ -71,10 +71,12 @@ class Reason:
     Attributes:
         source: Name of a skill, keyword of a control node, or label of a node.
         reason: Reason as the source declares it, for instance `missed`.
+        span: Position below `on` or `until`; equal reasons may have different positions.
     """
 
     source: str
     reason: str
+    span: Span = field(default=NOWHERE, compare=False, kw_only=True)
 
     def __str__(self) -> str:
         return f"{self.source}.{self.reason}"
@@ -91,7 +93,7 @@ def format_reasons(reasons: Iterable[object]) -> str:
 
 
 @dataclass(frozen=True)
-class Literal:
+class Constant:
     """A constant value.
 
     Attributes:
@@ -146,7 +148,7 @@ class InvalidValue:
     span: Span
 
 
-Value = Literal | Reference | InvalidValue
+Value = Constant | Reference | InvalidValue
 
 
 @dataclass(frozen=True)
@@ -192,13 +194,6 @@ class Setting:
 
     name_span: Span
     value: Value
-
-
-@dataclass(frozen=True)
-class LocatedReason(Reason):
-    """`Skill.reason` or `label.reason` below `on` or `until`, with its position."""
-
-    span: Span
 
 
 SpecificationT = TypeVar("SpecificationT", bound="Specification")

@@ -20,7 +20,7 @@ from executive.tree.keys import Children, Key, KeyOwner, KeySection, KeyValue, P
 from executive.tree.node import ControlNode, load_control_nodes
 from executive.tree.specification import (
     Child,
-    Literal,
+    Constant,
     Node,
     Reason,
     Reference,
@@ -189,7 +189,7 @@ def _replace_params(node: Node, values: Mapping[str, Value]) -> Node:
 def _format(value: KeyValue) -> str:
     """Return a value as the text of a port: a constant, a list, or a pointer to a variable."""
     match value:
-        case Literal(value=constant):
+        case Constant(value=constant):
             return _format_constant(constant)
         case Reference(name=name, field=field) if field:
             return _format_pointer(f"{name}.{field}")
