@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
+import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TypeAlias, cast, get_origin
@@ -246,23 +248,10 @@ def make_schema(declared_type: object, definitions: dict[str, Schema]) -> Schema
     """
     adapter: TypeAdapter[object] = TypeAdapter(cast("type[object]", declared_type))
     schema = adapter.json_schema(schema_generator=_FileSchema, ref_template="#/definitions/{model}")
-    models = schema.pop("$defs", {})
-    definitions |= {name: _resolve_definitions(model) for name, model in models.items()}
-    return _resolve_definitions(schema)
-
-
-def _resolve_definitions(schema: Schema) -> Schema:
-    """Return a schema in which a reference replaces each name of a definition."""
-    resolved: Schema = {}
-    for key, value in schema.items():
-        if key == "definition":
-            resolved |= _make_reference(value)
-        elif isinstance(value, dict):
-            resolved[key] = _resolve_definitions(value)
-        elif isinstance(value, list):
-            resolved[key] = [_resolve_definitions(one) if isinstance(one, dict) else one for one in value]
-        else:
-            resolved[key] = value
+    # `Child` and other types name a definition, because pydantic accepts references to its own models only.
+    text = re.sub(r'"definition": "(\w+)"', r'"$ref": "#/definitions/\1"', json.dumps(schema))
+    resolved: Schema = json.loads(text)
+    definitions |= resolved.pop("$defs", {})
     return resolved
 
 
@@ -356,7 +345,7 @@ def make_key_schema(key: Key, definitions: dict[str, Schema]) -> Schema:
     if key.value_type == Children:
         return _make_list_schema(items)
     if get_origin(key.value_type) is tuple:
-        return {"anyOf": [*items, _make_list_schema(items)]}
+        return _merge_alternatives({"anyOf": [*items, _make_list_schema(items)]})
     # Due to `allOf`, editors insert only the keyword of a node without a body.
     may_be_empty = key.shorthand and not key.is_required
     return {"allOf": [{"anyOf": [*items, {"type": "null"}]}]} if may_be_empty else items[0]

@@ -114,19 +114,11 @@ class Key:
             constraints.append(Field(le=max_value))
         members = get_args(self.value_type) if _is_union(self.value_type) else (self.value_type,)
         bounded = [
-            # A bound applies to numbers only; the words of a `Constant` have none.
+            # A bound applies to numbers only, not to the words of a `Literal`.
             member if get_origin(member) is Literal or not constraints else Annotated[(member, *constraints)]
             for member in members
         ]
         return TypeAdapter(cast("type[object]", Union[tuple(bounded)]))  # noqa: UP007
-
-    def convert(self, value: object, max_value: int | None = None) -> object:
-        """Return a plain value converted to the type of the key.
-
-        Raises:
-            ValidationError: The value cannot be converted, or is out of bounds.
-        """
-        return self.make_validator(max_value).validate_json(json.dumps(value), strict=True)
 
     def interpret(self, value: Value | None, max_value: int | None) -> object:
         """Return the typed value for a value in a mission.
@@ -140,7 +132,8 @@ class Key:
             elements = value.value if isinstance(value, Constant) else None
             return tuple(elements) if isinstance(elements, list) else "items"
         try:
-            return self.convert(value.value if isinstance(value, Constant) else None, max_value)
+            constant = value.value if isinstance(value, Constant) else None
+            return self.make_validator(max_value).validate_json(json.dumps(constant), strict=True)
         except ValidationError:
             if self.value_type in (int, float):
                 return sys.maxsize if self.value_type is int else math.inf

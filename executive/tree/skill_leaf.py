@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from py_trees.common import Status
 from pydantic import JsonValue
@@ -16,9 +15,6 @@ from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.skill import Direction, Skill, SkillFailed, get_attribute_name
 from executive.tree.tree_node import Failure, NodeContext, TreeNode
-
-if TYPE_CHECKING:
-    from executive.cell.protocols import Cell
 
 
 class SkillRun:
