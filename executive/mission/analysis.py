@@ -13,14 +13,7 @@ from executive.mission.mission_file import Mission
 from executive.mission.ports import Wire, find_control_node_inputs, find_wires, find_written_variables
 from executive.plugins import Skills
 from executive.skill import Direction, Port, Skill
-from executive.tree.flow import (
-    INITIAL_STATE,
-    UNKNOWN_STATE,
-    Flow,
-    FlowState,
-    compute_skill_flow,
-    join_states,
-)
+from executive.tree.flow import INITIAL_STATE, UNKNOWN_STATE, Flow, FlowState, compute_skill_flow, join_states
 from executive.tree.node import ControlNode, ControlNodes
 from executive.tree.specification import Node, Reference, SkillNode, Span, SubtreeNode
 

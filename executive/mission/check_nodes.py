@@ -22,15 +22,7 @@ from executive.skill import Skill, list_condition_violations
 from executive.tree.flow import UNKNOWN_NAME, Flow, FlowState, PossibleFailure
 from executive.tree.keys import PREDEFINED_LISTS, Key, KeySection, KeyValue, list_nodes
 from executive.tree.node import ControlNode, NodeFinding
-from executive.tree.specification import (
-    Constant,
-    Node,
-    Reason,
-    Reference,
-    SkillNode,
-    Span,
-    SubtreeNode,
-)
+from executive.tree.specification import Constant, Node, Reason, Reference, SkillNode, Span, SubtreeNode
 
 
 def check_constants(context: CheckContext) -> Iterator[Finding]:

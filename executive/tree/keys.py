@@ -144,12 +144,7 @@ class Key:
 
 
 def key(
-    default: object = ...,
-    *,
-    doc: str,
-    ge: float | None = None,
-    gt: float | None = None,
-    **marks: Any,
+    default: object = ..., *, doc: str, ge: float | None = None, gt: float | None = None, **marks: Any
 ) -> Any:
     """Declare a key, as a field of a class. `marks` are attributes of `Key`.
 
