@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from math import inf
 from typing import Any
 
 from hand_set_clock import Clock
-from py_trees.behaviour import Behaviour
 
 from executive.events import Emit, discard_event
 from executive.tree.decorators import Invert, Succeed, Timeout
@@ -35,21 +34,19 @@ def names_of(pairs: Names) -> tuple[Reason, ...]:
     return tuple(Reason(*pair) for pair in pairs)
 
 
-def sequence(site: NodeContext, children: Sequence[Behaviour]) -> Any:
+def sequence(site: NodeContext, children: Any) -> Any:
     return build(site, SequenceNode, do=children)
 
 
-def fallback(site: NodeContext, children: Sequence[Behaviour]) -> Any:
+def fallback(site: NodeContext, children: Any) -> Any:
     return build(site, Fallback, do=children)
 
 
-def parallel(
-    site: NodeContext, children: Sequence[Behaviour], wait_for: Any = None, halt: bool = False
-) -> Any:
-    return build(site, Parallel, do=children, wait_for="all" if wait_for is None else wait_for, halt=halt)
+def parallel(site: NodeContext, children: Any, wait_for: Any = "all", halt: bool = False) -> Any:
+    return build(site, Parallel, do=children, wait_for=wait_for, halt=halt)
 
 
-def lead(site: NodeContext, children: Sequence[Behaviour]) -> Any:
+def lead(site: NodeContext, children: Any) -> Any:
     return build(site, Parallel, do=children, wait_for="lead")
 
 
@@ -59,52 +56,46 @@ def make_backoff(first: float, factor: float = 1.0, max: float = inf) -> Backoff
 
 def retry(
     site: NodeContext,
-    body: Behaviour,
+    body: Any,
     attempts: int,
     on: Names = (),
-    recover: Behaviour | None = None,
-    backoff: Backoff | None = None,
+    recover: Any = None,
+    backoff: Any = None,
     clock: Any = None,
 ) -> Any:
     site = replace(site, clock=clock or site.clock)
     return build(site, Retry, attempts=attempts, on=names_of(on), recover=recover, backoff=backoff, do=body)
 
 
-def repeat(
-    site: NodeContext, body: Behaviour, times: int | None = None, until: Names = (), **limits: float
-) -> Any:
+def repeat(site: NodeContext, body: Any, times: int | None = None, until: Names = (), **limits: float) -> Any:
     ends = (*names_of(until), *((CounterLimits(**limits),) if limits else ()))
     return build(site, Repeat, times=times, until=ends, do=body)
 
 
-def while_loop(site: NodeContext, condition: Behaviour, body: Behaviour) -> Any:
+def while_loop(site: NodeContext, condition: Any, body: Any) -> Any:
     return build(site, While, condition=condition, do=body)
 
 
-def for_each(site: NodeContext, body: Behaviour, blackboard: Blackboard, each: str, source: Any) -> Any:
+def for_each(site: NodeContext, body: Any, blackboard: Blackboard, each: str, source: Any) -> Any:
     elements = VariableName(source) if isinstance(source, str) else tuple(source)
-    return build(
-        replace(site, blackboard=blackboard), ForEach, each=VariableName(each), in_=elements, do=body
-    )
+    site = replace(site, blackboard=blackboard)
+    return build(site, ForEach, each=VariableName(each), in_=elements, do=body)
 
 
 def try_catch(
-    site: NodeContext,
-    body: Behaviour,
-    handlers: Iterable[tuple[Names, Behaviour]] = (),
-    last: Behaviour | None = None,
+    site: NodeContext, body: Any, handlers: Iterable[tuple[Names, Any]] = (), last: Any = None
 ) -> Any:
     catch = tuple(Catch(on=names_of(names), do=specify(do)) for names, do in handlers)
     return build(site, TryCatch, do=body, catch=catch, finally_=last)
 
 
-def timeout(site: NodeContext, body: Behaviour, seconds: float, clock: Any) -> Any:
+def timeout(site: NodeContext, body: Any, seconds: float, clock: Any) -> Any:
     return build(replace(site, clock=clock), Timeout, seconds=seconds, do=body)
 
 
-def invert(site: NodeContext, body: Behaviour) -> Any:
+def invert(site: NodeContext, body: Any) -> Any:
     return build(site, Invert, do=body)
 
 
-def succeed(site: NodeContext, body: Behaviour | None = None) -> Any:
+def succeed(site: NodeContext, body: Any = None) -> Any:
     return build(site, Succeed, do=body)
