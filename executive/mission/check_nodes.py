@@ -37,7 +37,7 @@ def _check_keys(context: CheckContext, owner: ControlNode | KeySection, name: st
             if isinstance(item, KeySection):
                 yield from _check_keys(context, item, key.name)
         if key.is_constant:
-            validator = key.make_validator(owner.find_max(key, owner.__dict__))
+            validator = key.make_validator(owner.find_max(key, vars(owner)))
             yield from check_constant(context, f"{name}.{key.name}", validator, value)
         elif (
             key.is_plain

@@ -114,7 +114,12 @@ class NodeParser:
         """Return the node of a mapping, which has one entry with a keyword or skill, and sibling entries."""
         label = self._read_label(mapping)
         entries = [entry for entry in mapping.entries if entry.key.text != "as"]
-        node_entries = [entry for entry in entries if self._is_node_name(entry.key.text)]
+        # A node is a keyword, or a word that is written like the name of a skill.
+        node_entries = [
+            entry
+            for entry in entries
+            if entry.key.text in self._keywords or _SKILL_PATTERN.fullmatch(entry.key.text)
+        ]
         siblings = [entry for entry in entries if entry not in node_entries]
         if not node_entries:
             for entry in siblings:
@@ -149,10 +154,6 @@ class NodeParser:
         node = self._read_entry(mapping, node_entry, label)
         label_node = mapping.get("as")
         return node.replace(label_span=label_node.span) if label_node else node
-
-    def _is_node_name(self, word: str) -> bool:
-        """Return True for a keyword, and for a word that is written like the name of a skill."""
-        return word in self._keywords or _SKILL_PATTERN.fullmatch(word) is not None
 
     def _read_entry(self, mapping: YamlMapping, entry: YamlEntry, label: str) -> Node:
         """Return the node of a mapping; `entry` is the entry with the keyword or skill."""

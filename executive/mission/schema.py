@@ -230,7 +230,14 @@ def _make_file_schema(title: str, keys: type[FileKeys], skills: Skills, node_cla
             "pattern": rf"^\${grammar.NAME_EXPRESSION}(\.{grammar.NAME_EXPRESSION})?$",
         },
         **{skill: make_settings_schema(skill, skills[skill]) for skill in skills},
-        **{word: _make_control_node_schema(node_classes[word], definitions) for word in node_classes},
+        **{
+            word: {
+                "title": word,
+                "description": _get_first_line(node_class),
+                **_make_owner_schema(node_class, definitions),
+            }
+            for word, node_class in node_classes.items()
+        },
         grammar.USE_KEYWORD: {"title": grammar.USE_KEYWORD, "description": "A subtree by its name.", **name},
         grammar.BEHAVIOUR_KEYWORD: {
             **make_schema(BehaviourKeys, definitions),
@@ -299,12 +306,6 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes, definitions: d
             "dependencies": {"as": {"minProperties": 2}},
         },
     }
-
-
-def _make_control_node_schema(node_class: type[ControlNode], definitions: dict[str, Schema]) -> Schema:
-    """Return the schema of the value of the keyword of a control node."""
-    value = _make_owner_schema(node_class, definitions)
-    return {"title": node_class.keyword, "description": _get_first_line(node_class), **value}
 
 
 def _make_owner_schema(owner: type[KeyOwner], definitions: dict[str, Schema]) -> Schema:

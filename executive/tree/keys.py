@@ -224,7 +224,7 @@ class KeyOwner(Specification):
     def replace(self: OwnerT, **values: Any) -> OwnerT:
         """Return a copy with other values of some attributes."""
         if "settings" in values:
-            values |= self._interpret(values["settings"], {**self.__dict__, **values})
+            values |= self._interpret(values["settings"], {**vars(self), **values})
         return super().replace(**values)
 
     @classmethod
@@ -282,7 +282,7 @@ def map_parts(owner: PartT, change: Callable[[Part], object]) -> PartT:
     result is `owner` itself.
     """
     changed: dict[str, object] = {}
-    for name, value in owner.__dict__.items():
+    for name, value in vars(owner).items():
         if isinstance(value, _CONTAINER_TYPES):
             new_value = _map_value(value, change)
             if new_value is not value:

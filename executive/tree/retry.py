@@ -12,7 +12,6 @@ from executive.tree.keys import KeySection, Reasons, key
 from executive.tree.loops import GeneratorBehaviour, NodeRun
 from executive.tree.node import Advice, ControlNode, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.specification import Child, Node, Reason, format_reasons
-from executive.tree.tree_node import Failure
 
 _GIVE_UP = "give up: the recovery failed"
 """Choice that a retry reports after a failure of its recovery."""
@@ -300,16 +299,15 @@ class TryCatch(ControlNode):
         def run(self) -> NodeRun:
             """Run the body, then the handler of its failure, then `finally`."""
             failure = yield from self.run_child(self.node.do)
-            if failure and (handler := self._find_handler(failure)):
-                self.report_choice("catch", failure)
-                failure = yield from self.run_child(handler)
+            if failure:
+                handler = next((one.do for one in self.node.catch if failure.matches(one.on)), None)
+                if handler is not None:
+                    self.report_choice("catch", failure)
+                    failure = yield from self.run_child(handler)
             failure_of_finally = (
                 (yield from self.run_child(self.node.finally_)) if self.node.finally_ else None
             )
             return failure or failure_of_finally
-
-        def _find_handler(self, failure: Failure) -> Node | None:
-            return next((handler.do for handler in self.node.catch if failure.matches(handler.on)), None)
 
 
 def _append_finally(finally_child: Node, flow: Flow, get_flow: FlowFunction) -> Flow:

@@ -246,9 +246,6 @@ class Node(Specification):
     path: str = ""
     is_list: bool = False
 
-    __eq__ = object.__eq__
-    __hash__ = object.__hash__
-
     @property
     def children(self) -> Sequence[Node]:
         """The children of the node, in the order of the keys that its class declares."""
