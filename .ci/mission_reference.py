@@ -15,10 +15,10 @@ from executive.cell.config import CellConfig, Section
 from executive.cells.sim.scene_file import SceneConfig
 from executive.cli.main import main as command_line
 from executive.cli.skills import Declaration, collect_declarations
-from executive.mission.file_search import list_shipped_missions
 from executive.mission.findings import MEANING_BY_CODE
 from executive.mission.grammar import LibraryKeys, MissionKeys, NodeKeys, ParamKeys, SubtreeKeys, UseKeys
 from executive.mission.schema import Schema, make_key_schema, make_schema, make_type_schema
+from executive.mission.yaml_files import list_shipped_missions
 from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.perception.detectors.noisy import NoisyOptions
 from executive.perception.detectors.rfdetr import RfdetrOptions

@@ -8,8 +8,8 @@ from pathlib import Path
 from executive.cell.config import CellConfig
 from executive.errors import InputError
 from executive.mission.cell_file import load_cell
-from executive.mission.file_search import get_shipped_folder
 from executive.mission.findings import suggest_choice
+from executive.mission.yaml_files import get_shipped_folder
 
 
 def load_cells(

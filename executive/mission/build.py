@@ -14,9 +14,8 @@ from executive.mission.load import LoadedMission
 from executive.mission.ports import convert_setting, find_literals, find_wires
 from executive.skill import Direction, Param, Port, Skill
 from executive.tree.node import ControlNode, ControlNodes, load_control_nodes
-from executive.tree.skill_leaf import SkillLeaf, Wiring
 from executive.tree.specification import Node, SkillNode, SubtreeNode
-from executive.tree.tree_node import Blackboard, NodeContext, TreeNode
+from executive.tree.tree_node import Blackboard, NodeContext, SkillLeaf, TreeNode, Wiring
 
 
 def build_tree(

@@ -15,7 +15,6 @@ from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.geometry import Array
-from executive.mission.file_search import find_file_below, read_source
 from executive.mission.findings import Finding, MissionError, make_error, sort_findings
 from executive.mission.validate import (
     CELL_PREFIX,
@@ -25,7 +24,16 @@ from executive.mission.validate import (
     override_cell,
     validate,
 )
-from executive.mission.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, flatten, parse_yaml
+from executive.mission.yaml_files import (
+    YamlEntry,
+    YamlMapping,
+    YamlNode,
+    YamlScalar,
+    find_file_below,
+    flatten,
+    parse_yaml,
+    read_source,
+)
 from executive.tree.specification import Source, Span
 
 BASE_KEY = "base"

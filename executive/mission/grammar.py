@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 from pydantic.fields import FieldInfo
 
 from executive.mission.findings import Finding, make_error, suggest_choice
-from executive.mission.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, list_scalars
+from executive.mission.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence, list_scalars
 from executive.tree.specification import (
     Child,
     Constant,

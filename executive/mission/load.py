@@ -18,11 +18,16 @@ from executive.mission import check_flow, check_nodes, check_skills, check_varia
 from executive.mission.analysis import CheckContext, UnhandledFailure, find_unhandled_failures
 from executive.mission.cell_file import CellFile, read_cell
 from executive.mission.expand import assign_paths, expand
-from executive.mission.file_search import find_file_below, find_mission, get_shipped_folder, read_source
 from executive.mission.findings import Finding, MissionError, make_warning, sort_findings
 from executive.mission.mission_file import Mission, Subtree, parse_library, parse_mission
 from executive.mission.node_parser import NodeParser
-from executive.mission.yaml_text import parse_yaml
+from executive.mission.yaml_files import (
+    find_file_below,
+    find_mission,
+    get_shipped_folder,
+    parse_yaml,
+    read_source,
+)
 from executive.perception.camera_model import find_calibration_doubts
 from executive.perception.envelope import find_unmeasured_detectors
 from executive.plugins import Skills

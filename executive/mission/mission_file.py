@@ -24,7 +24,7 @@ from executive.mission.grammar import (
 from executive.mission.node_parser import NodeParser
 from executive.mission.ports import ValueProblem, convert_setting, convert_value
 from executive.mission.validate import CELL_PREFIX, make_override_source, parse_override
-from executive.mission.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence
+from executive.mission.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.skill import Param, param
 from executive.tree.specification import Constant, InvalidValue, LocatedName, Node, Span, Value
 

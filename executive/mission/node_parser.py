@@ -10,7 +10,7 @@ from executive.errors import InputError
 from executive.mission import grammar
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.grammar import NAME_PATTERN, MappingReader, is_empty, read_settings, read_value
-from executive.mission.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
+from executive.mission.yaml_files import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.plugins import Skills, load_behaviour
 from executive.skill import Skill
 from executive.tree.keys import (

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from executive.mission.findings import Finding, describe_validation_error, make_error, suggest_choice
-from executive.mission.yaml_text import (
+from executive.mission.yaml_files import (
     YamlEntry,
     YamlMapping,
     YamlNode,

@@ -15,9 +15,9 @@ import yaml
 
 from executive.errors import ExecutiveError
 from executive.events import Observer, RunEnded, TimedEvent
-from executive.mission.file_search import read_source
 from executive.mission.load import LoadedMission
 from executive.mission.outline import make_outline
+from executive.mission.yaml_files import read_source
 from executive.record.diagnosis.diagnose import diagnose
 from executive.record.recorded_mission import format_tree
 from executive.record.recorder import Recorder

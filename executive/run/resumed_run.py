@@ -17,8 +17,7 @@ from executive.run.run import Run
 from executive.run.run_context import RunContext, brake_arm
 from executive.run.run_control import RunControl
 from executive.run.versions import list_versions
-from executive.tree.skill_leaf import SkillLeaf
-from executive.tree.tree_node import TreeNode, halt
+from executive.tree.tree_node import SkillLeaf, TreeNode, halt
 
 
 class ResumedRun(Run):

@@ -21,7 +21,7 @@ from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.skill import Skill
 from executive.testing.faults import FaultyCell, ScheduledFault, with_faults
-from executive.tree.skill_leaf import SkillLeaf
+from executive.tree.tree_node import SkillLeaf
 
 MISSION_TIMEOUT = 600.0
 """Default timeout of a run, on the run's clock [s]; after the timeout the run ends as a fault."""

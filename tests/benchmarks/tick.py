@@ -31,8 +31,7 @@ from executive.skill import Skill
 from executive.tree.decorators import Timeout
 from executive.tree.retry import Retry
 from executive.tree.sequences import Sequence as SequenceNode
-from executive.tree.skill_leaf import SkillLeaf, Wiring
-from executive.tree.tree_node import Blackboard, NodeContext
+from executive.tree.tree_node import Blackboard, NodeContext, SkillLeaf, Wiring
 from tests.benchmarks.report import Figures, run_command
 from tests.node_behaviours import build
 

@@ -12,9 +12,9 @@ import pytest
 from executive.cell.config import CellConfig
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
-from executive.mission.file_search import find_mission, get_shipped_folder
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
+from executive.mission.yaml_files import find_mission, get_shipped_folder
 from executive.tree.specification import Reference, SkillNode
 
 Load = Callable[..., LoadedMission]

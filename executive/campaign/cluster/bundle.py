@@ -15,7 +15,7 @@ from packaging.utils import canonicalize_name
 
 from executive.campaign.sweep_job import SweepJob
 from executive.errors import InputError
-from executive.mission.file_search import find_mission
+from executive.mission.yaml_files import find_mission
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.envelope import MEASUREMENT_SUFFIX
 from executive.plugins import CELL_KIND_GROUP, SKILL_GROUP, find_project, list_entries

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import executive
 from executive.errors import InputError
-from executive.mission.file_search import get_shipped_folder
+from executive.mission.yaml_files import get_shipped_folder
 from executive.run.versions import find_version, list_requirements, list_versions
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from executive.campaign.results.database import FILE_NAME, ResultsDatabase, get_
 from executive.campaign.results.rows import SweepSettings
 from executive.cells.sim.scene_file import load_scene
 from executive.errors import InputError
-from executive.mission.file_search import read_source
 from executive.mission.load import LoadedMission, load_mission
+from executive.mission.yaml_files import read_source
 from executive.perception.envelope import FAKE_KIND, compute_fingerprint
 from executive.plugins import load_cell_kind, load_skills
 from executive.record.run_directory import make_dated_folder

@@ -26,7 +26,7 @@ from executive.cells.sim.world import World
 from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import InputError
 from executive.events import Emit
-from executive.mission.file_search import get_shipped_folder
+from executive.mission.yaml_files import get_shipped_folder
 from executive.motion.arms import build_planner
 from executive.perception.detectors.requests import ClosableDetector
 from executive.perception.envelope import build_rated_detectors

@@ -15,7 +15,7 @@ import yaml
 from markupsafe import Markup
 
 from executive.errors import ExecutiveError
-from executive.mission.file_search import get_shipped_folder
+from executive.mission.yaml_files import get_shipped_folder
 from executive.perception.evidence import describe_unknown_labels
 from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis.diagnosis import list_labelled_sentences, make_resume_command
