@@ -16,18 +16,17 @@ from executive.cell.device_config import Section
 from executive.cells.sim.scene_file import SceneConfig
 from executive.cli.main import main as command_line
 from executive.cli.skills import Declaration, collect_declarations
-from executive.mission import grammar
-from executive.mission.file_search import list_shipped_missions
 from executive.mission.findings import MEANING_BY_CODE
-from executive.mission.schema import Schema, make_type_schema
+from executive.mission.grammar import LibraryKeys, MissionKeys, NodeKeys, ParamKeys, SubtreeKeys, UseKeys
+from executive.mission.schema import Schema, make_key_schema, make_schema, make_type_schema
+from executive.mission.yaml_files import list_shipped_missions
 from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.perception.detectors.noisy import NoisyOptions
 from executive.perception.detectors.rfdetr import RfdetrOptions
 from executive.perception.detectors.roboflow.detector import RoboflowOptions
 from executive.plugins import load_skills
-from executive.tree.keys import KeyKind, KeySection
-from executive.tree.node import ControlNode
-from executive.tree.node_registry import load_control_nodes
+from executive.tree.keys import KeyOwner
+from executive.tree.node import load_control_nodes
 
 MISSIONS = Path(__file__).parent.parent / "missions"
 PATH = MISSIONS / "reference.md"
@@ -45,19 +44,13 @@ KEYS = "key, value, default, meaning"
 DETECTOR_OPTIONS = {
     "embedded": None, "noisy": NoisyOptions, "rfdetr": RfdetrOptions, "roboflow": RoboflowOptions,
 }  # fmt: skip
-KINDS = {
-    "node": "node", "number": "number", "text": "text", "name": "name", "names": "name, or list of names",
-    "list": "list", "value": "any value", "values": "names with values", "variables": "names with `$name`",
-    "paths": "file, or list of files", "params": "names with params", "routes": "classes with bins",
-    "quotas": "bins with numbers, or with numbers by class",
-    "trees": "names with subtrees", "args": "list of names, or names with values", "label": "name",
-    KeyKind.NODE: "node", KeyKind.NODES: "list of nodes", KeyKind.REASONS: "reason, or list of reasons",
-    KeyKind.VARIABLE: "name of a variable", KeyKind.ELEMENTS: "list, or `$name`",
-    KeyKind.REASONS_OR_SECTIONS: "reason, section, or list of both",
-    KeyKind.SECTION: "section", KeyKind.SECTIONS: "section, or list of sections",
-    "float": "number", "int": "whole number", "str": "text", "str | None": "text",
+DEFINITIONS = {
+    "node": "node", "reason": "reason", "variable": "name of a variable",
+    "ParamKeys": "param", "SubtreeKeys": "subtree",
 }  # fmt: skip
-"""Kinds of values of the keys of files and control nodes, and types of params, in words."""
+"""Values in words, by the definition in the schema of missions."""
+PARAM_TYPES = {"float": "number", "int": "whole number", "str": "text", "str | None": "text"}
+"""Types of the params of skills in words."""
 
 
 def generate() -> str:
@@ -86,18 +79,18 @@ def slug(heading: str) -> str:
 
 
 def _mission_files() -> Iterator[str]:
-    tables = {
-        "A mission": grammar.MISSION_KEYS, "A param of a mission": grammar.PARAM_KEYS,
-        "A library": grammar.LIBRARY_KEYS, "A subtree": grammar.SUBTREE_KEYS,
-        "Beside `use`": grammar.USE_SIBLINGS, "Any node": {"as": grammar.LABEL_KEY},
+    models = {
+        "A mission": MissionKeys, "A param of a mission": ParamKeys, "A library": LibraryKeys,
+        "A subtree": SubtreeKeys, "Beside `use`": UseKeys, "Any node": NodeKeys,
     }  # fmt: skip
-    for title, keys in tables.items():
+    for title, model in models.items():
         yield f"### {title}"
-        defaults = [_default(... if key.is_required else "") for key in keys.values()]
-        cells = zip(keys.items(), defaults, strict=True)
-        yield _table(
-            KEYS, ([f"`{name}`", KINDS[key.kind], default, key.doc] for (name, key), default in cells)
-        )
+        properties = make_schema(model, {})["properties"]
+        rows = []
+        for name, field in model.get_keys().items():
+            default = _default(... if field.is_required() else "")
+            rows.append([f"`{name}`", _value(properties[name]), default, field.description or ""])
+        yield _table(KEYS, rows)
 
 
 def _control_nodes() -> Iterator[str]:
@@ -117,16 +110,18 @@ def _control_nodes() -> Iterator[str]:
         yield _table(KEYS, _key_rows(word, node))
 
 
-def _key_rows(owner: str, node: type[ControlNode | KeySection], prefix: str = "") -> Iterator[list[str]]:
+def _key_rows(owner: str, node: type[KeyOwner], prefix: str = "") -> Iterator[list[str]]:
     for name, key in node.keys.items():
         written = f"`{prefix}{name}`" + (f", beside `{owner}`" if key.sibling else "")
         if key.shorthand:
-            written = (f"{written}, or " if grammar.find_inner_keys(node) else "") + f"the value of `{owner}`"
-        value = KINDS.get(key.kind) or _value(key.make_validator().json_schema())
+            written = (f"{written}, or " if node.inner_keys else "") + f"the value of `{owner}`"
+        schema = key.make_validator().json_schema() if key.is_constant else make_key_schema(key, {})
+        value = _value(schema)
         value = value.replace("node", "condition") if key.requires_conditions else value
         value += f", at most {key.max_count}" if key.max_count else ""
-        yield [written, value, _default(key.default), key.doc]
-        if key.kind in (KeyKind.SECTION, KeyKind.SECTIONS, KeyKind.REASONS_OR_SECTIONS):
+        default = ... if key.is_required else key.field.default
+        yield [written, value, _default(default), key.field.description or ""]
+        if key.section:
             yield from _key_rows(name, key.section, f"{name}.")
 
 
@@ -146,7 +141,7 @@ def _skill(name: str, skill: type) -> Iterator[str]:
 
 def _skill_row(entry: Declaration) -> list[str]:
     kind = {"in": "input", "out": "output", "": "param"}[entry.get("direction", "")]
-    value = KINDS.get(entry["type"], f"`{entry['type']}`")
+    value = PARAM_TYPES.get(entry["type"], f"`{entry['type']}`")
     if entry["refers"]:
         value = f"name of {'an' if entry['refers'][0] in 'aeiou' else 'a'} {entry['refers']}"
         if entry["type"].startswith("list["):
@@ -210,20 +205,37 @@ def _model(model: type[Section]) -> Iterator[str]:
 
 def _value(schema: Schema, plural: str = "") -> str:
     """Return a JSON schema in words."""
+    (schema,) = schema.get("allOf", [schema])
+    if not schema.keys() - {"description"}:
+        return "any value"
+    types = schema.get("type")
+    if "properties" in schema:
+        return f"section{plural}"
+    if isinstance(types, list):
+        if types == ["string", "number", "boolean"]:
+            return f"text{plural}"
+        alternatives = [{**schema, "type": one} for one in types]
+        return _value({"anyOf": alternatives}, plural)
     if "anyOf" in schema:
-        return ", or ".join(_value(one, plural) for one in schema["anyOf"] if one.get("type") != "null")
+        values = [_value(one, plural) for one in schema["anyOf"] if one.get("type") != "null"]
+        return ", or ".join(dict.fromkeys(values))
     if "const" in schema or "enum" in schema:
         return _listed(schema.get("enum") or [schema["const"]])
     if "$ref" in schema:
-        return f"section{plural}"
-    if schema["type"] == "object":
-        return f"names with {_value(schema['additionalProperties'], 's')}"
-    if schema["type"] == "array":
-        items = schema["items"][0] if isinstance(schema["items"], list) else schema["items"]
+        definition = schema["$ref"].rpartition("/")[2]
+        return "`$name`" if definition == "reference" else f"{DEFINITIONS.get(definition, 'section')}{plural}"
+    if types == "object":
+        named = schema.get("additionalProperties") or next(iter(schema["patternProperties"].values()))
+        return f"names with {_value(named, 's')}"
+    if types == "array":
+        items = schema.get("items", {})
+        items = items[0] if isinstance(items, list) else items
         count = f"{schema['minItems']} " if schema.get("minItems") == schema.get("maxItems", 0) else ""
-        return f"list{plural} of {count}{_value(items, 's')}"
+        return f"list{plural} of {count}{_value(items, 's')}" if items else f"list{plural}"
+    if types == "string" and "pattern" in schema:
+        return f"name{plural}"
     words = {"number": f"number{plural}", "integer": f"whole number{plural}", "string": f"text{plural}"}
-    return words.get(schema["type"], "`true` or `false`") + _bounds(schema)
+    return words.get(types, "`true` or `false`") + _bounds(schema)
 
 
 def _bounds(schema: Mapping[str, float | None]) -> str:

@@ -76,7 +76,8 @@ def find_mission_type(declared_type: object) -> object:
     An enumeration becomes a Literal of the names of its members. A union keeps the types that a mission can
     contain.
     """
-    origin, parts = get_origin(declared_type), get_args(declared_type)
+    origin = get_origin(declared_type)
+    parts = get_args(declared_type)
     if _is_enumeration(declared_type):
         return cast("Any", Literal)[tuple(declared_type.__members__)]
     if origin in (Union, UnionType):
@@ -90,7 +91,8 @@ def find_mission_type(declared_type: object) -> object:
 
 def to_argument(value: object, declared_type: object) -> object:
     """Convert a value from a mission to the declared type: names of enumeration members become members."""
-    origin, parts = get_origin(declared_type), get_args(declared_type)
+    origin = get_origin(declared_type)
+    parts = get_args(declared_type)
     if _is_enumeration(declared_type) and isinstance(value, str):
         return declared_type.__members__.get(value, value)
     if origin in (Union, UnionType):
@@ -299,7 +301,8 @@ def make_behaviour_skill(name: str, behaviour_type: type[Behaviour]) -> type[Beh
 def _make_params(arguments: Mapping[str, Param]) -> Iterator[tuple[str, Param]]:
     """Yield name and declaration of the param for each argument that a mission can set."""
     for name, argument in arguments.items():
-        mission_type, default = find_mission_type(argument.type), argument.default
+        mission_type = find_mission_type(argument.type)
+        default = argument.default
         if name != NAME_ARGUMENT and mission_type is not None:
             # The default is only shown to authors; without a value, the constructor applies its own default.
             default = default.name if isinstance(default, Enum) else default

@@ -21,13 +21,12 @@ from executive.cells.sim.scene_file import (
 from executive.cli.main import main
 from executive.events import Event
 from executive.mission.cell_file import load_cell
-from executive.mission.file_search import list_shipped_missions
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.schema import make_mission_schema
-from executive.mission.yaml_text import parse_yaml
+from executive.mission.yaml_files import list_shipped_missions, parse_yaml
 from executive.plugins import load_cell_kind, load_skills
 from executive.run.assembly import RunOptions, assemble
-from executive.tree.node_registry import load_control_nodes
+from executive.tree.node import load_control_nodes
 from executive.tree.specification import Source
 
 LONGEST = 300.0

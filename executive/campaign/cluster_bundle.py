@@ -27,11 +27,11 @@ from executive import plugins
 from executive.campaign.jobs import SweepJob
 from executive.campaign.results import RunRecord
 from executive.errors import InputError
-from executive.mission.file_search import find_mission, get_shipped_folder
+from executive.mission.yaml_files import find_mission, get_shipped_folder
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.envelope import MEASUREMENT_SUFFIX
 from executive.record.run_directory import convert_os_errors, make_unique_folder
-from executive.tree.node_registry import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
+from executive.tree.node import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
 
 if TYPE_CHECKING:
     from distributed import Worker

@@ -15,8 +15,8 @@ from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import find_max_object_count
 from executive.errors import InputError, explain_os_errors
 from executive.mission.cell_file import load_cell
-from executive.mission.file_search import get_shipped_folder
 from executive.mission.findings import suggest_choice
+from executive.mission.yaml_files import get_shipped_folder
 from executive.perception import envelope
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 from executive.perception.localization import CellLocalizer

@@ -9,13 +9,13 @@ from executive.campaign.jobs import MissionUnderTest
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import detect_and_record_drop
-from executive.mission.nodes import SkillNode
 from executive.record.timeline import Activation
 from executive.skill import EMPTY, HOLDING, Skill
 from executive.testing import faults as effects
 from executive.testing.faults import after, between, during
 from executive.testing.faulty_cell import Effect, ObjectChoice, ScheduledFault
 from executive.testing.run_mission import make_raising, make_substitute
+from executive.tree.specification import SkillNode
 
 FAULT_DURATIONS = (0.5, 5.0)
 """Durations of short faults of detectors and tool [s]."""

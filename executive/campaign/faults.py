@@ -18,8 +18,6 @@ from executive.errors import InputError
 from executive.events import RunEnded
 from executive.ledger.outcomes import is_balanced
 from executive.mission.analysis import UnhandledFailure
-from executive.mission.instance import get_mission_node, make_inspection_instance
-from executive.mission.nodes import InnerNode, SubtreeNode
 from executive.record.journal import Recorder
 from executive.record.recorded_run import execute_recorded, make_run_directory
 from executive.record.result import is_confirmed_by_audit
@@ -28,6 +26,8 @@ from executive.run.assembly import RunOptions, assemble
 from executive.skill import Skill
 from executive.testing.faults import with_faults
 from executive.testing.faulty_cell import FaultyCell
+from executive.tree.node import ControlNode
+from executive.tree.specification import SubtreeNode
 from executive.view.report import try_write_report
 from executive.view.terminal import describe_end
 
@@ -346,9 +346,8 @@ def count_branch_entries(campaign: Campaign) -> dict[str, int]:
     """
     paths_by_branch: dict[str, set[str]] = defaultdict(set)
     for node in campaign.mission.loaded.tree.walk():
-        if isinstance(node, InnerNode):
-            for name, child in make_inspection_instance(node).list_contingencies():
-                branch = get_mission_node(child)
+        if isinstance(node, ControlNode):
+            for name, branch in node.list_contingencies():
                 key = f"{branch.span.source.path}:{branch.span.line}:{branch.span.col}: {name}"
                 # The built tree contains no node for the use of a subtree without a label.
                 while isinstance(branch, SubtreeNode) and not branch.label and branch.body is not None:

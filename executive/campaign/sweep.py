@@ -18,8 +18,8 @@ from executive.campaign.results import FILE_NAME, ResultsDatabase, RunRecord, Sw
 from executive.campaign.sweep_summary import SweepResults, summarize_runs
 from executive.cells.sim.scene_file import load_scene
 from executive.errors import InputError
-from executive.mission.file_search import read_source
 from executive.mission.load import LoadedMission, load_mission
+from executive.mission.yaml_files import read_source
 from executive.perception.envelope import FAKE_KIND, compute_fingerprint
 from executive.plugins import DISTRIBUTION, list_versions, load_cell_kind, load_skills
 from executive.record.run_directory import make_dated_folder

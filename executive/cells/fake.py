@@ -26,7 +26,7 @@ from executive.errors import InputError, Unavailable
 from executive.events import Emit, discard_event
 from executive.geometry import GRAVITY, Array, Pose
 from executive.mission.cell_file import load_cell
-from executive.mission.file_search import get_shipped_folder
+from executive.mission.yaml_files import get_shipped_folder
 from executive.motion.arms import build_planning_kinematics, find_arm_errors, find_places_out_of_reach
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.planner import PlanningArm

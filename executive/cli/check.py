@@ -162,7 +162,7 @@ def schema_command(cell: bool, library: bool, journal: bool) -> None:
         from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
         from executive.plugins import load_skills
         from executive.record.journal import make_journal_schema
-        from executive.tree.node_registry import load_control_nodes
+        from executive.tree.node import load_control_nodes
 
         if cell:
             schema = make_cell_schema()

@@ -100,7 +100,7 @@ def check_simulator() -> Iterator[CheckResult]:
     """Load a simulated cell."""
     from executive.cells.sim.world import World
     from executive.mission.cell_file import load_cell
-    from executive.mission.file_search import get_shipped_folder
+    from executive.mission.yaml_files import get_shipped_folder
 
     World(load_cell(get_shipped_folder() / "cells" / "overhead.yaml"))
     yield CheckResult("ok", "simulator", "loads the cell overhead")

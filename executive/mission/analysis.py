@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 from executive.cell.config import CellConfig
 from executive.mission.findings import find_similar_word, suggest_choice
-from executive.mission.instance import get_mission_node, make_inspection_instance
 from executive.mission.mission_file import Mission
-from executive.mission.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.ports import Wire, find_control_node_inputs, find_wires, find_written_variables
 from executive.plugins import Skills
-from executive.skill import HALT, HOLDING, Direction, Port, Skill
-from executive.tree.flow import INITIAL_STATE, UNKNOWN_STATE, Flow, FlowState, PossibleFailure, join_states
-from executive.tree.keys import Child
-from executive.tree.node import ControlNode
-from executive.tree.node_registry import ControlNodes
-from executive.tree.specification import Reference, Span
+from executive.skill import Direction, Port, Skill
+from executive.tree.flow import INITIAL_STATE, UNKNOWN_STATE, Flow, FlowState, compute_skill_flow, join_states
+from executive.tree.node import ControlNode, ControlNodes
+from executive.tree.specification import Node, Reference, SkillNode, Span, SubtreeNode
 
 
 class FlowAnalysis:
@@ -46,9 +42,9 @@ class FlowAnalysis:
         self.entry_states: dict[str, FlowState] = {}
         self.flows: dict[str, Flow] = {}
         self.body_end_states: dict[str, FlowState | None] = {}
-        self._skills, self._is_first_tick = skills, is_first_tick
+        self._skills = skills
+        self._is_first_tick = is_first_tick
         self._flows_by_entry: dict[tuple[str, FlowState], Flow] = {}
-        self._instances: dict[str, ControlNode] = {}
         self.root_flow = self._analyse(tree, entry)
 
     def find_skill_or_most_similar(self, name: str) -> type[Skill] | None:
@@ -67,10 +63,8 @@ class FlowAnalysis:
 
     def _compute_flow(self, node: Node, state: FlowState) -> Flow:
         match node:
-            case InnerNode():
-                if node.path not in self._instances:
-                    self._instances[node.path] = make_inspection_instance(node)
-                return self._instances[node.path].compute_flow(self._analyse_child, state)
+            case ControlNode():
+                return node.compute_flow(self._analyse, state)
             case SkillNode():
                 return self._compute_skill_flow(node, state)
             case SubtreeNode(body=Node() as body):
@@ -79,33 +73,12 @@ class FlowAnalysis:
             self._analyse(child, UNKNOWN_STATE)
         return Flow.make_unknown(node.path)
 
-    def _analyse_child(self, child: Child, state: FlowState) -> Flow:
-        return self._analyse(get_mission_node(child), state)
-
     def _compute_skill_flow(self, node: SkillNode, state: FlowState) -> Flow:
         skill = self.find_skill_or_most_similar(node.skill)
         if skill is None:
             return Flow.make_unknown(node.path, node.skill)
-        precondition, postcondition = skill.tool_state
-        state = state.apply_precondition(precondition, node.path)
         outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
-        success_state = state.with_variables(outputs)
-        apply_success = success_state.apply_observation if skill.is_condition else success_state.apply_success
-        # A condition grasps no object: a tool that was empty before the condition failed is still empty.
-        may_be_holding = state.tool_states is None or state.find_tool_state(HOLDING) is not None
-        tool_states_after_failure = (
-            skill.tool_state_after_failure if may_be_holding or not skill.is_condition else {}
-        )
-        end_states = {
-            key: state.apply_failure(tool_states_after_failure.get(key), node.path)
-            for key in (*skill.reasons, HALT)
-        }
-        failures = {PossibleFailure(node.skill, key, node.path): end_states[key] for key in skill.reasons}
-        success = apply_success(postcondition, node.path)
-        if skill.is_instantaneous():
-            return Flow(success, failures, None)
-        halted = end_states[HALT]
-        return Flow(None, {}, halted) if self._is_first_tick else Flow(success, failures, halted)
+        return compute_skill_flow(node, skill, outputs, state, self._is_first_tick)
 
     def _compute_subtree_flow(self, node: SubtreeNode, body: Node, state: FlowState) -> Flow:
         flow = self._analyse(body, state)
@@ -197,29 +170,43 @@ class CheckContext:
         """Variables that a node of the tree may write."""
         return find_written_variables(self.tree, self.skills)
 
-    def iterate_nodes(self) -> Iterator[Node]:
-        """Yield every node of the tree and of the unused subtrees."""
-        for root in (self.tree, *self.unused_subtrees):
-            yield from root.walk()
+    @cached_property
+    def nodes(self) -> Sequence[Node]:
+        """Every node of the tree and of the unused subtrees."""
+        return [node for root in (self.tree, *self.unused_subtrees) for node in root.walk()]
 
-    def iterate_control_nodes(self) -> Iterator[InnerNode]:
-        """Yield every control node of the tree and of the unused subtrees."""
-        return (node for node in self.iterate_nodes() if isinstance(node, InnerNode))
+    @cached_property
+    def control_nodes(self) -> Sequence[ControlNode]:
+        """Every control node of the tree and of the unused subtrees."""
+        return [node for node in self.nodes if isinstance(node, ControlNode)]
 
-    def find_installed_skills(self, nodes: Iterable[Node]) -> Iterator[tuple[SkillNode, type[Skill]]]:
-        """Yield every node in `nodes` that runs an installed skill, with the skill."""
-        for node in nodes:
-            if isinstance(node, SkillNode) and node.skill in self.skills:
-                yield node, self.skills[node.skill]
+    def find_installed_skills(self, nodes: Iterable[Node]) -> Sequence[tuple[SkillNode, type[Skill]]]:
+        """Return every node in `nodes` that runs an installed skill, with the skill."""
+        skills = self.skills
+        return [
+            (node, skills[node.skill])
+            for node in nodes
+            if isinstance(node, SkillNode) and node.skill in skills
+        ]
 
-    def iterate_reads(self, root: Node) -> Iterator[VariableRead]:
-        """Yield every read of a variable by `root` and the nodes below it."""
-        for node in root.walk():
-            for reference in find_control_node_inputs(node):
-                yield VariableRead(node, node.type_name, reference.name, reference.span, True, False)
-            for wire in self.find_wires(node, Direction.IN):
-                flags = wire.is_explicit, wire.port.is_required
-                yield VariableRead(node, str(wire), wire.variable, wire.span, *flags)
+    def list_reads(self, root: Node) -> Sequence[VariableRead]:
+        """Return every read of a variable by `root` and the nodes below it."""
+        return [read for node in root.walk() for read in self._reads_by_node[node]]
+
+    @cached_property
+    def _reads_by_node(self) -> Mapping[Node, Sequence[VariableRead]]:
+        reads: dict[Node, Sequence[VariableRead]] = {}
+        for node in self.nodes:
+            reads[node] = [
+                VariableRead(node, node.type_name, reference.name, reference.span, True, False)
+                for reference in find_control_node_inputs(node)
+            ] + [
+                VariableRead(
+                    node, str(wire), wire.variable, wire.span, wire.is_explicit, wire.port.is_required
+                )
+                for wire in self.find_wires(node, Direction.IN)
+            ]
+        return reads
 
     @cached_property
     def names_in_cell_by_kind(self) -> Mapping[str, list[str]]:
@@ -264,13 +251,23 @@ class CheckContext:
         is_variable = isinstance(value, str) and value in self.written_variables
         return f"For the variable, write ${value}." if is_variable else ""
 
-    def find_wires(self, node: Node, direction: Direction) -> Iterator[Wire]:
-        """Yield the connections of the ports of a node; none if the node is no installed skill."""
-        if isinstance(node, SkillNode) and node.skill in self.skills:
-            for wire in find_wires(node, self.skills[node.skill], direction):
+    def find_wires(self, node: Node, direction: Direction) -> Sequence[Wire]:
+        """Return the connections of the ports of a node; none if the node is no installed skill."""
+        return self._wires_by_node.get((node, direction), ())
+
+    @cached_property
+    def _wires_by_node(self) -> Mapping[tuple[Node, Direction], Sequence[Wire]]:
+        written_variables = self.written_variables
+        return {
+            (node, direction): [
+                wire
+                for wire in find_wires(node, skill, direction)
                 # `check_settings` reports a param with a variable that no node writes.
-                if isinstance(wire.port, Port) or wire.variable in self.written_variables:
-                    yield wire
+                if isinstance(wire.port, Port) or wire.variable in written_variables
+            ]
+            for node, skill in self.find_installed_skills(self.nodes)
+            for direction in Direction
+        }
 
     def list_skills_with_output(self, name: str) -> str:
         """Return the names of the skills that have an output `name`, separated by commas."""

@@ -10,14 +10,12 @@ from executive.cell.protocols import Cell
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.grammar import SEQUENCE_KEYWORD
-from executive.mission.instance import make_instance
 from executive.mission.load import LoadedMission
-from executive.mission.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.ports import convert_setting, find_literals, find_wires
 from executive.skill import Direction, Param, Port, Skill
-from executive.tree.node_registry import ControlNodes, load_control_nodes
-from executive.tree.skill_leaf import SkillLeaf, Wiring
-from executive.tree.tree_node import Blackboard, NodeContext, TreeNode
+from executive.tree.node import ControlNode, ControlNodes, load_control_nodes
+from executive.tree.specification import Node, SkillNode, SubtreeNode
+from executive.tree.tree_node import Blackboard, NodeContext, SkillLeaf, TreeNode, Wiring
 
 
 def build_tree(
@@ -69,12 +67,15 @@ class TreeBuilder:
         match node:
             case SkillNode():
                 return self._build_skill_leaf(context, node)
-            case InnerNode():
-                return make_instance(node, context, self.build_node)
+            case ControlNode():
+                return node.Behaviour(context, node, self.build_node)
             case SubtreeNode(body=Node() as subtree_root):
                 body = self.build_node(subtree_root)
                 # A node has one label, so the label of the `use` belongs to a sequence around the subtree.
-                root = self.node_classes[SEQUENCE_KEYWORD](context, do=(body,)) if node.label else body
+                root = body
+                if node.label:
+                    sequence = self.node_classes[SEQUENCE_KEYWORD].make({}, do=(subtree_root,))
+                    root = sequence.Behaviour(context, sequence, lambda _: body)
                 root.subtree_names = (node.name, *root.subtree_names)
                 return root
         raise AssertionError(f"a checked mission contains no {type(node).__name__}")

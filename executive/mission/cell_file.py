@@ -15,7 +15,6 @@ from executive.cell.objects import BIN_THICKNESS
 from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.geometry import Array
-from executive.mission.file_search import find_file_below, read_source
 from executive.mission.findings import Finding, MissionError, make_error, sort_findings
 from executive.mission.validate import (
     CELL_PREFIX,
@@ -25,7 +24,16 @@ from executive.mission.validate import (
     override_cell,
     validate,
 )
-from executive.mission.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, flatten, parse_yaml
+from executive.mission.yaml_files import (
+    YamlEntry,
+    YamlMapping,
+    YamlNode,
+    YamlScalar,
+    find_file_below,
+    flatten,
+    parse_yaml,
+    read_source,
+)
 from executive.tree.specification import Source, Span
 
 BASE_KEY = "base"
@@ -210,7 +218,8 @@ def _merge_entry(entry: YamlEntry, base: YamlMapping) -> YamlEntry:
 
     A detector without value removes the base's detector of this name. The detectors of the file come first.
     """
-    detectors, base_detectors = entry.value, base.get(DETECTORS_KEY)
+    detectors = entry.value
+    base_detectors = base.get(DETECTORS_KEY)
     if not (isinstance(detectors, YamlMapping) and isinstance(base_detectors, YamlMapping)):
         return entry
     if entry.key.text != DETECTORS_KEY:
@@ -228,7 +237,8 @@ def _merge_detector(detector: YamlNode, base_detector: YamlNode | None) -> YamlN
     """Return a detector, completed by keys of the base's detector if both detectors have the same kind."""
     if not isinstance(detector, YamlMapping) or not isinstance(base_detector, YamlMapping):
         return detector
-    kind, base_kind = detector.get("kind"), base_detector.get("kind")
+    kind = detector.get("kind")
+    base_kind = base_detector.get("kind")
     is_same_kind = kind is None or (base_kind and kind.python_value == base_kind.python_value)
     return _inherit_entries(detector, base_detector) if is_same_kind else detector
 
@@ -263,7 +273,8 @@ def _find_wrong_looks(file: CellFile, config: CellConfig) -> Iterator[Finding]:
     for label, section in config.objects.items():
         if not (name := section.looks_like):
             continue
-        key_path, look = ("objects", label, "looks_like"), config.objects.get(name)
+        key_path = ("objects", label, "looks_like")
+        look = config.objects.get(name)
         if look is None:
             message = f'the cell has no class "{name}"; it has: {", ".join(config.objects)}'
             yield file.make_error(key_path, "unknown-class", message)
@@ -288,7 +299,8 @@ def _resolve_model_files(
 
     A path is relative to the folder of the cell file or base that contains the path.
     """
-    objects, errors = dict(config.objects), []
+    objects = dict(config.objects)
+    errors = []
     for label, model in config.objects.items():
         for key, path in (("urdf", model.urdf), ("mesh", model.mesh)):
             key_path = ("objects", label, key)
@@ -333,7 +345,8 @@ def find_overlaps(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 def _compute_outline(bin: BinConfig) -> Array:
     """Return the rows minimum x, y and maximum x, y of a bin with its walls, `(2, 2)` [m]."""
-    centre, half_size = np.array(bin.position[:2]), np.array(bin.size[:2]) / 2 + BIN_THICKNESS
+    centre = np.array(bin.position[:2])
+    half_size = np.array(bin.size[:2]) / 2 + BIN_THICKNESS
     return np.array([centre - half_size, centre + half_size])
 
 

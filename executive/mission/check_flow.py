@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations
 from typing import TypeAlias
 
 from executive.mission.analysis import CheckContext, FlowAnalysis, VariableRead
 from executive.mission.findings import Finding, make_error, make_warning
-from executive.mission.instance import get_mission_node, make_inspection_instance
-from executive.mission.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.ports import find_control_node_outputs
 from executive.skill import EMPTY, HOLDING, Direction
 from executive.tree.flow import PossibleToolState
-from executive.tree.specification import Span
+from executive.tree.node import ControlNode
+from executive.tree.specification import Node, SkillNode, Span, SubtreeNode
 
 
 def find_unreachable(context: CheckContext) -> Iterator[Finding]:
@@ -22,14 +21,13 @@ def find_unreachable(context: CheckContext) -> Iterator[Finding]:
 
 
 def _find_unreachable_below(node: Node, flow: FlowAnalysis) -> Iterator[Finding]:
-    instance = make_inspection_instance(node) if isinstance(node, InnerNode) else None
     for child in node.children:
         if child.path in flow.entry_states:
             yield from _find_unreachable_below(child, flow)
-        elif instance and instance.unreachable_reason:
+        elif isinstance(node, ControlNode) and (reason := node.explain_unreachable()):
             is_list = child.is_list and not child.label
             name = "this list" if is_list else child.path_name
-            message = f"{name} can never run: {instance.unreachable_reason}"
+            message = f"{name} can never run: {reason}"
             yield make_warning(child.span, "unreachable", message)
             return
 
@@ -38,7 +36,8 @@ def check_tool_states(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every skill that may start with the opposite of the required tool state."""
     flow = context.flow_analysis
     for node, skill in context.find_installed_skills(flow.nodes[path] for path in flow.entry_states):
-        required_state, entry_state = skill.tool_state[0], flow.entry_states[node.path]
+        required_state = skill.tool_state[0]
+        entry_state = flow.entry_states[node.path]
         name, span = context.locate_skill(node)
         if required_state is EMPTY and (tool := entry_state.find_tool_state(HOLDING)):
             message = f"{name} needs an empty tool, but the tool may hold an object here"
@@ -52,7 +51,8 @@ def check_tool_states(context: CheckContext) -> Iterator[Finding]:
 
 def check_tool_at_end(context: CheckContext) -> Iterator[Finding]:
     """Yield a warning if the mission may succeed with an object in the tool."""
-    flow, span = context.flow_analysis, context.tree.span
+    flow = context.flow_analysis
+    span = context.tree.span
     if flow.root_flow.success and (tool := flow.root_flow.success.find_tool_state(HOLDING)):
         message = "the mission may succeed with an object in the tool"
         yield make_warning(span, "tool-state", message, _explain_tool_state(flow, tool, span))
@@ -82,7 +82,8 @@ def find_shared_resources(context: CheckContext) -> Iterator[Finding]:
             shared_resources = [resource for resource in later_users if resource in users]
             conflicts = {(users[name].span, later_users[name].span): name for name in shared_resources}
             for resource in conflicts.values():
-                user, later_user = users[resource], later_users[resource]
+                user = users[resource]
+                later_user = later_users[resource]
                 name, span = context.locate_skill(later_user)
                 message = (
                     f"{name} uses the {resource}, and {user.skill} in "
@@ -130,24 +131,24 @@ def find_read_races(context: CheckContext) -> Iterator[Finding]:
                     yield make_error(read.span, "shared-variable", message, hint)
 
 
-def _list_concurrent_branches(context: CheckContext) -> Iterator[list[Node]]:
+def _list_concurrent_branches(context: CheckContext) -> Iterator[Sequence[Node]]:
     """Yield the concurrent children of each control node that has concurrent children."""
-    for node in context.iterate_control_nodes():
-        if branches := make_inspection_instance(node).concurrent_children:
-            yield [get_mission_node(branch) for branch in branches]
+    for node in context.control_nodes:
+        if node.concurrent_children:
+            yield node.concurrent_children
 
 
 def _find_first_leaf(node: Node) -> Node:
     """Return the first node without children, usually a skill, that the execution of a node reaches."""
     if isinstance(node, SubtreeNode):
         return _find_first_leaf(node.body) if node.body else node
-    first_child = make_inspection_instance(node).first_child if isinstance(node, InnerNode) else None
-    return _find_first_leaf(get_mission_node(first_child)) if first_child else node
+    first_child = node.first_child if isinstance(node, ControlNode) else None
+    return _find_first_leaf(first_child) if first_child else node
 
 
 def _find_reads(context: CheckContext, branch: Node) -> Iterator[VariableRead]:
     """Yield the reads below `branch`, except those that `find_unwritten_inputs` reports."""
-    for read in context.iterate_reads(branch):
+    for read in context.list_reads(branch):
         state = context.flow_analysis.entry_states.get(read.node.path)
         if state and not (read.is_required and state.may_be_unwritten(read.variable)):
             yield read
@@ -173,7 +174,7 @@ def _find_first_writes(context: CheckContext, branch: Node) -> dict[str, _Variab
     for node in branch.walk():
         for key, variable in find_control_node_outputs(node):
             hint = f"Let {node.type_name} write another variable: {key.name}: other."
-            writes.setdefault(variable.name, (node.type_name, variable.span, hint))
+            writes.setdefault(variable, (node.type_name, variable.span, hint))
         for wire in context.find_wires(node, Direction.OUT):
             hint = f"Let {wire.skill} write another variable: {wire.port.name}: $other."
             writes.setdefault(wire.variable, (wire.skill, wire.span, hint))

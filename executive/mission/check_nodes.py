@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import cast
+from dataclasses import dataclass
+
+from pydantic import TypeAdapter
 
 from executive.mission import grammar
 from executive.mission.analysis import CheckContext, FlowAnalysis
@@ -15,34 +17,31 @@ from executive.mission.findings import (
     suggest_choice,
     suggest_word,
 )
-from executive.mission.instance import find_upper_bound, get_mission_node, make_inspection_instance
-from executive.mission.nodes import InnerNode, KeyValue, Node, NodeSection, SkillNode, SubtreeNode, list_nodes
 from executive.mission.ports import ValueProblem, convert_constant
 from executive.skill import Skill, list_condition_violations
 from executive.tree.flow import UNKNOWN_NAME, Flow, FlowState, PossibleFailure
-from executive.tree.inspection import NodeFinding
-from executive.tree.keys import PREDEFINED_LISTS, Child, Key, KeyKind
-from executive.tree.node import ControlNode
-from executive.tree.specification import Literal, LocatedReason, Reason, Reference, Span
+from executive.tree.keys import PREDEFINED_LISTS, Key, KeySection, KeyValue, list_nodes
+from executive.tree.node import ControlNode, NodeFinding
+from executive.tree.specification import Constant, Node, Reason, Reference, SkillNode, Span, SubtreeNode
 
 
 def check_constants(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every constant of a control node that is invalid or a reference to a variable."""
-    for node in context.iterate_control_nodes():
-        yield from _check_keys(context, node, node.declaring_class.keyword)
+    for node in context.control_nodes:
+        yield from _check_keys(context, node, node.keyword)
 
 
-def _check_keys(context: CheckContext, owner: InnerNode | NodeSection, name: str) -> Iterator[Finding]:
-    for key, value in owner.iterate_keys():
+def _check_keys(context: CheckContext, owner: ControlNode | KeySection, name: str) -> Iterator[Finding]:
+    for key, value in owner.list_values():
         for item in value if isinstance(value, tuple) else (value,):
-            if isinstance(item, NodeSection):
+            if isinstance(item, KeySection):
                 yield from _check_keys(context, item, key.name)
-        if key.kind is KeyKind.CONSTANT:
-            max_value = find_upper_bound(owner, key)
-            yield from check_constant(context, f"{name}.{key.name}", key, value, max_value)
+        if key.is_constant:
+            validator = key.make_validator(owner.find_max(key, vars(owner)))
+            yield from check_constant(context, f"{name}.{key.name}", validator, value)
         elif (
-            key.kind is KeyKind.ELEMENTS
-            and isinstance(value, Literal)
+            key.is_plain
+            and isinstance(value, Constant)
             and not isinstance(value.value, list)
             and value.value not in PREDEFINED_LISTS
         ):
@@ -56,15 +55,15 @@ def _check_keys(context: CheckContext, owner: InnerNode | NodeSection, name: str
 
 
 def check_constant(
-    context: CheckContext, name: str, key: Key, value: KeyValue, max_value: int | None = None
+    context: CheckContext, name: str, validator: TypeAdapter[object], value: KeyValue
 ) -> Iterator[Finding]:
     """Yield an error if `value` is a variable or no valid constant; `name` is the subject of the message."""
     if isinstance(value, Reference):
         message = f"{name} must be a constant, but ${value.name} is neither a param nor an argument"
         yield make_error(value.span, "unknown-param", message, context.make_unknown_param_hint(value))
-    elif isinstance(value, Literal):
+    elif isinstance(value, Constant):
         try:
-            convert_constant(key, value.value, max_value)
+            convert_constant(validator, value.value)
         except ValueProblem as problem:
             is_param_name = isinstance(value.value, str) and value.value in context.mission.params
             is_missing_dollar = is_param_name and problem.code == "wrong-type"
@@ -79,79 +78,61 @@ def run_node_checks(context: CheckContext) -> Iterator[Finding]:
     """
     halted_paths = _find_paths_below(context, lambda node: node.children_halted_by_sibling)
     concurrent_paths = _find_paths_below(context, lambda node: node.concurrent_children)
-    for node in context.iterate_control_nodes():
+    for node in context.control_nodes:
         if non_conditions := list(find_non_conditions(context, node)):
             yield from non_conditions
             continue
-        analysis = CheckerAnalysis(context, node, node.path in halted_paths, node.path in concurrent_paths)
-        for node_finding in make_inspection_instance(node).check(analysis):
+        analysis = CheckerAnalysis(context, node.path in halted_paths, node.path in concurrent_paths)
+        for node_finding in node.check(analysis):
             yield _convert_node_finding(node, node_finding)
 
 
 def _find_paths_below(
-    context: CheckContext, select_children: Callable[[ControlNode], Sequence[Child]]
+    context: CheckContext, select_children: Callable[[ControlNode], Sequence[Node]]
 ) -> set[str]:
     """Return the paths of all nodes in and below the selected children of all control nodes."""
-    instances = map(make_inspection_instance, context.iterate_control_nodes())
-    roots = [get_mission_node(child) for instance in instances for child in select_children(instance)]
+    roots = [child for node in context.control_nodes for child in select_children(node)]
     return {node.path for root in roots for node in root.walk()}
 
 
-def _convert_node_finding(node: InnerNode, node_finding: NodeFinding) -> Finding:
+def _convert_node_finding(node: ControlNode, node_finding: NodeFinding) -> Finding:
     """Return the finding at the position of the key, reason or child that it names, or else of `node`."""
-    span, message = node.span, node_finding.message
-    if isinstance(node_finding.place, LocatedReason):
+    span = node.span
+    message = node_finding.message
+    if isinstance(node_finding.place, Reason | Node):
         span = node_finding.place.span
-    elif isinstance(node_finding.place, Child):
-        span = get_mission_node(node_finding.place).span
-    elif isinstance(value := node.values.get(str(node_finding.place)), Literal):
-        span, message = value.span, message + value.origin_note
+    elif isinstance(value := node.settings.get(str(node_finding.place)), Constant):
+        span = value.span
+        message = message + value.origin_note
     make_finding = make_warning if node_finding.is_warning else make_error
     return make_finding(span, node_finding.code, message, node_finding.hint)
 
 
+@dataclass
 class CheckerAnalysis:
     """Implementation of `NodeAnalysis` for one control node."""
 
-    def __init__(
-        self, context: CheckContext, node: InnerNode, is_halted_by_sibling: bool, is_concurrent: bool
-    ) -> None:
-        self._context, self._node = context, node
-        self.is_halted_by_sibling, self.is_concurrent = is_halted_by_sibling, is_concurrent
+    context: CheckContext
+    is_halted_by_sibling: bool
+    is_concurrent: bool
 
-    def get_flow(self, child: Child) -> Flow | None:
+    def get_flow(self, child: Node) -> Flow | None:
         """Return the possible outcomes of a child; None if the child never runs."""
-        return self._context.flow_analysis.flows.get(get_mission_node(child).path)
+        return self.context.flow_analysis.flows.get(child.path)
 
-    def compute_flow(self, child: Child, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
+    def compute_flow(self, child: Node, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
         """Return the possible outcomes of a child that starts in `entry`; optionally, of its first tick."""
-        node = get_mission_node(child)
-        return FlowAnalysis(node, self._context.skills, entry, is_first_tick=is_first_tick).root_flow
+        return FlowAnalysis(child, self.context.skills, entry, is_first_tick=is_first_tick).root_flow
 
-    def get_name(self, child: Child) -> str:
-        """Return the last part of the path of a child."""
-        return get_mission_node(child).path_name
-
-    def describe_place(self, reason: Reason, relative_to: Reason) -> str:
-        """Return the line of `reason` as a text, with the file if `relative_to` is in another file."""
-        source = cast("LocatedReason", relative_to).span.source
-        return cast("LocatedReason", reason).span.describe_place(source)
-
-    def is_written_as_constant(self, key: str) -> bool:
-        """Return True if the mission has a constant at a key of the node, not a param or an argument."""
-        value = self._node.values.get(key)
-        return isinstance(value, Literal) and not value.origin
-
-    def list_skills(self, child: Child | None = None) -> Mapping[str, type[Skill] | None]:
-        """Return the class of each skill in the subtree of a child or of the node; None if not installed."""
-        root = self._node if child is None else get_mission_node(child)
-        names = [node.skill for node in root.walk() if isinstance(node, SkillNode)]
-        return {name: self._context.skills.get(name) for name in names}
+    def list_skills(self, node: Node) -> Mapping[str, type[Skill] | None]:
+        """Return the class of each skill in and below a node, by name; None if not installed."""
+        names = [node.skill for node in node.walk() if isinstance(node, SkillNode)]
+        return {name: self.context.skills.get(name) for name in names}
 
 
-def find_non_conditions(context: CheckContext, parent: InnerNode) -> Iterator[Finding]:
+def find_non_conditions(context: CheckContext, parent: ControlNode) -> Iterator[Finding]:
     """Yield an error for each child that is not a condition although its key allows only conditions."""
-    for key, value in parent.iterate_keys():
+    for key, value in parent.list_values():
         for node in list_nodes(value) if key.requires_conditions else ():
             if problem := _find_problem(context, node):
                 message = f"{problem}, but {parent.type_name}.{key.name} needs a condition"
@@ -168,7 +149,7 @@ def _find_problem(context: CheckContext, node: Node) -> str:
             skill = context.skills[node.skill]
             effects = [*list_condition_violations(skill), "is not declared as a condition (is_condition)"]
             return "" if skill.is_condition else f"{node.skill} {effects[0]}"
-        case InnerNode() if not node.declaring_class.is_condition:
+        case ControlNode() if not node.is_condition:
             return "a list runs as a sequence" if node.is_list else f"{node.type_name} is no condition"
     return ""
 
@@ -186,9 +167,8 @@ def check_labels(context: CheckContext) -> Iterator[Finding]:
     # Paths contain keywords and keys, so a label must differ from all of them.
     reserved_words = {grammar.USE_KEYWORD, *context.node_classes}
     for node_class in context.node_classes.values():
-        keys, kinds = node_class.keys.values(), (KeyKind.NODE, KeyKind.NODES, KeyKind.SECTIONS)
-        reserved_words |= {key.name for key in keys if key.kind in kinds}
-    for node in context.iterate_nodes():
+        reserved_words |= {key.name for key in node_class.keys.values() if key.has_nodes}
+    for node in context.nodes:
         if not node.label:
             continue
         span = node.label_span or node.span
@@ -225,26 +205,26 @@ def check_failure_names(context: CheckContext) -> Iterator[Finding]:
                 yield make_error(name.span, "ambiguous", message, hint)
 
 
-def _find_names_with_bodies(node: Node) -> Iterator[tuple[LocatedReason, str, Node]]:
+def _find_names_with_bodies(node: Node) -> Iterator[tuple[Reason, str, Node]]:
     """Yield every failure name of a node, the keyword of the node, and the child that may fail."""
-    if not isinstance(node, InnerNode):
+    if not isinstance(node, ControlNode):
         return
     for key, name in _find_failure_names(node):
-        for body in list_nodes(node.values.get(key.failing_nodes_key, ())):
-            yield name, node.declaring_class.keyword, body
+        for body in node.list_children(key.failing_nodes_key):
+            yield name, node.keyword, body
 
 
-def _find_failure_names(owner: InnerNode | NodeSection) -> Iterator[tuple[Key, LocatedReason]]:
+def _find_failure_names(owner: ControlNode | KeySection) -> Iterator[tuple[Key, Reason]]:
     """Yield the names of failures in the keys of a node and of its sections."""
-    for key, value in owner.iterate_keys():
+    for key, value in owner.list_values():
         for item in value if isinstance(value, tuple) else (value,):
-            if isinstance(item, LocatedReason):
+            if isinstance(item, Reason):
                 yield key, item
-            elif isinstance(item, NodeSection):
+            elif isinstance(item, KeySection):
                 yield from _find_failure_names(item)
 
 
-def _make_impossible_error(context: CheckContext, name: LocatedReason, keyword: str, body: Node) -> Finding:
+def _make_impossible_error(context: CheckContext, name: Reason, keyword: str, body: Node) -> Finding:
     """Return the error if no failure of `body` has the name; `keyword` is the keyword of the parent."""
     reasons = _find_reasons(context.flow_analysis, body)
     if name.source in reasons:
@@ -253,7 +233,7 @@ def _make_impossible_error(context: CheckContext, name: LocatedReason, keyword: 
         message = f"{name} never leaves the body of this {keyword}"
         hint = f"Failures that leave it: {names}. A loop fails like its body, a fallback like its last child."
         return make_error(name.span, "impossible-reason", message, hint)
-    labels = {node.label for node in context.iterate_nodes() if node.label}
+    labels = {node.label for node in context.nodes if node.label}
     keywords = {word for word, node_class in context.node_classes.items() if node_class.reasons}
     if name.source in (*context.skills, *labels, *keywords):
         message = f"{name.source} is not in the body of this {keyword}, so the body cannot fail with {name}"
@@ -263,7 +243,7 @@ def _make_impossible_error(context: CheckContext, name: LocatedReason, keyword: 
     return make_error(name.span, "unknown-skill", f'there is no skill or label "{name.source}"', hint)
 
 
-def _find_unknown_reason(context: CheckContext, name: LocatedReason, body: Node) -> Finding | None:
+def _find_unknown_reason(context: CheckContext, name: Reason, body: Node) -> Finding | None:
     """Return an error if the skill or label exists, but never fails with the reason; otherwise None."""
     skill = context.skills.get(name.source)
     reasons = skill.reasons if skill else _find_reasons(context.flow_analysis, body).get(name.source)
@@ -280,15 +260,15 @@ def _find_reasons(flow: FlowAnalysis, body: Node) -> dict[str, list[str]]:
         if isinstance(node, SkillNode):
             skill = flow.find_skill_or_most_similar(node.skill)
             reasons.setdefault(node.skill, []).extend(skill.reasons if skill else ())
-        elif isinstance(node, InnerNode) and node.declaring_class.reasons:
-            reasons.setdefault(node.declaring_class.keyword, []).extend(node.declaring_class.reasons)
+        elif isinstance(node, ControlNode) and node.reasons:
+            reasons.setdefault(node.keyword, []).extend(node.reasons)
         if node.label and node.path in flow.flows:
             failures = flow.flows[node.path].failures
             reasons.setdefault(node.label, []).extend(failure.reason for failure in failures)
     return {source: list(dict.fromkeys(duplicates)) for source, duplicates in reasons.items()}
 
 
-def _find_named_nodes(flow: FlowAnalysis, name: LocatedReason, matching: list[PossibleFailure]) -> list[Node]:
+def _find_named_nodes(flow: FlowAnalysis, name: Reason, matching: list[PossibleFailure]) -> list[Node]:
     """Return the nodes whose failures `name` denotes; none for a label, because labels are unambiguous."""
     if any(name.source in failure.labels for failure in matching):
         return []

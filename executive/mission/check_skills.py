@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from typing import Annotated
+
+from pydantic import Field, TypeAdapter
 
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.objects import MIN_LIFT_ACCELERATION, SAFETY_FACTOR
@@ -15,16 +18,14 @@ from executive.mission.cell_file import CellFile
 from executive.mission.check_nodes import check_constant
 from executive.mission.findings import Finding, make_error, make_warning, suggest_choice
 from executive.mission.mission_file import Mission
-from executive.mission.nodes import SkillNode
 from executive.mission.ports import find_literals, find_problem
 from executive.skill import HOLDING, Direction, Param, Port, Skill
-from executive.tree.keys import Key
-from executive.tree.specification import Literal, LocatedName, Reference, Span
+from executive.tree.specification import Constant, LocatedName, Reference, SkillNode, Span
 
 
 def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every skill that is not installed."""
-    for node in context.iterate_nodes():
+    for node in context.nodes:
         if isinstance(node, SkillNode) and node.skill not in context.skills:
             hint = suggest_choice(node.skill, context.skills, "Installed skills")
             yield make_error(node.span, "unknown-skill", f'there is no skill "{node.skill}"', hint)
@@ -32,7 +33,7 @@ def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
 
 def check_settings(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every setting of a skill that is unknown, missing, or has an invalid value."""
-    for node, skill in context.find_installed_skills(context.iterate_nodes()):
+    for node, skill in context.find_installed_skills(context.nodes):
         declarations: dict[str, Param | Port] = {**skill.params, **skill.ports}
         for name, setting in node.settings.items():
             if name not in declarations:
@@ -41,7 +42,7 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
                     hint = f"A condition writes no output. Skills that write ${name}: {writers}."
                 message = f'{node.skill} has no param or port "{name}"'
                 yield make_error(setting.name_span, "unknown-param", message, hint)
-            elif isinstance(setting.value, Literal):
+            elif isinstance(setting.value, Constant):
                 yield from _check_value(context, node, declarations[name], setting.value)
                 yield from find_unknown_names(context, node.skill, declarations[name], setting.value)
             elif isinstance(setting.value, Reference):
@@ -74,7 +75,7 @@ def _check_reference(
 
 
 def _check_value(
-    context: CheckContext, node: SkillNode, declaration: Param | Port, value: Literal
+    context: CheckContext, node: SkillNode, declaration: Param | Port, value: Constant
 ) -> Iterator[Finding]:
     """Yield an error if the constant `value` does not fit the param or port of `declaration`."""
     name = f"{node.skill}.{declaration.name}"
@@ -89,7 +90,7 @@ def _check_value(
 
 
 def find_unknown_names(
-    context: CheckContext, skill: str, declaration: Param | Port, value: Literal
+    context: CheckContext, skill: str, declaration: Param | Port, value: Constant
 ) -> Iterator[Finding]:
     """Yield an error for each constant that names a bin, class, pose or detector that the cell lacks."""
     if declaration.refers_to not in context.names_in_cell_by_kind or value.value == declaration.default:
@@ -112,7 +113,7 @@ def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:
     routes = {route.label: route for route in context.mission.routes}
     bins = {label: {bin.name for bin in route.bins} for label, route in routes.items()}
     weighing_skills = [name for name, skill in context.skills.items() if _is_weighing(skill)]
-    skills = (skill for _, skill in context.find_installed_skills(context.iterate_nodes()))
+    skills = (skill for _, skill in context.find_installed_skills(context.nodes))
     is_weighed = any(map(_is_weighing, skills))
     for label, section in objects.items():
         detected = section.looks_like  # The detector reports this class for objects of the class `label`.
@@ -158,11 +159,11 @@ def _find_used_detectors(context: CheckContext) -> set[str]:
     """Return the names of the detectors that skills of the mission ask; a variable may name each detector."""
     names = list(context.classes_by_detector)
     used_names: set[str] = set()
-    for node, skill in context.find_installed_skills(context.iterate_nodes()):
+    for node, skill in context.find_installed_skills(context.nodes):
         for param in skill.params.values():
             if param.refers_to == "detector":
                 value = node.settings[param.name].value if param.name in node.settings else param.default
-                name = value.value if isinstance(value, Literal) else value
+                name = value.value if isinstance(value, Constant) else value
                 if isinstance(name, str):
                     used_names.update([name] if name else names[:1])  # The first detector is the default.
                 else:
@@ -173,22 +174,23 @@ def _find_used_detectors(context: CheckContext) -> set[str]:
 def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Span]]:
     """Yield every class in the routes and in the settings of skills, with its position."""
     yield from ((route.label, route.label_span) for route in context.mission.routes)
-    for node, skill in context.find_installed_skills(context.iterate_nodes()):
+    for node, skill in context.find_installed_skills(context.nodes):
         for name, value in find_literals(node):
             declaration = skill.params.get(name) or skill.ports.get(name)
             if declaration is not None and declaration.refers_to == "class" and isinstance(value.value, str):
                 yield value.value, value.span
 
 
-_LIMIT_KEY = Key(doc="Maximum number of objects.", ge=1, value_type=int)
-"""Type and minimum of the limit of a quota, in the form that `check_constant` accepts."""
+_LIMIT: TypeAdapter[object] = TypeAdapter(Annotated[int, Field(ge=1)])
+"""Validator of the limit of a quota."""
 
 
 def check_names(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every class and every bin in routes and quotas that the cell lacks."""
     if context.cell is None:
         return
-    routes, quotas = context.mission.routes, context.mission.quotas
+    routes = context.mission.routes
+    quotas = context.mission.quotas
     labels = [LocatedName(route.label, route.label_span) for route in routes]
     labels += [quota.label for quota in quotas if quota.label is not None]
     bins = [bin for route in routes for bin in route.bins] + [quota.bin for quota in quotas]
@@ -203,8 +205,10 @@ def check_names(context: CheckContext) -> Iterator[Finding]:
 def check_quotas(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for each invalid quota or quota without a route, and a warning for too few slots."""
     for quota in context.mission.quotas:
-        bin, label, limit = quota.bin, quota.label, quota.limit
-        yield from check_constant(context, str(quota), _LIMIT_KEY, limit)
+        bin = quota.bin
+        label = quota.label
+        limit = quota.limit
+        yield from check_constant(context, str(quota), _LIMIT, limit)
         if context.cell is None or bin.name not in context.cell.bins:
             continue
         routes = [route for route in context.mission.routes if label is None or route.label == label.name]
@@ -215,7 +219,7 @@ def check_quotas(context: CheckContext) -> Iterator[Finding]:
             hint = suggest_choice(bin.name, routed_bins, f"Bins in the routes of {classes}")
             yield make_error((label or bin).span, "no-route", message, hint)
         slot_count = math.prod(context.cell.bins[bin.name].slots)
-        if isinstance(limit, Literal) and isinstance(limit.value, int) and limit.value > slot_count:
+        if isinstance(limit, Constant) and isinstance(limit.value, int) and limit.value > slot_count:
             message = f"the quota exceeds the {slot_count} slots of {bin.name}, so objects would be stacked"
             hint = f"Lower the quota to {slot_count} or less, or add slots to the bin in the cell file."
             yield make_warning(limit.span, "large-quota", message + limit.origin_note, hint)
@@ -258,7 +262,8 @@ def check_slots(cell: CellFile, config: CellConfig, mission: Mission) -> Iterato
     # `list_obstacles` represents each object in a bin by a cylinder for the largest class.
     obstacle_radius = max(section.radius for section in config.objects.values()) + MAX_ROLL_DISTANCE
     for label, name in [(route.label, bin.name) for route in mission.routes for bin in route.bins]:
-        bin, section = config.bins.get(name), config.objects.get(label)
+        bin = config.bins.get(name)
+        section = config.objects.get(label)
         if bin is None or section is None:
             continue  # `routes.check_names` reports the name
         radius = section.radius + section.ring + config.motion.margin

@@ -10,7 +10,6 @@ from executive.cell.objects import Item
 from executive.mission.analysis import CheckContext, VariableRead
 from executive.mission.check_skills import find_unknown_names
 from executive.mission.findings import Finding, describe_value, make_error, make_warning, suggest_choice
-from executive.mission.nodes import InnerNode, KeyValue, Node, SkillNode, SubtreeNode
 from executive.mission.ports import (
     Wire,
     describe_type,
@@ -23,7 +22,9 @@ from executive.mission.ports import (
     is_assignable,
 )
 from executive.skill import Direction, Param
-from executive.tree.specification import Literal, Reference, Span
+from executive.tree.keys import KeyValue
+from executive.tree.node import ControlNode
+from executive.tree.specification import Constant, Node, Reference, SkillNode, Span, SubtreeNode
 
 
 def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
@@ -35,7 +36,8 @@ def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
             problem = "is not written on every path to this node"
             hint = f"${name_in_file} is written by {_describe_writers(context, read.variable, read.span)}."
         else:
-            problem, hint = "no node writes", _make_unwritten_hint(context, read)
+            problem = "no node writes"
+            hint = _make_unwritten_hint(context, read)
         message = f"{read.input_name} reads ${name_in_file}, which {problem}"
         yield make_error(read.span, "unwritten", message, hint)
 
@@ -59,8 +61,9 @@ def find_unwritten_library_inputs(context: CheckContext) -> Iterator[Finding]:
 
 def _find_unwritten_reads(context: CheckContext, in_libraries: bool) -> Iterator[VariableRead]:
     """Yield the reads of possibly unwritten variables, either in libraries or in the mission file."""
-    mission_source, uses = context.tree.span.source, context.library_uses_by_path
-    for read in context.iterate_reads(context.tree):
+    mission_source = context.tree.span.source
+    uses = context.library_uses_by_path
+    for read in context.list_reads(context.tree):
         state = context.flow_analysis.entry_states.get(read.node.path)
         if state and state.may_be_unwritten(read.variable) and (read.is_explicit or read.is_required):
             is_in_library = read.node.path in uses and read.span.source is not mission_source
@@ -70,12 +73,12 @@ def _find_unwritten_reads(context: CheckContext, in_libraries: bool) -> Iterator
 
 def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
     """Yield a warning for every variable that the mission assigns to an output by name, but no node reads."""
-    read_variables = {read.variable for read in context.iterate_reads(context.tree)}
+    read_variables = {read.variable for read in context.list_reads(context.tree)}
     for node in context.tree.walk():
         for _, variable in find_control_node_outputs(node):
-            if variable.name not in read_variables | set(context.mission.params):
-                message = f"no node in this {node.type_name} reads ${variable.name}"
-                hint = f"Write ${variable.name} where a node needs the value."
+            if variable not in read_variables | set(context.mission.params):
+                message = f"no node in this {node.type_name} reads ${variable}"
+                hint = f"Write ${variable} where a node needs the value."
                 yield make_warning(variable.span, "unread", message, hint)
         for wire in context.find_wires(node, Direction.OUT):
             if wire.is_explicit and wire.variable not in read_variables:
@@ -97,12 +100,12 @@ def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
 
     def check_node_and_children(node: Node, loop_writes: Mapping[str, tuple[str, Span]]) -> Iterator[Finding]:
         for _, variable in find_control_node_outputs(node):
-            if write := skill_writes.get(variable.name, loop_writes.get(variable.name)):
+            if write := skill_writes.get(variable, loop_writes.get(variable)):
                 name, span = write
                 place = span.describe_place(variable.span.source)
-                message = f"{node.type_name} writes ${variable.name}, and so does {name} in {place}"
+                message = f"{node.type_name} writes ${variable}, and so does {name} in {place}"
                 yield make_error(variable.span, "shadowed-variable", message, "Rename the loop variable.")
-            loop_writes = {**loop_writes, variable.name: (f"another {node.type_name}", variable.span)}
+            loop_writes = {**loop_writes, variable: (f"another {node.type_name}", variable.span)}
         for child in node.children:
             yield from check_node_and_children(child, loop_writes)
 
@@ -136,9 +139,7 @@ def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
 
 def _describe_writers(context: CheckContext, variable: str, span: Span) -> str:
     """Return the skills that write a variable, for a message at `span`: `Grasp in line 3`."""
-    wires = [
-        (node, wire) for node in context.iterate_nodes() for wire in context.find_wires(node, Direction.OUT)
-    ]
+    wires = [(node, wire) for node in context.nodes for wire in context.find_wires(node, Direction.OUT)]
     nodes = [(node.span, wire.skill) for node, wire in wires if wire.variable == variable]
     nodes.sort(key=lambda node: node[0].line)
     writers = dict.fromkeys(f"{skill} in {place.describe_place(span.source)}" for place, skill in nodes)
@@ -176,7 +177,7 @@ class Writer:
     span: Span
     type: object
     refers_to: str
-    constants: tuple[Literal, ...] | None = None
+    constants: tuple[Constant, ...] | None = None
 
     def describe(self, span: Span) -> str:
         """Return name and position of the writer, for a message at `span`."""
@@ -198,12 +199,12 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
     def check_node_and_children(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
         for key, variable in find_control_node_outputs(node):
             all_writers = {**skill_writers, **loop_writers}
-            elements = node.values.get(key.list_key, ()) if isinstance(node, InnerNode) else ()
+            elements = node.settings.get(key.list_key, ()) if isinstance(node, ControlNode) else ()
             list_writers = _find_list_writers(node, elements, all_writers)
             if isinstance(elements, Reference):
                 yield from _check_field(node.type_name, elements, all_writers.get(elements.name, ()))
                 yield from _check_lists(f"{node.type_name}.{key.list_key}", elements, list_writers)
-            loop_writers = {**loop_writers, variable.name: [*_make_element_writers(node, list_writers)]}
+            loop_writers = {**loop_writers, variable: [*_make_element_writers(node, list_writers)]}
         for wire in context.find_wires(node, Direction.IN):
             writers = loop_writers.get(wire.variable, skill_writers.get(wire.variable, ()))
             yield from _check_field(str(wire), wire.reference, writers)
@@ -220,7 +221,7 @@ def _find_list_writers(node: Node, elements: KeyValue, writers: WritersByVariabl
     """Return the writers of a list; a node with a constant list counts as the writer of the list."""
     if isinstance(elements, Reference):
         return list(_select_field(writers.get(elements.name, ()), elements.field))
-    if not isinstance(elements, Literal):
+    if not isinstance(elements, Constant):
         return []
     if elements.value == "items":
         return [Writer(node.type_name, node.span, list[Item], "item")]
@@ -246,7 +247,7 @@ def _make_element_writers(node: Node, list_writers: Iterable[Writer]) -> Iterato
     for writer in list_writers:
         if writer.constants is not None:
             elements = [
-                Literal(element, constant.get_element_span(index))
+                Constant(element, constant.get_element_span(index))
                 for constant in writer.constants
                 if isinstance(constant.value, list)
                 for index, element in enumerate(constant.value)
@@ -283,7 +284,8 @@ def _select_field(writers: Iterable[Writer], field: str) -> Iterator[Writer]:
 
 def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iterator[Finding]:
     """Yield an error for each value or type of a writer that does not fit the input `wire`."""
-    port, choices = wire.port, (wire.port.choices or ()) if isinstance(wire.port, Param) else ()
+    port = wire.port
+    choices = (wire.port.choices or ()) if isinstance(wire.port, Param) else ()
     port_type = describe_values(port.type, port.refers_to)
     if choices and not port.refers_to:
         port_type = " or ".join(map(str, choices))

@@ -12,22 +12,23 @@ from typing import cast
 
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
 from executive.mission.mission_file import Mission, Quota, Subtree
-from executive.mission.nodes import (
-    InnerNode,
-    InvalidNode,
-    KeyedValues,
-    KeyValue,
-    Node,
-    NodeSection,
-    SkillNode,
-    SubtreeNode,
-    map_parts,
-)
 from executive.mission.ports import find_control_node_outputs, find_written_variables
 from executive.plugins import Skills
 from executive.skill import Direction
-from executive.tree.keys import KeyKind
-from executive.tree.specification import InvalidValue, Literal, LocatedName, Reference, Span, Value
+from executive.tree.keys import Children, Elements, KeyOwner, KeySection, KeyValue, Part, map_parts
+from executive.tree.node import ControlNode
+from executive.tree.specification import (
+    Constant,
+    InvalidNode,
+    InvalidValue,
+    Node,
+    Reference,
+    SkillNode,
+    Span,
+    SubtreeNode,
+    Value,
+    VariableName,
+)
 
 _MAX_DEPTH = 40
 """Maximum depth of an expanded tree."""
@@ -98,7 +99,9 @@ class _Expander:
     """
 
     def __init__(self, mission: Mission, skills: Skills, predefined_lists: PredefinedLists) -> None:
-        self.mission, self.skills, self._predefined_lists = mission, skills, predefined_lists
+        self.mission = mission
+        self.skills = skills
+        self._predefined_lists = predefined_lists
         self.params: ValuesByName = {name: param.value for name, param in mission.params.items()}
         self.findings: list[Finding] = []
         self.used_subtree_names: set[str] = set()
@@ -147,12 +150,10 @@ class _Expander:
             self._add_error(self._outermost_span or node.span, "too-large", message)
             raise _TooLargeError
 
-        def expand_part(part: object) -> object:
+        def expand_part(part: Part) -> object:
             if isinstance(part, Node):
                 return self._expand_node(part, values, callers, depth + 1)
-            if isinstance(part, Reference):
-                return self._resolve_name(part, values, callers)
-            return map_parts(part, expand_part)
+            return self._resolve_name(part, values, callers) if isinstance(part, Reference) else part
 
         self.findings += self._find_shadowed_names(node, values)
         expanded = self._expand_predefined_lists(map_parts(node, expand_part))
@@ -160,14 +161,15 @@ class _Expander:
 
     def _expand_predefined_lists(self, node: Node) -> Node:
         """Return a control node with the names in place of each predefined list such as `bins`."""
-        if not isinstance(node, InnerNode):
+        if not isinstance(node, ControlNode):
             return node
-        values = dict(node.values)
-        for key, value in node.iterate_keys():
-            if key.kind is KeyKind.ELEMENTS and isinstance(value, Literal) and isinstance(value.value, str):
+        lists: dict[str, Value] = {}
+        for key, value in node.list_values():
+            if key.value_type == Elements and isinstance(value, Constant) and isinstance(value.value, str):
                 names = self._predefined_lists.get(value.value)
-                values[key.name] = value if names is None else replace(value, value=list(names))
-        return replace(node, values=values)
+                if names is not None:
+                    lists[key.name] = replace(value, value=list(names))
+        return node.replace(settings={**node.settings, **lists}) if lists else node
 
     def _find_shadowed_names(self, node: Node, values: ValuesByName) -> Iterator[Finding]:
         """Yield an error for every output variable of a node that has the name of a param or argument."""
@@ -177,8 +179,8 @@ class _Expander:
             return f"{writer} writes ${name}, but {name} is {kind}"
 
         for _, variable in find_control_node_outputs(node):
-            if variable.name in values:
-                message = explain(node.type_name, variable.name)
+            if variable in values:
+                message = explain(node.type_name, variable)
                 yield make_error(variable.span, "shadowed-param", message, "Rename one of them.")
         if not isinstance(node, SkillNode) or node.skill not in self.skills:
             return
@@ -196,7 +198,7 @@ class _Expander:
         self._referenced_names.add((callers[-1] if is_argument else "", name or ""))
         if value is None or isinstance(value, InvalidValue):
             return value or reference
-        if reference.field and (isinstance(value, Literal) or value.field):
+        if reference.field and (isinstance(value, Constant) or value.field):
             text = "a constant"
             if isinstance(value, Reference):
                 text = f"the field {value}".replace(_CALLER_PREFIX, "")
@@ -233,9 +235,9 @@ class _Expander:
             arguments = {name: _prefix_variable(value) for name, value in arguments.items()}
         body = self._expand_node(subtree.body, {**params, **arguments}, (*callers, use.name), depth + 1)
         if subtree.returns is None:
-            return replace(use, body=body)
+            return use.replace(body=body)
         body = self._rename_variables(use, body, returns)
-        return replace(use, body=body, written_variables=tuple(returns.values()))
+        return use.replace(body=body, written_variables=tuple(returns.values()))
 
     def _rename_variables(self, use: SubtreeNode, body: Node, returns: Mapping[str, str]) -> Node:
         """Return the body; local variables get unique names, returned variables get the caller's names."""
@@ -250,16 +252,18 @@ class _Expander:
                 return returns[name]
             return prefix + name if name in written_variables else name
 
-        def rename_part(part: object) -> object:
-            if isinstance(part, Reference | LocatedName):
+        def rename_part(part: Part) -> Part:
+            if isinstance(part, Reference):
                 return replace(part, name=rename(part.name))
+            if isinstance(part, VariableName):
+                return VariableName(rename(part), part.field, part.span)
             part = map_parts(part, rename_part)
             if isinstance(part, SubtreeNode):
-                return replace(part, written_variables=tuple(map(rename, part.written_variables)))
+                return part.replace(written_variables=tuple(map(rename, part.written_variables)))
             if isinstance(part, SkillNode) and part.skill in self.skills:
                 ports = self.skills[part.skill].ports
                 variables = {port: rename(part.variables_by_port.get(port, port)) for port in ports}
-                return replace(part, variables_by_port=variables)
+                return part.replace(variables_by_port=variables)
             return part
 
         return cast("Node", rename_part(body))
@@ -318,38 +322,40 @@ def _assign_path(node: Node, parent_path: str, key_path: str, name: str = "") ->
     """
     path = _join(parent_path, key_path, name or ("" if node.is_list else node.path_name))
     match node:
-        case InnerNode():
-            return replace(node, path=path, values=_assign_value_paths(node, path))
+        case ControlNode():
+            return node.replace(path=path, **_assign_key_paths(node, path))
         case SubtreeNode(body=Node() as body):
-            return replace(node, path=path, body=_assign_path(body, path, "do" if node.label else ""))
+            return node.replace(path=path, body=_assign_path(body, path, "do" if node.label else ""))
         case InvalidNode():
-            return replace(node, path=path, parts=_assign_list_paths(node.parts, path))
-    return replace(node, path=path)
+            return node.replace(path=path, parts=_assign_list_paths(node.parts, path))
+    return node.replace(path=path)
 
 
-def _assign_value_paths(owner: KeyedValues, path: str, section_path: str = "") -> dict[str, KeyValue]:
-    """Return the values by key, with paths for the nodes in the values; `path` is that of the control node.
+def _assign_key_paths(owner: KeyOwner, path: str, section_path: str = "") -> dict[str, KeyValue]:
+    """Return the attributes of a control node or section whose values contain nodes, with their paths.
 
-    If `owner` is a section, `section_path` is its path in the control node: `backoff`, or `cases/2`.
+    `path` is that of the control node. `section_path` is the path of a section in the control node, such as
+    `backoff` or `cases/2`; "" if `owner` is the control node.
     """
     values: dict[str, KeyValue] = {}
-    for key, value in owner.iterate_keys():
+    for key, value in owner.list_values():
         # In the path of a child below `do` of a section, the key `do` is omitted.
         key_path = section_path if section_path and key.name == "do" else _join(section_path, key.name)
         if isinstance(value, Node):
-            value = _assign_path(value, path, key_path if key.in_path or value.is_list else "")
-        elif isinstance(value, NodeSection):
-            value = replace(value, values=_assign_value_paths(value, path, key_path))
-        elif isinstance(value, tuple) and key.kind is KeyKind.NODES:
-            value = _assign_list_paths(tuple(item for item in value if isinstance(item, Node)), path)
+            values[key.attribute] = _assign_path(
+                value, path, key_path if key.in_path or value.is_list else ""
+            )
+        elif isinstance(value, KeySection):
+            values[key.attribute] = value.replace(**_assign_key_paths(value, path, key_path))
+        elif isinstance(value, tuple) and key.value_type == Children:
+            values[key.attribute] = _assign_list_paths(cast("tuple[Node, ...]", value), path)
         elif isinstance(value, tuple):
-            value = tuple(
-                replace(item, values=_assign_value_paths(item, path, f"{key_path}/{index}"))
-                if isinstance(item, NodeSection)
+            values[key.attribute] = tuple(
+                item.replace(**_assign_key_paths(item, path, f"{key_path}/{index}"))
+                if isinstance(item, KeySection)
                 else item
                 for index, item in enumerate(value, 1)
             )
-        values[key.name] = value
     return values
 
 

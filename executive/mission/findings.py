@@ -98,7 +98,8 @@ class Finding:
         lines = [f"{position}: {self.severity}[{self.code}]: {self.message}"]
         if self.line and self.excerpt:
             number = f"{self.line:4d}"
-            excerpt, caret_start = self.shown_excerpt, self.col - 1 - self._excerpt_start
+            excerpt = self.shown_excerpt
+            caret_start = self.col - 1 - self._excerpt_start
             # Tabs are kept, so that the carets are aligned at any tab width.
             indentation = re.sub(r"[^\t]", " ", excerpt[:caret_start])
             caret_count = max(1, min(self.length, len(excerpt) - caret_start))
@@ -136,7 +137,8 @@ def make_error(span: Span, code: str, message: str, hint: str = "", severity: st
     assert code in MEANING_BY_CODE, code
     source = span.source
     excerpt = _mask_secrets(source.get_line(span.line))
-    message, hint = shorten_quotations(message), shorten_quotations(hint)
+    message = shorten_quotations(message)
+    hint = shorten_quotations(hint)
     return Finding(source.path, span.line, span.col, severity, code, message, span.length, hint, excerpt)
 
 
@@ -231,7 +233,9 @@ def describe_value(value: object) -> str:
 
 def describe_validation_error(error: ErrorDetails) -> str:
     """Return the message of a pydantic error, without the name of the value: `must be at least 1, not 0`."""
-    error_type, value, context = error["type"], error["input"], error.get("ctx", {})
+    error_type = error["type"]
+    value = error["input"]
+    context = error.get("ctx", {})
     if error_type in _TYPE_PHRASES:
         return f"must be {_TYPE_PHRASES[error_type]}, not {describe_value(value)}"
     if error_type in _BOUND_PHRASES:

@@ -1,65 +1,44 @@
-"""Grammar of mission files: keys, kinds of values and meanings, for parser, schema and documentation."""
+"""Mappings of mission and library files: their keys, as pydantic models, and the reader of their values.
+
+The keys of a control node are fields of its class (`executive.tree.keys`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Annotated, Literal, TypeAlias
 
-from executive.tree.keys import Key, KeyOwner
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
+from pydantic.fields import FieldInfo
 
+from executive.mission.findings import Finding, make_error, suggest_choice
+from executive.mission.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence, list_scalars
+from executive.tree.specification import (
+    Child,
+    Constant,
+    InvalidValue,
+    Reason,
+    Reference,
+    Setting,
+    Span,
+    Value,
+)
 
-@dataclass(frozen=True)
-class GrammarKey:
-    """A key of a mapping.
-
-    Attributes:
-        kind: Kind of the value: `node`, `number`, `text`, `name`, `label`, `list`, `value` (any YAML value),
-            or a list or mapping of such values: `names`, `values`, `variables`, `paths`, `params`, `routes`,
-            `quotas`, `trees`, `args`.
-        doc: Meaning of the key, one sentence.
-        is_required: True if the key is mandatory.
-    """
-
-    kind: str
-    doc: str
-    is_required: bool = False
-
-
-GrammarKeys = Mapping[str, GrammarKey]
-"""The keys of a mapping by name."""
-
-AllowedKeys = Mapping[str, Key | GrammarKey]
-"""The keys of a mapping or of a control node by name."""
-
-LABEL_PATTERN = "[a-z_][a-z0-9_]*"
+NAME_EXPRESSION = "[A-Za-z_][A-Za-z0-9_]*"
+"""Regular expression of the names of params, arguments, variables and subtrees."""
+LABEL_EXPRESSION = "[a-z_][a-z0-9_]*"
 """Regular expression that every label matches."""
-
-LABEL_KEY = GrammarKey("label", "Label of the node, for references in `on`, `until` and `catch`.")
-"""The key `as`, an optional sibling of the keyword of a node."""
-
 SEQUENCE_KEYWORD = "sequence"
 """Keyword that is assumed if a node is written as a plain list."""
-
 USE_KEYWORD = "use"
 """Keyword of a node that uses a subtree."""
-
-USE_SIBLINGS: GrammarKeys = {
-    "with": GrammarKey("values", "Values of the subtree's arguments."),
-    "returns": GrammarKey("variables", "Variable of the caller for each returned one: `pose: $grasp_pose`."),
-}
-"""Keys at the level of `use`."""
-
 BEHAVIOUR_KEYWORD = "PyTree"
 """Keyword of a node that runs a behaviour of py_trees."""
-
 BEHAVIOUR_CLASS = "class"
 """Key below `PyTree` for the import path of the behaviour; all other keys are its arguments and ports."""
-
-BEHAVIOUR_KEYS: GrammarKeys = {
-    BEHAVIOUR_CLASS: GrammarKey("text", "Import path of the behaviour: `module:Class`.", is_required=True),
-}
-"""The keys below `PyTree` that every behaviour has."""
-
 KEYWORD_HINTS: Mapping[str, str] = {
     "then": "Write nodes that run in sequence as a list.",
     "do": 'Only control nodes have the key "do"; write the node without "do".',
@@ -68,62 +47,292 @@ KEYWORD_HINTS: Mapping[str, str] = {
 }
 """Hints for words that authors write as keywords by mistake."""
 
-MISSION_KEYS: GrammarKeys = {
-    "mission": GrammarKey("name", "Name of the mission.", is_required=True),
-    "description": GrammarKey("text", "Purpose of the mission, one sentence."),
-    "cell": GrammarKey("text", "Cell file: a path relative to this or the shipped folder.", is_required=True),
-    "library": GrammarKey("paths", "Library files: paths relative to this or the shipped folder."),
-    "params": GrammarKey("params", "Constants, read as `$name`; `--set name=value` replaces a value."),
-    "routes": GrammarKey("routes", "Bin, or list of permitted bins, for each class of objects."),
-    "quotas": GrammarKey("quotas", "Maximum number of objects in a bin, in all or of each class."),
-    "tree": GrammarKey("node", "Root node of the tree.", is_required=True),
-    "trees": GrammarKey("trees", "Subtrees by name."),
-}
-"""The keys of a mission file."""
-
-LIBRARY_KEYS: GrammarKeys = {
-    "library": GrammarKey("name", "Name of the library.", is_required=True),
-    "description": GrammarKey("text", "Content of the library, one sentence."),
-    "trees": GrammarKey("trees", "Subtrees by name.", is_required=True),
-}
-"""The keys of a library file."""
-
-SUBTREE_KEYS: GrammarKeys = {
-    "doc": GrammarKey("text", "Purpose of the subtree, one sentence."),
-    "args": GrammarKey("args", "Arguments of the subtree: a list of names, or names with defaults."),
-    "returns": GrammarKey("names", "Variables that the caller gets; all other variables are then local."),
-    "do": GrammarKey("node", "Root node of the subtree.", is_required=True),
-}
-"""The keys of a subtree."""
-
-PARAM_KEYS: GrammarKeys = {
-    "default": GrammarKey("value", "Default value; a param without a default must be set with `--set`."),
-    "type": GrammarKey("name", "text, integer, number, boolean or list; by default the type of `default`."),
-    "min": GrammarKey("number", "Minimum value."),
-    "max": GrammarKey("number", "Maximum value."),
-    "choices": GrammarKey("list", "Allowed values."),
-    "doc": GrammarKey("text", "Meaning of the param, one sentence."),
-}
-"""The keys of a param whose declaration is a mapping."""
+Text: TypeAlias = str | float | bool
+"""A text; a number or a boolean is a text, too."""
+Name: TypeAlias = Annotated[str, Field(pattern=f"^{NAME_EXPRESSION}$")]
+"""Name of a param, an argument, a variable or a subtree."""
+TitleName: TypeAlias = Annotated[str, Field(pattern="^[A-Za-z_][A-Za-z0-9_-]*$")]
+"""Name of a mission or a library."""
+DollarName: TypeAlias = Annotated[str, Field(pattern=rf"^\$?{NAME_EXPRESSION}$")]
+"""Name of a variable, with or without `$`."""
+ReferenceText: TypeAlias = Annotated[str, WithJsonSchema({"definition": "reference"})]
+"""`$name` or `$name.field`."""
+Files: TypeAlias = str | Annotated[list[str], Field(min_length=1)]
+"""Path of a file, or a list of paths."""
+Limit: TypeAlias = Annotated[int, Field(ge=1)] | ReferenceText
+"""Maximum number of objects."""
 
 
-def find_shorthand_key(owner: type[KeyOwner]) -> Key | None:
-    """Return the key whose value may directly follow the keyword of a node or section, or None."""
-    return next((key for key in owner.keys.values() if key.shorthand), None)
+class FileKeys(BaseModel):
+    """Base class of the keys of a mapping in a mission or library file; each field declares a key."""
+
+    model_config = ConfigDict(extra="forbid", defer_build=True, arbitrary_types_allowed=True)
+
+    @classmethod
+    @cache
+    def get_keys(cls) -> Mapping[str, FieldInfo]:
+        """Return the fields by the names of the keys in the file."""
+        return {field.alias or name: field for name, field in cls.model_fields.items()}
 
 
-def is_value_optional(node_class: type[KeyOwner]) -> bool:
-    """Return True if the keyword of a node may stand alone, without a value."""
-    shorthand_key = find_shorthand_key(node_class)
-    return shorthand_key is not None and not shorthand_key.is_required
+class NodeKeys(FileKeys):
+    """Key at the level of the keyword of every node."""
+
+    label: Annotated[str, Field(pattern=f"^{LABEL_EXPRESSION}$")] = Field(
+        "", alias="as", description="Label of the node, for references in `on`, `until` and `catch`."
+    )
 
 
-def find_inner_keys(owner: type[KeyOwner]) -> Mapping[str, Key]:
-    """Return the keys of the mapping below a keyword; no keys if the value must not be a mapping."""
-    inner_keys = {name: key for name, key in owner.keys.items() if not key.sibling}
-    return {} if all(key.shorthand for key in inner_keys.values()) else inner_keys
+class UseKeys(FileKeys):
+    """Keys at the level of `use`."""
+
+    arguments: dict[Name, object] | None = Field(
+        None, alias="with", description="Values of the subtree's arguments."
+    )
+    returns: dict[Name, ReferenceText] | None = Field(
+        None, description="Variable of the caller for each returned one: `pose: $grasp_pose`."
+    )
 
 
-def find_sibling_keys(owner: type[KeyOwner]) -> Mapping[str, Key]:
-    """Return the keys at the level of the keyword."""
-    return {name: key for name, key in owner.keys.items() if key.sibling}
+class BehaviourKeys(FileKeys):
+    """The key below `PyTree` that every behaviour has; all other keys are its arguments and ports."""
+
+    model_config = ConfigDict(extra="allow")
+
+    behaviour: Text = Field(
+        alias=BEHAVIOUR_CLASS, description="Import path of the behaviour: `module:Class`."
+    )
+
+
+class ParamKeys(FileKeys):
+    """Keys of a param; a value without keys is the default."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"type": ["object", "array", "string", "number", "boolean", "null"]}
+    )
+
+    default: object = Field(
+        None, description="Default value; a param without a default must be set with `--set`."
+    )
+    type: Literal["text", "integer", "number", "boolean", "list"] = Field(
+        "text", description="text, integer, number, boolean or list; by default the type of `default`."
+    )
+    min: float = Field(0.0, description="Minimum value.")
+    max: float = Field(0.0, description="Maximum value.")
+    choices: list[object] | ReferenceText = Field([], description="Allowed values.")
+    doc: Text = Field("", description="Meaning of the param, one sentence.")
+
+
+class SubtreeKeys(FileKeys):
+    """Keys of a subtree; a node without these keys is a subtree without arguments."""
+
+    doc: Text = Field("", description="Purpose of the subtree, one sentence.")
+    args: dict[Name, object] | list[TitleName] | None = Field(
+        None, description="Arguments of the subtree: a list of names, or names with defaults."
+    )
+    returns: DollarName | list[DollarName] = Field(
+        [], description="Variables that the caller gets; all other variables are then local."
+    )
+    do: Child = Field(description="Root node of the subtree.")
+
+
+class LibraryKeys(FileKeys):
+    """Keys of a library file."""
+
+    library: TitleName = Field(description="Name of the library.")
+    description: Text = Field("", description="Content of the library, one sentence.")
+    trees: dict[Name, Child | SubtreeKeys] | None = Field(description="Subtrees by name.")
+
+
+class MissionKeys(FileKeys):
+    """Keys of a mission file."""
+
+    mission: TitleName = Field(description="Name of the mission.")
+    description: Text = Field("", description="Purpose of the mission, one sentence.")
+    cell: Text = Field(description="Cell file: a path relative to this or the shipped folder.")
+    library: Files = Field([], description="Library files: paths relative to this or the shipped folder.")
+    params: dict[Name, ParamKeys] | None = Field(
+        None, description="Constants, read as `$name`; `--set name=value` replaces a value."
+    )
+    routes: dict[str, Files] | None = Field(
+        None, description="Bin, or list of permitted bins, for each class of objects."
+    )
+    quotas: dict[str, Limit | Annotated[dict[str, Limit], Field(min_length=1)]] | None = Field(
+        None, description="Maximum number of objects in a bin, in all or of each class."
+    )
+    tree: Child = Field(description="Root node of the tree.")
+    trees: dict[Name, Child | SubtreeKeys] | None = Field(None, description="Subtrees by name.")
+
+
+NAME_PATTERN = re.compile(NAME_EXPRESSION)
+"""Matches the names of params, arguments, variables and subtrees."""
+REFERENCE_PATTERN = re.compile(rf"\$({NAME_PATTERN.pattern})(?:\.({NAME_PATTERN.pattern}))?")
+"""Matches `$name` and `$name.field`."""
+_REFERENCE_START = re.compile(r"^\$|\$(?=[A-Za-z_])")
+"""Matches `$` at the start of a text, or before a letter."""
+_FAILURE_PATTERN = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\.([A-Za-z_][A-Za-z0-9_]*)")
+"""Matches `Skill.reason` and `label.reason`."""
+
+
+class MappingReader:
+    """Reader of one mapping; reports unknown keys and missing keys at construction.
+
+    Attributes:
+        owner: Name, in messages, of the node, key or file to which the mapping belongs.
+        span: Position of the owner, for findings about missing keys.
+        findings: List to which the reader adds its findings.
+    """
+
+    def __init__(
+        self, owner: str, span: Span, node: YamlNode, keys: Mapping[str, FieldInfo], findings: list[Finding]
+    ) -> None:
+        self.owner = owner
+        self.span = span
+        self.findings = findings
+        self._mapping = node if isinstance(node, YamlMapping) else YamlMapping(node.span, ())
+        if not isinstance(node, YamlMapping):
+            message = f"{owner} must be a mapping, not {node.description}"
+            self.add_error(node.span, "wrong-type", message, f"Its keys: {', '.join(keys)}.")
+            return
+        for entry in self._mapping.entries:
+            if entry.key.text not in keys:
+                hint = suggest_choice(entry.key.text, keys, "Allowed keys")
+                self.add_error(entry.key.span, "unknown-key", f'{owner} has no key "{entry.key.text}"', hint)
+        for name, key in keys.items():
+            if key.is_required() and self.get(name) is None:
+                self.add_error(span, "missing-key", f'{owner} needs the key "{name}"')
+
+    def get(self, key: str) -> YamlNode | None:
+        """Return the value of `key`, or None."""
+        return self._mapping.get(key)
+
+    def get_key_span(self, key: str) -> Span:
+        """Return the position of `key`, or of the owner if the key is missing."""
+        entry = self._mapping.get_entry(key)
+        return entry.key.span if entry else self.span
+
+    def get_value_span(self, key: str) -> Span:
+        """Return the position of the value of `key`, or of the owner if the key is missing."""
+        return (self.get(key) or self).span
+
+    def read_text(self, key: str) -> str:
+        """Return the text below `key`, or ""; add an error for a list, a mapping or null."""
+        node = self.get(key)
+        if node is None:
+            return ""
+        if isinstance(node, YamlScalar) and node.value is not None:
+            return node.text
+        message = f"{self._describe_key(key)} must be a text, not {node.description}"
+        self.add_error(node.span, "wrong-type", message)
+        return ""
+
+    def read_reasons(self, key: str, section_keys: Sequence[str] = ()) -> tuple[Reason, ...]:
+        """Return the failure names in the list or single value of `key`; add an error for invalid items.
+
+        If the value may also contain sections with keys `section_keys`, mappings are ignored.
+        """
+        node = self.get(key)
+        names = []
+        if isinstance(node, YamlSequence) and not node.items:
+            hint = f'To match every failure, delete "{key}".'
+            self.add_error(node.span, "empty-list", f"{self._describe_key(key)} names no failure", hint)
+        for item in self.list_items(key):
+            text = item.text if isinstance(item, YamlScalar) else ""
+            if section_keys and isinstance(item, YamlMapping):
+                continue
+            if match := _FAILURE_PATTERN.fullmatch(text):
+                names.append(Reason(match[1], match[2], span=item.span))
+            else:
+                rule = f"{self._describe_key(key)} must name failures as Skill.reason or label.reason"
+                if section_keys:
+                    rule += f", or be a mapping with {' or '.join(section_keys)}"
+                message = f'{rule}, not "{text}"' if text else f"{rule}, not {item.description}"
+                self.add_error(item.span, "bad-match", message)
+        return tuple(names)
+
+    def list_items(self, key: str) -> tuple[YamlNode, ...]:
+        """Return the items of the list under `key`; a single value counts as a list with one item."""
+        node = self.get(key)
+        if isinstance(node, YamlSequence):
+            return node.items
+        return () if node is None else (node,)
+
+    def iterate_entries(self, key: str) -> Iterator[tuple[str, Span, YamlNode]]:
+        """Yield name, position of the name, and value of each entry below `key`."""
+        node = self.get(key)
+        if isinstance(node, YamlMapping):
+            for entry in node.entries:
+                yield entry.key.text, entry.key.span, entry.value
+        elif node is not None and not is_empty(node):
+            message = f"{self._describe_key(key)} must be a mapping, not {node.description}"
+            self.add_error(node.span, "wrong-type", message)
+
+    def check_name(self, name: str, span: Span, kind: str, hint: str = "") -> None:
+        """Add an error if `name` is not a valid name; `kind` is the kind of name, such as `a param`."""
+        if not NAME_PATTERN.fullmatch(name):
+            hint = hint or 'Use letters, digits and "_", and begin with no digit.'
+            self.add_error(span, "bad-name", f'"{name}" is no valid name of {kind}', hint)
+
+    def add_error(self, span: Span, code: str, message: str, hint: str = "") -> None:
+        """Add an error to the findings."""
+        self.findings.append(make_error(span, code, message, hint))
+
+    def _describe_key(self, key: str) -> str:
+        """Return the name of a key in messages: `retry.on`, or `params of the mission`."""
+        return f"{key} of {self.owner}" if " " in self.owner else f"{self.owner}.{key}"
+
+
+def is_empty(node: YamlNode) -> bool:
+    """Return True for a key without value, or with the value null."""
+    return isinstance(node, YamlScalar) and node.value is None
+
+
+def read_settings(
+    node: YamlNode, owner: str, findings: list[Finding], example_key: str = "name"
+) -> dict[str, Setting]:
+    """Return the settings below `owner`, a skill or a key; the hint of an error shows `example_key`."""
+    if is_empty(node):
+        return {}
+    if not isinstance(node, YamlMapping):
+        message = f"the value of {owner} must be a mapping of names to values, not {node.description}"
+        hint = f"Write {owner}: {{{example_key}: {node.text}}}." if isinstance(node, YamlScalar) else ""
+        findings.append(make_error(node.span, "wrong-type", message, hint))
+        return {}
+    entries = ((entry.key, entry.value) for entry in node.entries)
+    return {key.text: Setting(key.span, read_value(value, findings)) for key, value in entries}
+
+
+def read_value(node: YamlNode, findings: list[Finding]) -> Value:
+    """Return a reference for `$name` or `$name.field`; otherwise a constant, with `$` in place of `$$`."""
+    text = node.value if isinstance(node, YamlScalar) else None
+    if isinstance(text, str) and (match := REFERENCE_PATTERN.fullmatch(text)):
+        return Reference(match[1], node.span, match[2] or "")
+    errors = list(_find_misplaced_dollars(node))
+    findings += errors
+    literal = make_literal(node)
+    return InvalidValue(node.span) if errors else replace(literal, value=_unescape(literal.value))
+
+
+def make_literal(node: YamlNode) -> Constant:
+    """Return a node as a constant with its position and the positions of its elements."""
+    element_spans = tuple(item.span for item in node.items) if isinstance(node, YamlSequence) else ()
+    return Constant(node.python_value, node.span, element_spans=element_spans)
+
+
+def _find_misplaced_dollars(node: YamlNode) -> Iterator[Finding]:
+    """Yield an error for each text with a `$`, not escaped as `$$`, at the start or before a letter."""
+    for scalar in list_scalars(node):
+        if isinstance(scalar.value, str) and _REFERENCE_START.search(scalar.value.replace("$$", "")):
+            rule = "a reference is a whole value, as in key: $name or key: $name.field"
+            message = f'"{scalar.text}" is no reference: {rule}'
+            hint = f'For the character $, write $$: "{scalar.text.replace("$", "$$")}".'
+            yield make_error(scalar.span, "bad-reference", message, hint)
+
+
+def _unescape(value: JsonValue) -> JsonValue:
+    """Return a plain value in which `$` replaces each `$$`."""
+    if isinstance(value, str):
+        return value.replace("$$", "$")
+    if isinstance(value, list):
+        return [_unescape(item) for item in value]
+    return {key: _unescape(item) for key, item in value.items()} if isinstance(value, dict) else value

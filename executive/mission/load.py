@@ -18,18 +18,22 @@ from executive.mission import check_flow, check_nodes, check_skills, check_varia
 from executive.mission.analysis import CheckContext, UnhandledFailure, find_unhandled_failures
 from executive.mission.cell_file import CellFile, read_cell
 from executive.mission.expand import assign_paths, expand
-from executive.mission.file_search import find_file_below, find_mission, get_shipped_folder, read_source
 from executive.mission.findings import Finding, MissionError, make_warning, sort_findings
 from executive.mission.mission_file import Mission, Subtree, parse_library, parse_mission
 from executive.mission.node_parser import NodeParser
-from executive.mission.nodes import InvalidNode, Node
-from executive.mission.yaml_text import parse_yaml
+from executive.mission.yaml_files import (
+    find_file_below,
+    find_mission,
+    get_shipped_folder,
+    parse_yaml,
+    read_source,
+)
 from executive.perception.camera_model import find_calibration_doubts
 from executive.perception.envelope import find_unmeasured_detectors
 from executive.plugins import Skills
 from executive.skill import Skill
-from executive.tree.node_registry import ControlNodes, load_control_nodes
-from executive.tree.specification import Literal, LocatedName, Source
+from executive.tree.node import ControlNodes, load_control_nodes
+from executive.tree.specification import Constant, InvalidNode, LocatedName, Node, Source
 
 Check = Callable[[CheckContext], Iterator[Finding]]
 """Function that yields the findings of one check."""
@@ -142,10 +146,13 @@ def _add_library(
             continue
         # The position is in the mission file: the subtree of this name, or the path of the library.
         if first_subtree.library:
-            span, other_span = reference.span, first_subtree.span
+            span = reference.span
+            other_span = first_subtree.span
             hint = "Delete one of the libraries from the list."
         else:
-            span, other_span, hint = first_subtree.span, subtree.span, "Rename one of them."
+            span = first_subtree.span
+            other_span = subtree.span
+            hint = "Rename one of them."
         message = f'there are two subtrees "{name}"; the other is in {other_span.describe_place(span.source)}'
         parser.add_error(span, "duplicate-tree", message, hint)
     return source.text
@@ -188,7 +195,7 @@ class LoadedMission:
     @property
     def params(self) -> dict[str, JsonValue]:
         """Values of the mission's params, with overrides."""
-        return {name: cast("Literal", param.value).value for name, param in self.mission.params.items()}
+        return {name: cast("Constant", param.value).value for name, param in self.mission.params.items()}
 
     @property
     def routes(self) -> dict[str, tuple[str, ...]]:
@@ -200,7 +207,7 @@ class LoadedMission:
         """Maximum numbers of objects in the bins."""
         quotas = self.mission.quotas
         keys = [(quota.bin.name, quota.label.name if quota.label else None) for quota in quotas]
-        limits = [cast("int", cast("Literal", quota.limit).value) for quota in quotas]
+        limits = [cast("int", cast("Constant", quota.limit).value) for quota in quotas]
         return dict(zip(keys, limits, strict=True))
 
 
@@ -224,12 +231,16 @@ def load_mission(
         MissionError: The mission or the cell has errors; the exception contains every finding.
         InputError: The mission does not exist.
     """
-    mission_path, node_classes = find_mission(path), load_control_nodes()
+    mission_path = find_mission(path)
+    node_classes = load_control_nodes()
     files = read_mission(mission_path, overrides or {}, skills, node_classes, recorded_cell)
-    mission, cell, findings = files.mission, files.cell, list(files.findings)
+    mission = files.mission
+    cell = files.cell
+    findings = list(files.findings)
     skills = {**skills, **files.behaviours}
     config = cell.config if cell else None
-    cell_kind, classes_by_detector = None, {}
+    cell_kind = None
+    classes_by_detector = {}
     if cell is not None and config is not None:
         findings += _warn_about_calibration(cell, config)
     if cell is not None and config is not None and find_cell_kind is not None:
@@ -249,7 +260,7 @@ def load_mission(
             findings += check_skills.check_slots(cell, config, mission)
     expansion = expand(mission, skills, _make_predefined_lists(mission, config) if config else {})
     mission = replace(mission, quotas=expansion.quotas)
-    tree = assign_paths(expansion.tree or InvalidNode(files.source.make_span(), label=""))
+    tree = assign_paths(expansion.tree or InvalidNode(span=files.source.make_span()))
     context = CheckContext(
         mission, tree, expansion.unused_subtrees, skills, node_classes, config, classes_by_detector
     )

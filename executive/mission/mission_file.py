@@ -9,16 +9,24 @@ from typing import Any, cast, get_origin
 
 from pydantic import JsonValue
 
-from executive.mission import grammar
 from executive.mission.findings import suggest_choice
-from executive.mission.mapping_reader import NAME_PATTERN, MappingReader, is_empty, make_literal, read_value
+from executive.mission.grammar import (
+    NAME_PATTERN,
+    LibraryKeys,
+    MappingReader,
+    MissionKeys,
+    ParamKeys,
+    SubtreeKeys,
+    is_empty,
+    make_literal,
+    read_value,
+)
 from executive.mission.node_parser import NodeParser
-from executive.mission.nodes import Node
 from executive.mission.ports import ValueProblem, convert_setting, convert_value
 from executive.mission.validate import CELL_PREFIX, make_override_source, parse_override
-from executive.mission.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence
+from executive.mission.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.skill import Param, param
-from executive.tree.specification import InvalidValue, Literal, LocatedName, Span, Value
+from executive.tree.specification import Constant, InvalidValue, LocatedName, Node, Span, Value
 
 
 @dataclass(frozen=True)
@@ -62,7 +70,7 @@ class MissionParam:
     """
 
     span: Span
-    value: Literal | InvalidValue
+    value: Constant | InvalidValue
     declaration: Param
 
 
@@ -124,7 +132,7 @@ def parse_params(reader: MappingReader, overrides: Mapping[str, str]) -> dict[st
     for name, span, node in reader.iterate_entries("params"):
         reader.check_name(name, span, "a param")
         if isinstance(node, YamlMapping):
-            keys = grammar.PARAM_KEYS
+            keys = ParamKeys.get_keys()
             param_reader = MappingReader(f'the param "{name}"', span, node, keys, reader.findings)
             params[name] = _read_declaration(name, param_reader, name in overrides)
         else:
@@ -145,7 +153,8 @@ def parse_params(reader: MappingReader, overrides: Mapping[str, str]) -> dict[st
 
 def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> MissionParam:
     """Return the param that a mapping with keys such as `default` and `min` declares."""
-    default, items = reader.get("default"), reader.list_items("choices")
+    default = reader.get("default")
+    items = reader.list_items("choices")
     reader.read_text("doc")
     declaration = param(
         ge=_read_bound(reader, "min"),
@@ -195,7 +204,7 @@ def _read_bound(reader: MappingReader, key: str) -> float | None:
     return None
 
 
-def _replace_value(name: str, param: MissionParam, value: Literal, reader: MappingReader) -> MissionParam:
+def _replace_value(name: str, param: MissionParam, value: Constant, reader: MappingReader) -> MissionParam:
     """Return the param with a value; if the value is not allowed, add an error and return the old param."""
     try:
         converted = cast("JsonValue", convert_setting(value.value, param.declaration))
@@ -212,7 +221,7 @@ _MISSION_NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodeParser) -> Mission:
     """Return the valid content of a mission file; add errors to the findings of `parser`."""
     span = replace(root.span, length=1)
-    reader = MappingReader("the mission", span, root, grammar.MISSION_KEYS, parser.findings)
+    reader = MappingReader("the mission", span, root, MissionKeys.get_keys(), parser.findings)
     tree = reader.get("tree")
     return Mission(
         name=_read_name(reader),
@@ -283,7 +292,7 @@ def _read_names(reader: MappingReader, items: Iterable[YamlNode], rule: str) -> 
 def parse_library(root: YamlNode, parser: NodeParser) -> dict[str, Subtree]:
     """Return the valid subtrees of a library file by name; add errors to the findings of `parser`."""
     span = replace(root.span, length=1)
-    reader = MappingReader("the library", span, root, grammar.LIBRARY_KEYS, parser.findings)
+    reader = MappingReader("the library", span, root, LibraryKeys.get_keys(), parser.findings)
     return _read_subtrees(reader, parser, reader.read_text("library") or "library")
 
 
@@ -292,7 +301,7 @@ def _read_subtrees(reader: MappingReader, parser: NodeParser, library: str = "")
     subtrees: dict[str, Subtree] = {}
     for name, span, node in reader.iterate_entries("trees"):
         reader.check_name(name, span, "a subtree")
-        if isinstance(node, YamlMapping) and set(grammar.SUBTREE_KEYS) & set(node.keys):
+        if isinstance(node, YamlMapping) and set(SubtreeKeys.get_keys()) & set(node.keys):
             has_body = node.get("do") is not None
             if not has_body:
                 parser.add_error(span, "missing-key", f'the subtree "{name}" needs the key "do"')
@@ -305,7 +314,7 @@ def _read_subtrees(reader: MappingReader, parser: NodeParser, library: str = "")
 
 def _parse_subtree(name: str, span: Span, node: YamlMapping, parser: NodeParser, library: str) -> Subtree:
     """Return the subtree of a mapping with subtree keys; `span` is the position of the name."""
-    reader = MappingReader(f'the subtree "{name}"', span, node, grammar.SUBTREE_KEYS, parser.findings)
+    reader = MappingReader(f'the subtree "{name}"', span, node, SubtreeKeys.get_keys(), parser.findings)
     return Subtree(
         name,
         span,

@@ -9,24 +9,35 @@ from dataclasses import replace
 from executive.errors import InputError
 from executive.mission import grammar
 from executive.mission.findings import Finding, make_error, suggest_choice
-from executive.mission.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_settings, read_value
-from executive.mission.nodes import (
-    InnerNode,
-    InvalidNode,
-    KeyValue,
-    Node,
-    NodeSection,
-    SkillNode,
-    SubtreeNode,
-    list_nodes,
-)
-from executive.mission.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
+from executive.mission.grammar import NAME_PATTERN, MappingReader, is_empty, read_settings, read_value
+from executive.mission.yaml_files import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.plugins import Skills, load_behaviour
 from executive.skill import Skill
-from executive.tree.keys import Key, KeyKind, KeyOwner
-from executive.tree.node import ControlNode
-from executive.tree.node_registry import ControlNodes
-from executive.tree.specification import InvalidValue, Literal, LocatedName, Reference, Span
+from executive.tree.keys import (
+    Children,
+    Key,
+    KeyOwner,
+    KeySection,
+    KeyValue,
+    OwnerT,
+    list_member_types,
+    list_nodes,
+)
+from executive.tree.node import ControlNode, ControlNodes
+from executive.tree.specification import (
+    Child,
+    Constant,
+    InvalidNode,
+    InvalidValue,
+    Node,
+    Reason,
+    Reference,
+    SkillNode,
+    Span,
+    SubtreeNode,
+    Value,
+    VariableName,
+)
 
 _SKILL_PATTERN = re.compile(r"[A-Z][A-Za-z0-9]*")
 """Matches the names of skills, also of skills that are not installed."""
@@ -40,7 +51,9 @@ class NodeParser:
     """
 
     def __init__(self, findings: list[Finding], skills: Skills, node_classes: ControlNodes) -> None:
-        self.findings, self._skills, self._node_classes = findings, skills, node_classes
+        self.findings = findings
+        self._skills = skills
+        self._node_classes = node_classes
         self.behaviours: dict[str, type[Skill]] = {}
         self._keywords = [*node_classes, grammar.USE_KEYWORD, grammar.BEHAVIOUR_KEYWORD]
 
@@ -55,7 +68,7 @@ class NodeParser:
         if yaml_node is None or is_empty(yaml_node):
             if yaml_node is not None:
                 self.add_error(span, "missing-node", "a node is missing here")
-            return InvalidNode(span, "")
+            return InvalidNode(span=span)
         if isinstance(yaml_node, YamlSequence):
             return self._read_list(yaml_node)
         if isinstance(yaml_node, YamlScalar):
@@ -79,29 +92,34 @@ class NodeParser:
     def _read_list(self, sequence: YamlSequence) -> Node:
         nodes = self.read_nodes(sequence, "a list of nodes")
         if not nodes:
-            return InvalidNode(sequence.span, "")
+            return InvalidNode(span=sequence.span)
         node_class = self._node_classes[grammar.SEQUENCE_KEYWORD]
-        return InnerNode(sequence.span, "", node_class, {"do": nodes}, is_list=True)
+        return node_class.make({}, span=sequence.span, do=nodes, is_list=True)
 
     def _read_scalar(self, scalar: YamlScalar) -> Node:
         """Return the mission node for a YAML scalar: a skill, or a keyword that needs no body."""
         word = scalar.text
         node_class = self._node_classes.get(word)
-        if node_class is not None and grammar.is_value_optional(node_class):
-            return InnerNode(scalar.span, "", node_class, {})
+        if node_class is not None and node_class.is_value_optional():
+            return node_class.make({}, span=scalar.span)
         if word in self._keywords:
             self.add_error(scalar.span, "missing-node", f'"{word}" needs a body: write {word}: ...')
         elif isinstance(scalar.value, str) and _SKILL_PATTERN.fullmatch(word):
-            return SkillNode(scalar.span, "", word, {})
+            return SkillNode.model_construct(span=scalar.span, skill=word, settings={})
         else:
             self._add_keyword_error(scalar.span, word)
-        return InvalidNode(scalar.span, "")
+        return InvalidNode(span=scalar.span)
 
     def _read_mapping(self, mapping: YamlMapping) -> Node:
         """Return the node of a mapping, which has one entry with a keyword or skill, and sibling entries."""
         label = self._read_label(mapping)
         entries = [entry for entry in mapping.entries if entry.key.text != "as"]
-        node_entries = [entry for entry in entries if self._is_node_name(entry.key.text)]
+        # A node is a keyword, or a word that is written like the name of a skill.
+        node_entries = [
+            entry
+            for entry in entries
+            if entry.key.text in self._keywords or _SKILL_PATTERN.fullmatch(entry.key.text)
+        ]
         siblings = [entry for entry in entries if entry not in node_entries]
         if not node_entries:
             for entry in siblings:
@@ -109,34 +127,33 @@ class NodeParser:
             if not siblings:
                 message = "a node is missing here: the mapping names no node"
                 self.add_error(mapping.span, "missing-node", message)
-            return InvalidNode(mapping.span, "")
+            return InvalidNode(span=mapping.span)
         node_entry, *surplus_entries = node_entries
-        name, span = node_entry.key.text, node_entry.key.span
+        name = node_entry.key.text
+        span = node_entry.key.span
         for entry in surplus_entries:
             message = f'"{name}" and "{entry.key.text}" are two nodes in one mapping'
             self.add_error(entry.key.span, "two-nodes", message, "Write a list to run one after the other.")
         if surplus_entries:
             # Errors in surplus nodes are discarded, because the author must correct the mapping first.
             parts = [self.make_silent_parser()._read_entry(mapping, entry, "") for entry in surplus_entries]
-            return InvalidNode(span, label, (self._read_entry(mapping, node_entry, ""), *parts))
+            return InvalidNode(
+                span=span, label=label, parts=(self._read_entry(mapping, node_entry, ""), *parts)
+            )
         node_class = self._node_classes.get(name)
-        sibling_keys = grammar.find_sibling_keys(node_class) if node_class else {}
-        allowed_keys = ("as", *(grammar.USE_SIBLINGS if name == grammar.USE_KEYWORD else sibling_keys))
+        sibling_keys = node_class.sibling_keys if node_class else {}
+        allowed_keys = ("as", *(grammar.UseKeys.get_keys() if name == grammar.USE_KEYWORD else sibling_keys))
         for entry in siblings:
             key = entry.key.text
             if key not in allowed_keys:
-                is_inner_key = node_class is not None and key in grammar.find_inner_keys(node_class)
+                is_inner_key = node_class is not None and key in node_class.inner_keys
                 hint = f"Indent {key}: it is a key below {name}." if is_inner_key else ""
                 hint = hint or suggest_choice(key, allowed_keys, f"Keys at the level of {name}")
                 message = f'"{key}" is not allowed at the level of "{name}"'
                 self.add_error(entry.key.span, "unknown-key", message, hint)
         node = self._read_entry(mapping, node_entry, label)
         label_node = mapping.get("as")
-        return replace(node, label_span=label_node.span) if label_node else node
-
-    def _is_node_name(self, word: str) -> bool:
-        """Return True for a keyword, and for a word that is written like the name of a skill."""
-        return word in self._keywords or _SKILL_PATTERN.fullmatch(word) is not None
+        return node.replace(label_span=label_node.span) if label_node else node
 
     def _read_entry(self, mapping: YamlMapping, entry: YamlEntry, label: str) -> Node:
         """Return the node of a mapping; `entry` is the entry with the keyword or skill."""
@@ -146,28 +163,35 @@ class NodeParser:
         if name == grammar.BEHAVIOUR_KEYWORD:
             return self._read_behaviour(entry, label)
         if name in self._node_classes:
-            return read_control_node(self, mapping, entry, label, self._node_classes[name])
+            return self._read_control_node(mapping, entry, label, self._node_classes[name])
         params = self._skills[name].params if name in self._skills else {}
         settings = read_settings(entry.value, name, self.findings, next(iter(params), "name"))
-        return SkillNode(entry.key.span, label, name, settings)
+        return SkillNode.model_construct(span=entry.key.span, label=label, skill=name, settings=settings)
 
     def _read_use(self, mapping: YamlMapping, entry: YamlEntry, label: str) -> Node:
         """Return the use of a subtree, or an invalid node if the name of the subtree is no text."""
-        siblings = [(key, value) for key in grammar.USE_SIBLINGS if (value := mapping.get(key)) is not None]
+        siblings = [
+            (key, value) for key in grammar.UseKeys.get_keys() if (value := mapping.get(key)) is not None
+        ]
         settings = {key: read_settings(value, key, self.findings) for key, value in siblings}
         if not (isinstance(entry.value, YamlScalar) and isinstance(entry.value.value, str)):
             message = f"use must be the name of a subtree, not {entry.value.description}"
             self.add_error(entry.value.span, "wrong-type", message)
-            return InvalidNode(entry.key.span, "")
-        arguments, returns = settings.get("with", {}), settings.get("returns", {})
-        return SubtreeNode(entry.value.span, label, entry.value.text, arguments, returns)
+            return InvalidNode(span=entry.key.span)
+        arguments = settings.get("with", {})
+        returns = settings.get("returns", {})
+        return SubtreeNode.model_construct(
+            span=entry.value.span, label=label, name=entry.value.text, arguments=arguments, returns=returns
+        )
 
     def _read_behaviour(self, entry: YamlEntry, label: str) -> Node:
         """Return the skill node for a behaviour, or an invalid node if a mission cannot use the behaviour."""
-        keyword, class_key, span = entry.key.text, grammar.BEHAVIOUR_CLASS, entry.key.span
+        keyword = entry.key.text
+        class_key = grammar.BEHAVIOUR_CLASS
+        span = entry.key.span
         settings = read_settings(entry.value, keyword, self.findings, class_key)
         path = settings.pop(class_key).value if class_key in settings else None
-        if isinstance(path, Literal) and isinstance(path.value, str):
+        if isinstance(path, Constant) and isinstance(path.value, str):
             try:
                 skill = load_behaviour(path.value)
                 name = skill.__name__
@@ -176,17 +200,17 @@ class NodeParser:
                     raise InputError(f'there is another skill "{name}"; {advice}')
             except InputError as error:
                 self.add_error(path.span, "unknown-behaviour", str(error))
-                return InvalidNode(span, label)
+                return InvalidNode(span=span, label=label)
             self.behaviours[name] = skill
-            return SkillNode(span, label, name, settings)
-        if isinstance(path, Literal | Reference):
+            return SkillNode.model_construct(span=span, label=label, skill=name, settings=settings)
+        if isinstance(path, Constant | Reference):
             message = (
                 f"{keyword}.{class_key} must be an import path, for example py_trees.behaviours:TickCounter"
             )
             self.add_error(path.span, "wrong-type", message)
         elif path is None and (is_empty(entry.value) or isinstance(entry.value, YamlMapping)):
             self.add_error(span, "missing-key", f'{keyword} needs the key "{class_key}"')
-        return InvalidNode(span, label)
+        return InvalidNode(span=span, label=label)
 
     def _read_label(self, mapping: YamlMapping) -> str:
         value = mapping.get("as")
@@ -195,7 +219,7 @@ class NodeParser:
         description = value.description
         if isinstance(value, YamlScalar):
             description = f'"{value.text}"'
-            if isinstance(value.value, str) and re.fullmatch(grammar.LABEL_PATTERN, value.text):
+            if isinstance(value.value, str) and re.fullmatch(grammar.LABEL_EXPRESSION, value.text):
                 return value.text
         self.add_error(value.span, "bad-label", f"a label must be a lower-case word, not {description}")
         return ""
@@ -206,7 +230,7 @@ class NodeParser:
         skill = skills_by_lower_case.get(word.replace("_", "").replace(" ", "").lower())
         hints = dict(grammar.KEYWORD_HINTS)
         for name, node_class in self._node_classes.items():
-            keys = grammar.find_sibling_keys(node_class)
+            keys = node_class.sibling_keys
             hints |= {key: f"Write {key} at the level of {name}, not below {name}." for key in keys}
         hint = hints.get(word) or (f'Did you mean the skill "{skill}"?' if skill else "")
         if not hint:
@@ -214,130 +238,145 @@ class NodeParser:
             hint = f"{keywords} A subtree is written as use: NAME."
         self.add_error(span, "unknown-node", f'there is no control node "{word}"', hint)
 
+    def _read_control_node(
+        self, mapping: YamlMapping, entry: YamlEntry, label: str, node_class: type[ControlNode]
+    ) -> Node:
+        """Return the control node of a mapping, or an invalid node if the children or a variable are invalid.
 
-def read_control_node(
-    parser: NodeParser, mapping: YamlMapping, entry: YamlEntry, label: str, node_class: type[ControlNode]
-) -> Node:
-    """Return the control node of a mapping, or an invalid node if the children or a variable are invalid.
+        `entry` is the entry of the mapping with the keyword; the other entries have sibling keys.
+        """
+        keyword = entry.key.text
+        span = entry.key.span
+        sibling_keys = node_class.sibling_keys
+        siblings = tuple(sibling for sibling in mapping.entries if sibling.key.text in sibling_keys)
+        values = {
+            **self._read_inner_keys(keyword, span, entry.value, node_class),
+            **self._read_keys(keyword, span, replace(mapping, entries=siblings), sibling_keys),
+        }
+        any_of = node_class.any_of
+        inner_keys = entry.value.keys if isinstance(entry.value, YamlMapping) else ()
+        # `MappingReader` reports a value that is not a mapping although it must be one.
+        is_form_valid = isinstance(entry.value, YamlMapping) or node_class.shorthand_key is not None
+        if any_of and is_form_valid and not {*mapping.keys, *inner_keys} & {*any_of}:
+            level = f" at the level of {keyword}" if set(any_of) <= set(sibling_keys) else ""
+            alternatives = " or ".join(f'"{name}"' for name in any_of)
+            self.add_error(span, "missing-key", f"{keyword} needs {alternatives}{level}")
+        missing = [key for name, key in node_class.keys.items() if key.is_required and name not in values]
+        if any(key.value_type in (Children, VariableName) for key in missing):
+            children = [node for value in values.values() for node in list_nodes(value)]
+            return InvalidNode(span=span, label=label, parts=tuple(children))
+        return _make_owner(node_class, values, span=span, label=label)
 
-    `entry` is the entry of the mapping with the keyword; the other entries have sibling keys.
-    """
-    keyword, span, sibling_keys = entry.key.text, entry.key.span, grammar.find_sibling_keys(node_class)
-    siblings = tuple(sibling for sibling in mapping.entries if sibling.key.text in sibling_keys)
-    values = {
-        **_read_inner_keys(parser, keyword, span, entry.value, node_class),
-        **_read_keys(parser, keyword, span, replace(mapping, entries=siblings), sibling_keys),
-    }
-    any_of = node_class.any_of
-    inner_keys = entry.value.keys if isinstance(entry.value, YamlMapping) else ()
-    # `MappingReader` reports a value that is not a mapping although it must be one.
-    is_form_valid = isinstance(entry.value, YamlMapping) or grammar.find_shorthand_key(node_class) is not None
-    if any_of and is_form_valid and not {*mapping.keys, *inner_keys} & {*any_of}:
-        level = f" at the level of {keyword}" if set(any_of) <= set(sibling_keys) else ""
-        alternatives = " or ".join(f'"{name}"' for name in any_of)
-        parser.add_error(span, "missing-key", f"{keyword} needs {alternatives}{level}")
-    missing = {key.kind for name, key in node_class.keys.items() if key.is_required and name not in values}
-    if missing & {KeyKind.NODES, KeyKind.VARIABLE}:
-        children = [node for value in values.values() for node in list_nodes(value)]
-        return InvalidNode(span, label, tuple(children))
-    return InnerNode(span, label, node_class, values)
+    def _read_inner_keys(
+        self, name: str, span: Span, yaml_node: YamlNode, owner: type[KeyOwner]
+    ) -> dict[str, KeyValue]:
+        """Return the values of the keys of `owner`; `yaml_node` is below the keyword `name`."""
+        shorthand_key = owner.shorthand_key
+        inner_keys = owner.inner_keys
+        is_list_required = shorthand_key is not None and shorthand_key.value_type == Children
+        # If the owner has inner keys, a mapping contains these keys, and is no node in shorthand form. A
+        # scalar in place of a list is treated like a mapping: `MappingReader` reports it and lists the keys.
+        is_scalar_for_list = is_list_required and isinstance(yaml_node, YamlScalar)
+        reads_inner_keys = isinstance(yaml_node, YamlMapping) or is_scalar_for_list
+        if shorthand_key is not None and not (reads_inner_keys and inner_keys):
+            key_node = YamlScalar(span, name, shorthand_key.name)
+            yaml_node = YamlMapping(span, (YamlEntry(key_node, yaml_node),))
+            inner_keys = {shorthand_key.name: shorthand_key}
+        return self._read_keys(name, span, yaml_node, inner_keys)
 
+    def _read_keys(
+        self, name: str, span: Span, yaml_node: YamlNode, keys: Mapping[str, Key]
+    ) -> dict[str, KeyValue]:
+        """Return the valid values of `keys` in a mapping.
 
-def _read_inner_keys(
-    parser: NodeParser, name: str, span: Span, yaml_node: YamlNode, owner: type[KeyOwner]
-) -> dict[str, KeyValue]:
-    """Return the values of the keys of `owner`; `yaml_node` is below the keyword `name`."""
-    shorthand_key, inner_keys = grammar.find_shorthand_key(owner), grammar.find_inner_keys(owner)
-    is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
-    # If the owner has inner keys, a mapping contains these keys, and is no node in shorthand form. A scalar
-    # in place of a list is treated like a mapping, so that `MappingReader` reports it and lists the keys.
-    is_scalar_for_list = is_list_required and isinstance(yaml_node, YamlScalar)
-    reads_inner_keys = isinstance(yaml_node, YamlMapping) or is_scalar_for_list
-    if shorthand_key is not None and not (reads_inner_keys and inner_keys):
-        key_node = YamlScalar(span, name, shorthand_key.name)
-        yaml_node = YamlMapping(span, (YamlEntry(key_node, yaml_node),))
-        inner_keys = {shorthand_key.name: shorthand_key}
-    return _read_keys(parser, name, span, yaml_node, inner_keys)
+        `InvalidNode` or `InvalidValue` stands for a required node or constant that the mapping lacks.
+        """
+        fields = {key.name: key.field for key in keys.values()}
+        reader = MappingReader(name, span, yaml_node, fields, self.findings)
+        values: dict[str, KeyValue] = {}
+        for key in keys.values():
+            if (value_node := reader.get(key.name)) is not None:
+                value = self._read_value(reader, key, value_node)
+                values |= {} if value is None else {key.name: value}
+            elif key.is_required and key.value_type == Child:
+                values[key.name] = InvalidNode(span=span)
+            elif key.is_required and key.is_plain:
+                values[key.name] = InvalidValue(span)
+        return values
 
-
-def _read_keys(
-    parser: NodeParser, name: str, span: Span, yaml_node: YamlNode, keys: Mapping[str, Key]
-) -> dict[str, KeyValue]:
-    """Return the valid values of `keys` in a mapping.
-
-    `InvalidNode` or `InvalidValue` stands for a required node or constant that the mapping lacks.
-    """
-    reader = MappingReader(name, span, yaml_node, keys, parser.findings)
-    values: dict[str, KeyValue] = {}
-    for key in keys.values():
-        if (value_node := reader.get(key.name)) is not None:
-            value = _read_value(parser, reader, key, value_node)
-            values |= {} if value is None else {key.name: value}
-        elif key.is_required and key.kind is KeyKind.NODE:
-            values[key.name] = InvalidNode(span, "")
-        elif key.is_required and key.kind in (KeyKind.CONSTANT, KeyKind.ELEMENTS):
-            values[key.name] = InvalidValue(span)
-    return values
-
-
-def _read_value(parser: NodeParser, reader: MappingReader, key: Key, yaml_node: YamlNode) -> KeyValue | None:
-    """Return the value of a key, or None after an error and for an omitted optional child."""
-    span = reader.get_key_span(key.name)
-    match key.kind:
-        case KeyKind.NODE:
+    def _read_value(self, reader: MappingReader, key: Key, yaml_node: YamlNode) -> KeyValue | None:
+        """Return the value of a key, or None after an error and for an omitted optional child."""
+        span = reader.get_key_span(key.name)
+        if key.is_plain:
+            return read_value(yaml_node, self.findings)
+        if key.value_type == Child:
             is_omitted = is_empty(yaml_node) and key.shorthand and not key.is_required
-            return None if is_omitted else parser.read_node(yaml_node, span)
-        case KeyKind.NODES:
-            nodes = parser.read_nodes(yaml_node, reader.owner)
+            return None if is_omitted else self.read_node(yaml_node, span)
+        if key.value_type == Children:
+            nodes = self.read_nodes(yaml_node, reader.owner)
             if key.max_count is None or len(nodes) <= key.max_count:
                 return nodes or None
             message = f"{reader.owner} has {len(nodes)} branches, but may have at most {key.max_count}"
-            parser.add_error(reader.span, "too-large", message)
+            self.add_error(reader.span, "too-large", message)
             return None
-        case KeyKind.REASONS:
+        if key.value_type == VariableName:
+            return self._read_variable(reader, key.name)
+        section = key.section
+        if section is None:
             return reader.read_reasons(key.name)
-        case KeyKind.REASONS_OR_SECTIONS:
-            names = reader.read_reasons(key.name, tuple(key.section.keys))
+        if key.value_type is section:
+            return self._read_section(key.name, section, yaml_node, span)
+        if Reason in list_member_types(key.value_type):
+            names = reader.read_reasons(key.name, tuple(section.keys))
             mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
-            return *names, *(_read_section(parser, key, item, item.span) for item in mappings)
-        case KeyKind.VARIABLE:
-            return _read_variable(parser, reader, key.name)
-        case KeyKind.SECTION:
-            return _read_section(parser, key, yaml_node, span)
-        case KeyKind.SECTIONS:
-            return tuple(_read_sections(parser, key, yaml_node))
-    return read_value(yaml_node, parser.findings)
+            return *names, *(self._read_section(key.name, section, item, item.span) for item in mappings)
+        return tuple(self._read_sections(key.name, section, yaml_node))
+
+    def _read_variable(self, reader: MappingReader, key: str) -> VariableName | None:
+        """Return the output variable of a key; for `$name`, add an error and return the variable `name`."""
+        text = reader.read_text(key)
+        span = reader.get_value_span(key)
+        if NAME_PATTERN.fullmatch(text):
+            return VariableName(text, span=span)
+        hint = f"Write the name without $, for example {key}: target; $target is then the value."
+        self.add_error(span, "bad-name", f'"{text}" is no valid name of a variable', hint)
+        name = text.removeprefix("$")
+        return VariableName(name, span=span) if NAME_PATTERN.fullmatch(name) else None
+
+    def _read_section(
+        self, key: str, section: type[KeySection], yaml_node: YamlNode, span: Span
+    ) -> KeySection:
+        """Return the section below a key."""
+        values = self._read_inner_keys(key, span, yaml_node, section)
+        if section.any_of and isinstance(yaml_node, YamlMapping) and not yaml_node.entries:
+            alternatives = " or ".join(f'"{name}"' for name in section.any_of)
+            self.add_error(span, "missing-key", f"{key} needs {alternatives}")
+        return _make_owner(section, values, span=span)
+
+    def _read_sections(
+        self, key: str, section: type[KeySection], yaml_node: YamlNode
+    ) -> Iterable[KeySection]:
+        """Yield the sections of a list, or a single section."""
+        kind = "mapping with " + " and ".join(f'"{name}"' for name in section.keys)
+        if not isinstance(yaml_node, YamlSequence | YamlMapping):
+            message = f"{key} must be a {kind}, or a list of such mappings, not {yaml_node.description}"
+            self.add_error(yaml_node.span, "wrong-type", message)
+            return
+        if isinstance(yaml_node, YamlSequence) and not yaml_node.items:
+            self.add_error(yaml_node.span, "empty-list", f"{key} needs at least one {kind}")
+        for item in yaml_node.items if isinstance(yaml_node, YamlSequence) else (yaml_node,):
+            yield self._read_section(key, section, item, item.span)
 
 
-def _read_variable(parser: NodeParser, reader: MappingReader, key: str) -> LocatedName | None:
-    """Return the output variable of a key; for `$name`, add an error and return the variable `name`."""
-    variable = LocatedName(reader.read_text(key), reader.get_value_span(key))
-    if NAME_PATTERN.fullmatch(variable.name):
-        return variable
-    hint = f"Write the name without $, for example {key}: target; $target is then the value."
-    message = f'"{variable.name}" is no valid name of a variable'
-    parser.add_error(variable.span, "bad-name", message, hint)
-    name = variable.name.removeprefix("$")
-    return LocatedName(name, variable.span) if NAME_PATTERN.fullmatch(name) else None
-
-
-def _read_section(parser: NodeParser, key: Key, yaml_node: YamlNode, span: Span) -> NodeSection:
-    """Return the section below a key."""
-    values = _read_inner_keys(parser, key.name, span, yaml_node, key.section)
-    if key.section.any_of and isinstance(yaml_node, YamlMapping) and not yaml_node.entries:
-        alternatives = " or ".join(f'"{name}"' for name in key.section.any_of)
-        parser.add_error(span, "missing-key", f"{key.name} needs {alternatives}")
-    return NodeSection(key.section, span, values)
-
-
-def _read_sections(parser: NodeParser, key: Key, yaml_node: YamlNode) -> Iterable[NodeSection]:
-    """Yield the sections of a list, or a single section."""
-    kind = "mapping with " + " and ".join(f'"{name}"' for name in key.section.keys)
-    if not isinstance(yaml_node, YamlSequence | YamlMapping):
-        message = f"{key.name} must be a {kind}, or a list of such mappings, not {yaml_node.description}"
-        parser.add_error(yaml_node.span, "wrong-type", message)
-        return
-    if isinstance(yaml_node, YamlSequence) and not yaml_node.items:
-        parser.add_error(yaml_node.span, "empty-list", f"{key.name} needs at least one {kind}")
-    for item in yaml_node.items if isinstance(yaml_node, YamlSequence) else (yaml_node,):
-        yield _read_section(parser, key, item, item.span)
+def _make_owner(owner: type[OwnerT], values: Mapping[str, KeyValue], **attributes: object) -> OwnerT:
+    """Return a control node or a section with the values of its keys."""
+    settings: dict[str, Value] = {}
+    for name, value in values.items():
+        if isinstance(value, Value):
+            settings[name] = value
+        else:
+            attributes[owner.keys[name].attribute] = value
+    for key in owner.keys.values():
+        if key.is_required and not key.is_plain:
+            attributes.setdefault(key.attribute, ())
+    return owner.make(settings, **attributes)

@@ -11,8 +11,8 @@ from typing import Annotated
 from py_trees.behaviour import Behaviour
 from pydantic import Field
 
-from executive.tree.node import ControlNode
-from executive.tree.skill_leaf import SkillLeaf
+from executive.tree.node import ControlNode, NodeBehaviour
+from executive.tree.tree_node import SkillLeaf
 
 _INDEX_PATTERN = re.compile(r"[0-9]+:")
 """Index before the name of a list element in a path: `2:` in `2:try`."""
@@ -103,22 +103,25 @@ def list_child_indices(nodes: Sequence[OutlineNode]) -> list[list[int]]:
 def _iterate_outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) -> Iterator[OutlineNode]:
     path = _get_path(node)
     relative_path = path.removeprefix(f"{_get_path(parent) if parent else 'tree'}/")
-    label, detail = getattr(node, "label", ""), getattr(node, "detail", "")
+    label = getattr(node, "label", "")
+    detail = getattr(node, "detail", "")
     kind = _get_kind(node)
     if label and kind != SKILL_KIND:
         detail = ", ".join(filter(None, (kind, detail)))
     title = label or (node.skill_name if isinstance(node, SkillLeaf) else kind)
     subtrees = tuple(getattr(node, "subtree_names", ()))
     parent_key = _find_parent_key(node, parent, relative_path, (title, *reversed(subtrees)))
-    trigger = parent.describe_trigger(node) if isinstance(parent, ControlNode) else ""
+    trigger = ""
+    if isinstance(parent, NodeBehaviour):
+        trigger = parent.node.describe_trigger(parent.node.children[parent.children.index(node)])
     name = _format_name(relative_path)
     outline_node = OutlineNode(path, name, depth, detail, kind, title, parent_key, trigger, subtrees)
     if isinstance(node, SkillLeaf):
         yield _describe_skill(outline_node, node)
     else:
         # A py_trees behaviour that is no node of a mission is drawn in the default style.
-        style = node if isinstance(node, ControlNode) else ControlNode
-        yield replace(outline_node, symbol=style.symbol)
+        symbol = node.node.symbol if isinstance(node, NodeBehaviour) else ControlNode.symbol
+        yield replace(outline_node, symbol=symbol)
     for child in node.children:
         yield from _iterate_outline(child, node, depth + 1)
 
@@ -132,13 +135,14 @@ def _get_kind(node: Behaviour) -> str:
     """Return "skill", the keyword of a control node, or the class name of another py_trees behaviour."""
     if isinstance(node, SkillLeaf):
         return SKILL_KIND
-    return node.keyword if isinstance(node, ControlNode) else type(node).__name__.lower()
+    return node.node.keyword if isinstance(node, NodeBehaviour) else type(node).__name__.lower()
 
 
 def _format_name(relative_path: str) -> str:
     """Return the name of a node below its parent, from its path relative to the parent."""
     keys, _, name = relative_path.rpartition("/")
-    keys, name = keys.replace("/", " "), _INDEX_PATTERN.sub("", name)
+    keys = keys.replace("/", " ")
+    name = _INDEX_PATTERN.sub("", name)
     # The path of a list without a label ends with a key and an index, such as "catch/2".
     return f"{keys} {name}" if name.isdigit() else f"{keys}: {name}" if keys else name
 
@@ -155,15 +159,18 @@ def _find_parent_key(
     for name in names:
         if parts and parts[-1] == name:
             del parts[-1]
-    if not parts and isinstance(parent, ControlNode):
-        omitted_keys = [name for name, key in parent.keys.items() if not key.in_path]
-        parts = [name for name in omitted_keys if node in parent.list_children(name)]
+    if not parts and isinstance(parent, NodeBehaviour):
+        omitted_keys = [name for name, key in parent.node.keys.items() if not key.in_path]
+        child = parent.node.children[parent.children.index(node)]
+        parts = [name for name in omitted_keys if child in parent.node.list_children(name)]
     return " ".join(parts)
 
 
 def _describe_skill(node: OutlineNode, leaf: SkillLeaf) -> OutlineNode:
     """Return `node` with the declarations and connections of the skill of `leaf`."""
-    skill, wiring, ports = leaf.skill_type, leaf.wiring, leaf.skill_type.ports
+    skill = leaf.skill_type
+    wiring = leaf.wiring
+    ports = leaf.skill_type.ports
 
     def make_connections(variables_by_port: Mapping[str, str]) -> tuple[Connection, ...]:
         pairs = ((name, name in ports and ports[name].default is not ...) for name in variables_by_port)

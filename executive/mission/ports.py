@@ -6,7 +6,7 @@ import functools
 import json
 import math
 import types
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, NoReturn, Union, cast, get_args, get_origin, get_type_hints
 
@@ -15,10 +15,10 @@ from pydantic import TypeAdapter, ValidationError
 from executive.behaviours import find_mission_type
 from executive.cell.objects import KnownItem, RefersTo
 from executive.mission.findings import describe_validation_error, describe_value, suggest_word
-from executive.mission.nodes import InnerNode, Node, SkillNode
 from executive.skill import Direction, Param, Port, Skill
-from executive.tree.keys import Key, KeyKind
-from executive.tree.specification import Literal, LocatedName, Reference, Span
+from executive.tree.keys import Elements, Key
+from executive.tree.node import ControlNode
+from executive.tree.specification import Constant, Node, Reference, SkillNode, Span, VariableName
 
 _DESCRIPTIONS = {
     str: "a text",
@@ -64,7 +64,8 @@ def find_fields(declared_type: object, refers_to: str) -> dict[str, tuple[object
     value_type = KnownItem if refers_to == "item" and declared_type is str else declared_type
     if not (isinstance(value_type, type) and is_dataclass(value_type)):
         return {}
-    hints, annotations = get_type_hints(value_type), get_type_hints(value_type, include_extras=True)
+    hints = get_type_hints(value_type)
+    annotations = get_type_hints(value_type, include_extras=True)
     return {
         field.name: (hints[field.name], _find_kind(annotations[field.name])) for field in fields(value_type)
     }
@@ -141,7 +142,9 @@ def convert_setting(value: object, declaration: Param | Port) -> object:
             raise ValueProblem(f"must be a variable, {example}, not {describe_value(value)}")
         return convert_value(value, declaration.type)
     converted = convert_value(value, declaration.type)
-    minimum, maximum, choices = declaration.ge, declaration.le, declaration.choices
+    minimum = declaration.ge
+    maximum = declaration.le
+    choices = declaration.choices
     unit = f" {declaration.unit}" if declaration.unit else ""
     number = converted if isinstance(converted, int | float) else None
     if number is not None and minimum is not None and number < minimum:
@@ -164,24 +167,19 @@ def convert_value(value: object, declared_type: object) -> object:
     """
     if not is_plain_type(declared_type):
         raise ValueProblem(f"must be a variable, not {describe_value(value)}")
-    return _validate(_get_adapter(declared_type), value)
+    return convert_constant(_get_adapter(declared_type), value)
 
 
-def convert_constant(key: Key, value: object, max_value: int | None = None) -> object:
-    """Return a plain value converted to the type of a key; a number must not exceed `max_value`.
+def convert_constant(validator: TypeAdapter[object], value: object) -> object:
+    """Return a plain value converted by a validator.
 
     Raises:
         ValueProblem: The value cannot be converted, or is out of bounds.
     """
-    return _validate(key.make_validator(max_value), value)
-
-
-def _validate(adapter: TypeAdapter[object], value: object) -> object:
-    """Return the converted value, or raise ValueProblem."""
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueProblem(f"must be a finite number, not {value}")
     try:
-        return adapter.validate_json(json.dumps(value), strict=True)
+        return validator.validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
         # A union has one error per type. The most useful error is a violated bound, such as `less_than`.
         errors = sorted(error.errors(include_url=False), key=lambda details: "than" not in details["type"])
@@ -225,8 +223,8 @@ class Wire:
         return f"{self.skill}.{self.port.name}"
 
 
-def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator[Wire]:
-    """Yield the connection of every port of a direction, except inputs with a constant.
+def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Sequence[Wire]:
+    """Return the connection of every port of a direction, except inputs with a constant.
 
     A param with a name as its value counts as an input if the mission gives a variable. An input in `one_of`
     of the skill is connected only if the mission sets it.
@@ -234,48 +232,45 @@ def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Ite
     params = skill.params.values() if direction is Direction.IN else ()
     ports = [port for port in skill.ports.values() if port.direction is direction]
     declarations: list[Param | Port] = [*(param for param in params if param.accepts_variable), *ports]
+    wires: list[Wire] = []
     for declaration in declarations:
         setting = node.settings.get(declaration.name)
         value = setting.value if setting else None
         if isinstance(value, Reference):
-            yield Wire(node.skill, declaration, value.name, value.span, is_explicit=True, field=value.field)
+            wires.append(Wire(node.skill, declaration, value.name, value.span, True, value.field))
         # `check_settings` reports a constant for an output.
         elif isinstance(declaration, Port) and (
-            (direction is Direction.OUT and isinstance(value, Literal))
+            (direction is Direction.OUT and isinstance(value, Constant))
             or (value is None and declaration.name not in skill.one_of)
         ):
             variable = node.variables_by_port.get(declaration.name, declaration.name)
-            yield Wire(node.skill, declaration, variable, node.span, is_explicit=False)
+            wires.append(Wire(node.skill, declaration, variable, node.span, is_explicit=False))
+    return wires
 
 
-def find_literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
-    """Yield the name and the constant of every param and port that has a constant."""
-    for name, setting in node.settings.items():
-        if isinstance(setting.value, Literal):
-            yield name, setting.value
+def find_literals(node: SkillNode) -> Sequence[tuple[str, Constant]]:
+    """Return the name and the constant of every param and port that has a constant."""
+    values = [(name, setting.value) for name, setting in node.settings.items()]
+    return [(name, value) for name, value in values if isinstance(value, Constant)]
 
 
-def find_control_node_outputs(node: Node) -> Iterator[tuple[Key, LocatedName]]:
-    """Yield each key of a control node that names an output variable, and the variable."""
-    if isinstance(node, InnerNode):
-        for key, value in node.iterate_keys():
-            if isinstance(value, LocatedName):
-                yield key, value
+def find_control_node_outputs(node: Node) -> Sequence[tuple[Key, VariableName]]:
+    """Return each key of a control node that names an output variable, and the variable."""
+    values = node.list_values() if isinstance(node, ControlNode) else ()
+    return [(key, value) for key, value in values if isinstance(value, VariableName)]
 
 
-def find_control_node_inputs(node: Node) -> Iterator[Reference]:
-    """Yield the variables that a control node reads as lists of elements."""
-    if isinstance(node, InnerNode):
-        for key, value in node.iterate_keys():
-            if key.kind is KeyKind.ELEMENTS and isinstance(value, Reference):
-                yield value
+def find_control_node_inputs(node: Node) -> Sequence[Reference]:
+    """Return the variables that a control node reads as lists of elements."""
+    values = node.list_values() if isinstance(node, ControlNode) else ()
+    return [value for key, value in values if key.value_type == Elements and isinstance(value, Reference)]
 
 
 def find_written_variables(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
     """Return the variables that the nodes of a tree may write."""
-    variables = set()
+    variables: set[str] = set()
     for node in root.walk():
-        variables |= {variable.name for _, variable in find_control_node_outputs(node)}
+        variables |= {variable for _, variable in find_control_node_outputs(node)}
         if isinstance(node, SkillNode) and node.skill in skills:
             variables |= {wire.variable for wire in find_wires(node, skills[node.skill], Direction.OUT)}
     return variables

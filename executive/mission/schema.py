@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
+import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from pathlib import Path
-from typing import TypeAlias, cast
+from typing import TypeAlias, cast, get_origin
 
-import yaml
 from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema, to_jsonable_python
 
 from executive.cell.config import CellConfig
 from executive.mission import grammar
-from executive.mission.grammar import AllowedKeys, GrammarKey, GrammarKeys
-from executive.mission.mapping_reader import NAME_PATTERN
-from executive.mission.mission_file import PARAM_TYPES
+from executive.mission.grammar import BehaviourKeys, FileKeys, LibraryKeys, MissionKeys, NodeKeys, UseKeys
 from executive.mission.ports import is_plain_type
 from executive.plugins import Skills
 from executive.skill import Direction, Param, Port, Skill
-from executive.tree.keys import PREDEFINED_LISTS, Key, KeyKind
-from executive.tree.node import ControlNode
-from executive.tree.node_registry import ControlNodes
+from executive.tree.keys import Children, Elements, Key, KeyOwner, list_member_types
+from executive.tree.node import ControlNode, ControlNodes
 
 Schema: TypeAlias = JsonSchemaValue
 """A JSON Schema or a subschema."""
@@ -87,7 +84,8 @@ def make_type_schema(declared_type: object) -> Schema:
 def make_cell_schema() -> Schema:
     """Return the schema of a cell file; with `base`, other keys and all keys of detectors are optional."""
     cell = CellConfig.model_json_schema(schema_generator=Draft07, ref_template="#/definitions/{model}")
-    sections, required = cell.pop("$defs"), cell.pop("required")
+    sections = cell.pop("$defs")
+    required = cell.pop("required")
     detector = sections["DetectorConfig"]
     complete_detector = {"type": detector["type"], "required": detector.pop("required")}
     detector["type"] = [complete_detector["type"], "null"]
@@ -168,68 +166,120 @@ def _make_port_schema(port: Port) -> Schema:
     return {"description": description, **make_value_or_reference_schema(make_type_schema(port.type))}
 
 
-_NAME = NAME_PATTERN.pattern
-"""Regular expression of a name, for use in longer expressions."""
-_KINDS_FILE = Path(__file__).parent / "kinds.yaml"
-_SCHEMAS_BY_KIND: Mapping[str, Schema] = yaml.safe_load(_KINDS_FILE.read_text(encoding="utf-8"))
-"""Schema of the value of a key, by `GrammarKey.kind`."""
-_REASON: Schema = {"$ref": "#/definitions/reason"}
-"""Schema of the name of a failure."""
+class _FileSchema(Draft07):
+    """Generator of the schemas of mission and library files.
+
+    A union of types whose schemas do not overlap becomes one schema with a list of types, because editors
+    mark errors more precisely in such a schema than in `anyOf`.
+    """
+
+    def union_schema(self, schema: core_schema.UnionSchema) -> Schema:
+        """Return the schema of a union of types."""
+        return _merge_alternatives(super().union_schema(schema))
+
+    def nullable_schema(self, schema: core_schema.NullableSchema) -> Schema:
+        """Return the schema of an optional value."""
+        return _merge_alternatives(super().nullable_schema(schema))
+
+    def dict_schema(self, schema: core_schema.DictSchema) -> Schema:
+        """Return the schema of a mapping; no other keys are allowed than those of the declared pattern."""
+        mapping = super().dict_schema(schema)
+        return {**mapping, "additionalProperties": False} if "patternProperties" in mapping else mapping
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> Schema:
+        """Return the schema without default, which editors would insert."""
+        return self.generate_inner(schema["schema"])
+
+
+def _merge_alternatives(schema: Schema) -> Schema:
+    """Return one schema with a list of types for `anyOf`, if no alternative restricts another one."""
+    alternatives = schema.get("anyOf", [])
+    keywords = [name for one in alternatives for name in one if name != "type"]
+    if not all("type" in one for one in alternatives) or len(keywords) > len(set(keywords)):
+        return schema
+    types: list[str] = []
+    merged: Schema = {}
+    for one in alternatives:
+        types += [one["type"]] if isinstance(one["type"], str) else one["type"]
+        merged |= one
+    return {**merged, "type": types}
 
 
 def make_mission_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     """Return the schema of a mission file; its definition `library` is the schema of a library file."""
-    return _make_file_schema("A mission", grammar.MISSION_KEYS, skills, node_classes)
+    return _make_file_schema("A mission", MissionKeys, skills, node_classes)
 
 
 def make_library_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     """Return the schema of a library file."""
-    return _make_file_schema("A library", grammar.LIBRARY_KEYS, skills, node_classes)
+    return _make_file_schema("A library", LibraryKeys, skills, node_classes)
 
 
-def _make_file_schema(title: str, keys: GrammarKeys, skills: Skills, node_classes: ControlNodes) -> Schema:
-    control_nodes = {word: _make_control_node_schema(node_class) for word, node_class in node_classes.items()}
-    use = {"title": grammar.USE_KEYWORD, "description": "A subtree by its name.", **_SCHEMAS_BY_KIND["name"]}
-    subtree = {"title": "A subtree", **_make_mapping_schema(grammar.SUBTREE_KEYS)}
-    return {
-        "$schema": DIALECT,
-        "title": title,
-        **_make_mapping_schema(keys),
-        "definitions": {
-            "node": _make_node_schema(skills, node_classes),
-            "tree": {"anyOf": [_make_reference("node"), subtree]},
-            "param": _make_mission_param_schema(),
-            "library": _make_mapping_schema(grammar.LIBRARY_KEYS),
-            "reason": _make_reason_schema(skills),
-            "reasons": {"anyOf": [*_make_reason_schema(skills)["anyOf"], _make_list_schema(_REASON)]},
-            "label": {"type": "string", "pattern": f"^{grammar.LABEL_PATTERN}$"},
-            "reference": {"title": "$name", "type": "string", "pattern": rf"^\${_NAME}(\.{_NAME})?$"},
-            **{name: make_settings_schema(name, skill) for name, skill in skills.items()},
-            **control_nodes,
-            grammar.USE_KEYWORD: use,
-            grammar.BEHAVIOUR_KEYWORD: _make_behaviour_schema(),
+def _make_file_schema(title: str, keys: type[FileKeys], skills: Skills, node_classes: ControlNodes) -> Schema:
+    definitions: dict[str, Schema] = {}
+    file = make_schema(keys, definitions)
+    name: Schema = {"type": "string", "pattern": f"^{grammar.NAME_EXPRESSION}$"}
+    definitions |= {
+        "library": make_schema(LibraryKeys, definitions),
+        "node": _make_node_schema(skills, node_classes, definitions),
+        "reason": _make_reason_schema(skills),
+        "variable": name,
+        "reference": {
+            "title": "$name",
+            "type": "string",
+            "pattern": rf"^\${grammar.NAME_EXPRESSION}(\.{grammar.NAME_EXPRESSION})?$",
+        },
+        **{skill: make_settings_schema(skill, skills[skill]) for skill in skills},
+        **{
+            word: {
+                "title": word,
+                "description": _get_first_line(node_class),
+                **_make_owner_schema(node_class, definitions),
+            }
+            for word, node_class in node_classes.items()
+        },
+        grammar.USE_KEYWORD: {"title": grammar.USE_KEYWORD, "description": "A subtree by its name.", **name},
+        grammar.BEHAVIOUR_KEYWORD: {
+            **make_schema(BehaviourKeys, definitions),
+            "title": grammar.BEHAVIOUR_KEYWORD,
+            "description": "A behaviour of py_trees.",
         },
     }
+    return {"$schema": DIALECT, **file, "title": title, "definitions": definitions}
 
 
-def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
+def make_schema(declared_type: object, definitions: dict[str, Schema]) -> Schema:
+    """Return the schema of a type, with references to the definitions in the schema of a file.
+
+    The schemas of the models that the type contains are added to `definitions`.
+    """
+    adapter: TypeAdapter[object] = TypeAdapter(cast("type[object]", declared_type))
+    schema = adapter.json_schema(schema_generator=_FileSchema, ref_template="#/definitions/{model}")
+    # `Child` and other types name a definition, because pydantic accepts references to its own models only.
+    text = re.sub(r'"definition": "(\w+)"', r'"$ref": "#/definitions/\1"', json.dumps(schema))
+    resolved: Schema = json.loads(text)
+    definitions |= resolved.pop("$defs", {})
+    return resolved
+
+
+def _make_node_schema(skills: Skills, node_classes: ControlNodes, definitions: dict[str, Schema]) -> Schema:
     """Return the schema of a node: a name, a list, or a mapping with one name (skill or keyword) as a key.
 
     The name selects the schema of the other keys by `dependencies`, because editors mark invalid keys and
     complete valid keys in `dependencies`, but not in alternatives.
     """
-    label: Schema = {**_make_reference("label"), "description": grammar.LABEL_KEY.doc}
+    label: Schema = make_schema(NodeKeys, definitions)["properties"]
     names = [*skills, *node_classes, grammar.USE_KEYWORD, grammar.BEHAVIOUR_KEYWORD]
     nodes_without_body = [
         {"const": word, "title": word, "description": _get_first_line(node_class), **NO_ITEM_SUGGESTION}
         for word, node_class in node_classes.items()
-        if grammar.is_value_optional(node_class)
+        if node_class.is_value_optional()
     ]
-    siblings: dict[str, Schema] = {grammar.USE_KEYWORD: _make_properties(grammar.USE_SIBLINGS)}
+    siblings: dict[str, Schema] = {grammar.USE_KEYWORD: make_schema(UseKeys, definitions)["properties"]}
     requirements: dict[str, Schema] = {}
     for word, node_class in node_classes.items():
-        keys = grammar.find_sibling_keys(node_class)
-        siblings[word] = _make_properties(keys)
+        keys = node_class.sibling_keys
+        siblings[word] = _make_properties(keys, definitions)
         requirements[word] = _require_any_of(node_class.any_of) if set(node_class.any_of) & set(keys) else {}
     return {
         "title": "A node",
@@ -242,7 +292,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
         "minItems": 1,
         "dependencies": {
             name: {
-                "properties": {name: _make_reference(name), "as": label, **siblings.get(name, {})},
+                "properties": {name: _make_reference(name), **label, **siblings.get(name, {})},
                 "additionalProperties": False,
                 **requirements.get(name, {}),
             }
@@ -250,7 +300,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
         },
         "if": {"anyOf": [{"required": [name]} for name in names]},
         "else": {
-            "properties": {**{name: _make_reference(name) for name in names}, "as": label},
+            "properties": {**{name: _make_reference(name) for name in names}, **label},
             "additionalProperties": False,
             "minProperties": 1,
             "dependencies": {"as": {"minProperties": 2}},
@@ -258,57 +308,53 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     }
 
 
-def _make_control_node_schema(node_class: type[ControlNode]) -> Schema:
-    """Return the schema of the value of the keyword of a control node."""
-    shorthand, inner_keys = grammar.find_shorthand_key(node_class), grammar.find_inner_keys(node_class)
-    alternatives = [_make_value_schema(shorthand)] if shorthand else []
+def _make_owner_schema(owner: type[KeyOwner], definitions: dict[str, Schema]) -> Schema:
+    """Return the schema of the value of a control node or of a section: its keys, or one value."""
+    shorthand = owner.shorthand_key
+    inner_keys = owner.inner_keys
+    alternatives = [make_key_schema(shorthand, definitions)] if shorthand else []
     if inner_keys:
-        any_of = node_class.any_of
-        requirement = _require_any_of(any_of) if set(any_of) <= set(inner_keys) else {}
-        alternatives.append({**_make_mapping_schema(inner_keys), **requirement})
-    value = alternatives[0] if len(alternatives) == 1 else {"anyOf": alternatives}
-    return {"title": node_class.keyword, "description": _get_first_line(node_class), **value}
-
-
-def _make_behaviour_schema() -> Schema:
-    """Return the schema of the mapping under `PyTree`: its arguments and ports depend on the behaviour."""
-    title = grammar.BEHAVIOUR_KEYWORD
-    mapping = {**_make_mapping_schema(grammar.BEHAVIOUR_KEYS), "additionalProperties": True}
-    return {"title": title, "description": "A behaviour of py_trees.", **mapping}
+        mapping = {
+            "type": "object",
+            "properties": _make_properties(inner_keys, definitions),
+            "required": [name for name, key in inner_keys.items() if key.is_required],
+            "additionalProperties": False,
+        }
+        requirement = _require_any_of(owner.any_of) if set(owner.any_of) <= set(inner_keys) else {}
+        alternatives.append({**mapping, **requirement})
+    return alternatives[0] if len(alternatives) == 1 else {"anyOf": alternatives}
 
 
 def _get_first_line(node_class: type[ControlNode]) -> str:
     return (inspect.getdoc(node_class) or "").partition("\n")[0]
 
 
-def _make_value_schema(key: Key | GrammarKey) -> Schema:
-    """Return the schema of the value of a key."""
-    if isinstance(key, GrammarKey):
-        return _SCHEMAS_BY_KIND[key.kind]
-    match key.kind:
-        case KeyKind.NODE:
-            node = _make_reference("node")
-            may_be_empty = key.shorthand and not key.is_required
-            return {"allOf": [{"anyOf": [node, {"type": "null"}]}]} if may_be_empty else node
-        case KeyKind.NODES | KeyKind.REASONS | KeyKind.VARIABLE:
-            return _SCHEMAS_BY_KIND[key.kind.name.lower()]
-        case KeyKind.REASONS_OR_SECTIONS:
-            section = {**_make_mapping_schema(key.section.keys), **_require_any_of(key.section.any_of)}
-            return {"anyOf": [_make_reference("reasons"), section, _make_list_schema(_REASON, section)]}
-        case KeyKind.ELEMENTS:
-            return make_value_or_reference_schema({"type": "array"}, {"enum": list(PREDEFINED_LISTS)})
-        case KeyKind.SECTIONS:
-            section = _make_mapping_schema(key.section.keys)
-            return {**section, "type": ["array", "object"], "items": section}
-        case KeyKind.SECTION:
-            section = _make_mapping_schema(key.section.keys)
-            shorthand = grammar.find_shorthand_key(key.section)
-            if shorthand is None:
-                return section
-            value = shorthand.make_validator().json_schema()
-            return make_value_or_reference_schema({**section, **value, "type": [value["type"], "object"]})
-    constant = key.make_validator().json_schema()
-    return make_value_or_reference_schema(*constant.get("anyOf", [constant]))
+def make_key_schema(key: Key, definitions: dict[str, Schema]) -> Schema:
+    """Return the schema of the value of a key; a single value counts as a list with one item."""
+    if key.is_constant:
+        constant = key.make_validator().json_schema()
+        return make_value_or_reference_schema(*constant.get("anyOf", [constant]))
+    if key.value_type == Elements:
+        return make_value_or_reference_schema(*make_schema(Elements, definitions)["anyOf"])
+    section = key.section
+    items = [
+        _make_owner_schema(section, definitions)
+        if section is not None and member is section
+        else make_schema(member, definitions)
+        for member in list_member_types(key.value_type)
+    ]
+    if key.value_type == Children:
+        return _make_list_schema(items)
+    if get_origin(key.value_type) is tuple:
+        return _merge_alternatives({"anyOf": [*items, _make_list_schema(items)]})
+    # Due to `allOf`, editors insert only the keyword of a node without a body.
+    may_be_empty = key.shorthand and not key.is_required
+    return {"allOf": [{"anyOf": [*items, {"type": "null"}]}]} if may_be_empty else items[0]
+
+
+def _make_list_schema(items: Sequence[Schema]) -> Schema:
+    item = items[0] if len(items) == 1 else {"anyOf": items}
+    return {"type": "array", "items": item, "minItems": 1}
 
 
 def _require_any_of(keys: Sequence[str]) -> Schema:
@@ -318,7 +364,7 @@ def _require_any_of(keys: Sequence[str]) -> Schema:
 
 def _make_reason_schema(skills: Skills) -> Schema:
     skill_reasons = [f"{name}.{reason}" for name, skill in skills.items() for reason in skill.reasons]
-    label_pattern = rf"^{grammar.LABEL_PATTERN}\.{_NAME}$"
+    label_pattern = rf"^{grammar.LABEL_EXPRESSION}\.{grammar.NAME_EXPRESSION}$"
     return {
         "anyOf": [
             {"title": "Skill.reason", "enum": skill_reasons},
@@ -328,28 +374,11 @@ def _make_reason_schema(skills: Skills) -> Schema:
     }
 
 
-def _make_list_schema(*item_schemas: Schema) -> Schema:
-    """Return the schema of a list whose items have one of the schemas."""
-    return {"title": "list", "type": "array", "items": {"anyOf": [*item_schemas]}, "minItems": 1}
-
-
-def _make_mission_param_schema() -> Schema:
-    declaration = _make_mapping_schema(grammar.PARAM_KEYS)
-    declaration["properties"]["type"]["enum"] = list(PARAM_TYPES)
-    return {**declaration, "type": ["object", "array", "string", "number", "boolean", "null"]}
-
-
-def _make_mapping_schema(keys: AllowedKeys) -> Schema:
+def _make_properties(keys: Mapping[str, Key], definitions: dict[str, Schema]) -> Schema:
     return {
-        "type": "object",
-        "properties": _make_properties(keys),
-        "required": [name for name, key in keys.items() if key.is_required],
-        "additionalProperties": False,
+        name: {"description": key.field.description, **make_key_schema(key, definitions)}
+        for name, key in keys.items()
     }
-
-
-def _make_properties(keys: AllowedKeys) -> Schema:
-    return {name: {"description": key.doc, **_make_value_schema(key)} for name, key in keys.items()}
 
 
 def _make_reference(name: str) -> Schema:

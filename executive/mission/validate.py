@@ -13,13 +13,13 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from executive.mission.findings import Finding, describe_validation_error, make_error, suggest_choice
-from executive.mission.yaml_text import (
+from executive.mission.yaml_files import (
     YamlEntry,
     YamlMapping,
     YamlNode,
     YamlScalar,
     YamlSequence,
-    iterate_scalars,
+    list_scalars,
     parse_yaml,
 )
 from executive.tree.specification import Source, Span
@@ -113,7 +113,8 @@ def find_span(root: YamlNode, path: KeyPath, at_key: bool = False) -> Span:
 
     If `at_key` is True, or the value is a list or mapping, return the position of the key.
     """
-    node, span = root, root.span
+    node = root
+    span = root.span
     for key in path:
         if isinstance(node, YamlMapping) and (entry := node.get_entry(str(key))):
             node = entry.value
@@ -135,7 +136,8 @@ def _make_finding(root: YamlNode, model: type[BaseModel], error: ErrorDetails) -
     """Return the finding for an error of pydantic, at the position of the wrong key or value."""
     path: KeyPath = error["loc"]
     error_type = error["type"]
-    parent, key = path[:-1], path[-1] if path else ""
+    parent = path[:-1]
+    key = path[-1] if path else ""
     owner = join_keys(parent) or "the file"
     if error_type == "extra_forbidden":
         allowed_keys = getattr(_find_type(model, parent), "model_fields", ())
@@ -181,6 +183,6 @@ def _remove_none(annotation: object) -> object:
 
 
 def _find_infinite_numbers(node: YamlNode) -> Iterator[Finding]:
-    for scalar in iterate_scalars(node):
+    for scalar in list_scalars(node):
         if isinstance(scalar.value, float) and not math.isfinite(scalar.value):
             yield make_error(scalar.span, "not-finite", f'"{scalar.text}" is not a finite number')

@@ -9,17 +9,14 @@ from pathlib import Path, PurePath
 
 from executive.errors import RecordLost
 from executive.events import RunEnded
-from executive.mission.instance import get_mission_node, make_inspection_instance
 from executive.mission.load import LoadedMission
-from executive.mission.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.record.diagnosis import Diagnosis, FailureNode, LostItem
 from executive.record.picture_recorder import find_picture
 from executive.record.result import is_resumable
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline import ItemHistory, Look, Sighting, Timeline, get_skill_name
-from executive.tree.inspection import Advice, PropagatedFailure
-from executive.tree.node_registry import load_control_nodes
-from executive.tree.specification import Reason
+from executive.tree.node import Advice, ControlNode, PropagatedFailure, load_control_nodes
+from executive.tree.specification import Node, Reason, SkillNode, SubtreeNode
 
 CAMERA_ADVICE = "mount camera and bins as the cell file says, or measure the pose again"
 """Advice about a displaced camera, which no change of the mission corrects."""
@@ -196,12 +193,10 @@ def _trace_failure(nodes: Sequence[Node], timeline: Timeline, end: RunEnded) -> 
         subtrees = [ancestor.name for ancestor in nodes[:index] if isinstance(ancestor, SubtreeNode)]
         entry = _FailurePathNode(node, f"{subtrees[-1]}: {node.path_name}" if subtrees else node.path_name)
         activation = timeline.activation_by_path.get(node.path)
-        if isinstance(node, InnerNode) and activation is not None:
-            control = make_inspection_instance(node)
-            children = [child for key in control.keys for child in control.list_children(key)]
+        if isinstance(node, ControlNode) and activation is not None:
             failed_node = failure_path[-1].node if failure_path else None
             failure = PropagatedFailure(
-                child=next((child for child in children if get_mission_node(child) is failed_node), None),
+                child=failed_node if failed_node in node.children else None,
                 name=activation.reason, reasons=frozenset(reasons),
                 handled_counts=activation.handled_counts, last_messages=activation.message_by_reason,
                 last_handled_name=activation.last_handled_reason, last_choice=activation.choice,
@@ -209,10 +204,10 @@ def _trace_failure(nodes: Sequence[Node], timeline: Timeline, end: RunEnded) -> 
             )  # fmt: skip
             entry = replace(
                 entry,
-                explanation=control.explain(failure) if failure.child else "",
-                attempt=control.count_attempts(failure),
-                changes=list(control.advise(failure)),
-                is_handler=bool(control.remedy),
+                explanation=node.explain(failure) if failure.child else "",
+                attempt=node.count_attempts(failure),
+                changes=list(node.advise(failure)),
+                is_handler=bool(node.remedy),
             )
         failure_path.append(entry)
         reasons |= {Reason(node.label, reason)} if node.label else set()
@@ -295,8 +290,7 @@ def _list_changes(run: _FailedRun) -> Iterator[str]:
 
 
 def _format_advice(run: _FailedRun, entry: _FailurePathNode, advice: Advice) -> str:
-    changed_node = get_mission_node(advice.child) if advice.child else entry.node
-    return f"{advice.text} at {_format_location(run, changed_node)}"
+    return f"{advice.text} at {_format_location(run, advice.child or entry.node)}"
 
 
 def _format_location(run: _FailedRun, node: Node) -> str:

@@ -15,9 +15,9 @@ import yaml
 
 from executive.errors import ExecutiveError
 from executive.events import Observer, TimedEvent
-from executive.mission.file_search import read_source
 from executive.mission.load import LoadedMission
 from executive.mission.outline import make_outline
+from executive.mission.yaml_files import read_source
 from executive.record.diagnose import diagnose
 from executive.record.journal import Recorder
 from executive.record.result import Audit, ItemCounts, Result, is_resumable, list_requests, write_result

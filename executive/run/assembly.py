@@ -22,8 +22,7 @@ from executive.replay.replayed_cell import InputLog, Interruption, ReplayedCell
 from executive.run.operator import ScriptedOperator, TerminalOperator
 from executive.run.run import LookaheadPlanner, Run, brake_arm
 from executive.skill import Skill
-from executive.tree.skill_leaf import SkillLeaf
-from executive.tree.tree_node import Blackboard, halt
+from executive.tree.tree_node import Blackboard, SkillLeaf, halt
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from executive.run.run import Run
 from executive.skill import Skill
 from executive.testing.faults import with_faults
 from executive.testing.faulty_cell import FaultyCell, ScheduledFault
-from executive.tree.skill_leaf import SkillLeaf
+from executive.tree.tree_node import SkillLeaf
 
 MISSION_TIMEOUT = 600.0
 """Default timeout of a run, on the run's clock [s]; after the timeout the run ends as a fault."""

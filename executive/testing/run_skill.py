@@ -16,7 +16,7 @@ from executive.errors import InputError
 from executive.replay.recording_cell import COMMANDS
 from executive.run.run import MAX_BRAKING_TIME
 from executive.skill import Skill, SkillFailed
-from executive.tree.skill_leaf import SkillRun
+from executive.tree.tree_node import SkillRun
 
 _INTERCEPTED_ROLES = ("arm", "tool", "camera", "detector", "ledger", "operator")
 _LOGGED_CALLS = COMMANDS | {

@@ -8,9 +8,9 @@ from py_trees.common import Status
 
 from executive.skill import Seconds
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
-from executive.tree.inspection import Advice, Counterpart, PropagatedFailure
-from executive.tree.keys import Child, key
-from executive.tree.node import ControlNode
+from executive.tree.keys import key
+from executive.tree.node import Advice, ControlNode, Counterpart, NodeBehaviour, PropagatedFailure
+from executive.tree.specification import Child, Node
 
 
 class Invert(ControlNode):
@@ -23,16 +23,8 @@ class Invert(ControlNode):
     keyword = "invert"
     reasons = ("inverted",)
     symbol = "¬"
-    counterpart = Counterpart("Inverter")
 
     do: Child = key(shorthand=True, doc="Body.")
-
-    def step(self) -> Status:
-        """Tick the body."""
-        status = self.tick_child(self.do)
-        if status is Status.SUCCESS:
-            return self.fail_with_reason("inverted", f"{self.do.name} succeeded")
-        return Status.SUCCESS if status is Status.FAILURE else status
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes of the body, with success and failure exchanged."""
@@ -40,6 +32,25 @@ class Invert(ControlNode):
         inverted = PossibleFailure(self.keyword, "inverted", self.path)
         failures = {} if flow.success is None else {inverted: flow.success}
         return Flow(join_states(flow.failures.values()), failures, flow.halted)
+
+    @property
+    def counterpart(self) -> Counterpart | None:
+        """`Inverter` of BehaviorTree.CPP."""
+        return Counterpart("Inverter")
+
+    class Behaviour(NodeBehaviour):
+        """Runs the node."""
+
+        node: Invert
+
+        def step(self) -> Status:
+            """Tick the body."""
+            status = self.tick_child(self.node.do)
+            if status is Status.SUCCESS:
+                return self.fail_with_reason(
+                    "inverted", f"{self.behaviour_by_child[self.node.do].name} succeeded"
+                )
+            return Status.SUCCESS if status is Status.FAILURE else status
 
 
 class NotCondition(Invert):
@@ -67,15 +78,6 @@ class Succeed(ControlNode):
 
     do: Child | None = key(shorthand=True, default=None, doc="Body.")
 
-    def step(self) -> Status:
-        """Tick the body, if any."""
-        if self.do is None:
-            return Status.SUCCESS
-        status = self.tick_child(self.do)
-        if status is Status.FAILURE:
-            self.report_choice("succeed despite the failure", self.get_failure(self.do))
-        return Status.RUNNING if status is Status.RUNNING else Status.SUCCESS
-
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes: success after success and failure of the body, or a halt."""
         if self.do is None:
@@ -87,6 +89,20 @@ class Succeed(ControlNode):
     def counterpart(self) -> Counterpart | None:
         """`ForceSuccess` of BehaviorTree.CPP; without a body, `AlwaysSuccess`."""
         return Counterpart("ForceSuccess" if self.do else "AlwaysSuccess")
+
+    class Behaviour(NodeBehaviour):
+        """Runs the node."""
+
+        node: Succeed
+
+        def step(self) -> Status:
+            """Tick the body, if any."""
+            if self.node.do is None:
+                return Status.SUCCESS
+            status = self.tick_child(self.node.do)
+            if status is Status.FAILURE:
+                self.report_choice("succeed despite the failure", self.get_failure(self.node.do))
+            return Status.RUNNING if status is Status.RUNNING else Status.SUCCESS
 
 
 class Timeout(ControlNode):
@@ -111,21 +127,6 @@ class Timeout(ControlNode):
         """The limit as a text: `5 s`."""
         return f"{self.seconds:g} s"
 
-    def start(self) -> None:
-        """Set the deadline."""
-        self._deadline = self.clock.now + self.seconds
-
-    def step(self) -> Status:
-        """Tick the body, then compare the clock with the deadline."""
-        status = self.tick_child(self.do)
-        if status is Status.FAILURE:
-            return self.fail(self.get_failure(self.do))
-        # 1 ns covers the rounding errors of a clock that sums control periods.
-        if status is Status.RUNNING and self.clock.now >= self._deadline - 1e-9:
-            self.halt_children([self.do])
-            return self.fail_with_reason("timeout", f"the body did not end within {self.seconds:g} s")
-        return status
-
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the outcomes of the body, and the timeout if the body can take more than one tick."""
         flow = get_flow(self.do, state)
@@ -135,7 +136,7 @@ class Timeout(ControlNode):
         return Flow(flow.success, failures, flow.halted)
 
     @property
-    def first_child(self) -> Child | None:
+    def first_child(self) -> Node | None:
         """The body."""
         return self.do
 
@@ -153,3 +154,25 @@ class Timeout(ControlNode):
         """`Timeout` of BehaviorTree.CPP, with the limit in whole milliseconds."""
         # A limit that is unknown during the export is infinite here.
         return Counterpart("Timeout", {"msec": max(1, round(1000 * min(self.seconds, 1e6)))})
+
+    class Behaviour(NodeBehaviour):
+        """Runs the node."""
+
+        node: Timeout
+
+        def start(self) -> None:
+            """Set the deadline."""
+            self._deadline = self.clock.now + self.node.seconds
+
+        def step(self) -> Status:
+            """Tick the body, then compare the clock with the deadline."""
+            status = self.tick_child(self.node.do)
+            if status is Status.FAILURE:
+                return self.fail(self.get_failure(self.node.do))
+            # 1 ns covers the rounding errors of a clock that sums control periods.
+            if status is Status.RUNNING and self.clock.now >= self._deadline - 1e-9:
+                self.halt_children([self.node.do])
+                return self.fail_with_reason(
+                    "timeout", f"the body did not end within {self.node.seconds:g} s"
+                )
+            return status

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import TypeAlias
 
-from executive.skill import ANY, EMPTY, HOLDING, ToolState
-from executive.tree.keys import Child
-from executive.tree.specification import Reason
+from executive.skill import ANY, EMPTY, HALT, HOLDING, Skill, ToolState
+from executive.tree.specification import Node, Reason, SkillNode
 
 UNKNOWN_NAME = "*"
 """Placeholder for an unknown source or an unknown reason of a failure."""
@@ -80,7 +79,7 @@ class FlowState:
         """Return the state after a control node has handled a failure."""
         if self.tool_states is None:
             return self
-        failure_name = str(failure)
+        failure_name = f"{failure.source}.{failure.reason}"
         # Merge the states that differ only in `handled_failure`; tuples are hashed faster than dataclasses.
         merged_states = {(state.state, state.cause) for state in self.tool_states}
         return self.with_tool_states(
@@ -188,6 +187,19 @@ class Flow:
         failure = PossibleFailure(source, UNKNOWN_NAME, path)
         return cls(UNKNOWN_STATE, {failure: UNKNOWN_STATE}, UNKNOWN_STATE)
 
+    def join_handled(self, reasons: Sequence[Reason] = ()) -> FlowState | None:
+        """Return the state after a control node has handled a failure that `reasons` may denote.
+
+        If `reasons` is empty, the node handles all failures. None if it handles none.
+        """
+        return join_states(
+            [
+                end.with_handled_failure(failure)
+                for failure, end in self.failures.items()
+                if not reasons or failure.may_match(reasons)
+            ]
+        )
+
     def with_label(self, label: str) -> Flow:
         """Return the flow with the label of the node added to all failures; "" adds no label."""
         if not label:
@@ -199,12 +211,37 @@ class Flow:
         return replace(self, failures=failures)
 
 
-FlowFunction: TypeAlias = Callable[[Child, FlowState], Flow]
+def compute_skill_flow(
+    node: SkillNode, skill: type[Skill], outputs: Sequence[str], state: FlowState, is_first_tick: bool
+) -> Flow:
+    """Return the possible outcomes of a skill that starts in a state and writes the variables `outputs`.
+
+    If `is_first_tick` is True, only outcomes in the first tick of the skill are possible.
+    """
+    precondition, postcondition = skill.tool_state
+    state = state.apply_precondition(precondition, node.path)
+    success_state = state.with_variables(outputs)
+    apply_success = success_state.apply_observation if skill.is_condition else success_state.apply_success
+    # A condition grasps no object: a tool that was empty before the condition failed is still empty.
+    may_be_holding = state.tool_states is None or state.find_tool_state(HOLDING) is not None
+    states_after_failure = skill.tool_state_after_failure if may_be_holding or not skill.is_condition else {}
+    ends = {
+        reason: state.apply_failure(states_after_failure.get(reason), node.path)
+        for reason in (*skill.reasons, HALT)
+    }
+    failures = {PossibleFailure(node.skill, reason, node.path): ends[reason] for reason in skill.reasons}
+    success = apply_success(postcondition, node.path)
+    if skill.is_instantaneous():
+        return Flow(success, failures, None)
+    return Flow(None, {}, ends[HALT]) if is_first_tick else Flow(success, failures, ends[HALT])
+
+
+FlowFunction: TypeAlias = Callable[[Node, FlowState], Flow]
 """Function that returns the possible outcomes of a child from a state."""
 
 
 def find_fixed_point(
-    get_flow: FlowFunction, child: Child, entry: FlowState, get_next_entry: Callable[[Flow], FlowState | None]
+    get_flow: FlowFunction, child: Node, entry: FlowState, get_next_entry: Callable[[Flow], FlowState | None]
 ) -> tuple[Flow, FlowState]:
     """Return the possible outcomes of a child that runs repeatedly, and the joined state of all entries.
 

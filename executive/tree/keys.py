@@ -1,74 +1,52 @@
-"""Declarations of the keys of control nodes, for parser, schema, checks and builder of missions."""
+"""Keys of control nodes: pydantic fields with marks, for parser, schema, checks and builder of missions."""
 
 from __future__ import annotations
 
+import json
+import math
+import sys
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum, auto
-from functools import cache
+from functools import cache, cached_property
 from inspect import get_annotations
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias, Union, cast, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar, Union, cast, get_args, get_origin
 
-from py_trees.behaviour import Behaviour
-from pydantic import Field, TypeAdapter
+from pydantic import Field, TypeAdapter, ValidationError, WithJsonSchema
+from pydantic.fields import FieldInfo
 
-from executive.tree.specification import Reason
+from executive.tree.specification import (
+    Child,
+    Constant,
+    Node,
+    Reason,
+    Reference,
+    Setting,
+    Specification,
+    Value,
+    VariableName,
+)
 
-Child: TypeAlias = Behaviour
-"""Child of a control node; in the checker and the diagnosis, a `ChildPlaceholder` that represents it."""
-
-
-class VariableName(str):
-    """Name of a variable of the mission.
-
-    Attributes:
-        field: Name of a field of the value; "" for the whole value.
-    """
-
-    field: str
-
-    def __new__(cls, name: str, field: str = "") -> VariableName:
-        """Return the name of a variable or of a field of its value."""
-        variable = super().__new__(cls, name)
-        variable.field = field
-        return variable
-
-
+PREDEFINED_LISTS = ("poses", "bins", "classes", "items")
+"""Names of predefined lists. `for_each` reads the list `items` in the run; the loader of missions replaces
+every other name by its list before the tree is built."""
 Children: TypeAlias = tuple[Child, ...]
 """Type of a key with a list of nodes."""
 Reasons: TypeAlias = tuple[Reason, ...]
 """Type of a key with a list of reasons."""
-Elements: TypeAlias = tuple[object, ...] | VariableName | Literal["items"]
+Elements: TypeAlias = Annotated[
+    tuple[object, ...] | VariableName | Literal["items"],
+    WithJsonSchema({"anyOf": [{"type": "array"}, {"enum": list(PREDEFINED_LISTS)}]}),
+]
 """Type of a key with a list of values, the name of a variable that holds a list, or `items`: the items that
 still have to be sorted."""
-PREDEFINED_LISTS = ("poses", "bins", "classes", "items")
-"""Names of predefined lists. `for_each` reads the list `items` in the run; the loader of missions replaces
-every other name by its list before the tree is built."""
 
 
-class KeyKind(Enum):
-    """Kind of the value of a key, derived from the type annotation of its attribute."""
-
-    NODE = auto()
-    NODES = auto()
-    REASONS = auto()
-    REASONS_OR_SECTIONS = auto()
-    VARIABLE = auto()
-    ELEMENTS = auto()
-    SECTION = auto()
-    SECTIONS = auto()
-    CONSTANT = auto()
-
-
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Key:
-    """A key of a control node or of a section.
+    """A key of a control node or of a section: a pydantic field with marks.
 
     Attributes:
-        doc: Meaning of the key, one sentence.
-        default: Value if the key is missing; `...` for a required key.
-        ge, gt: Inclusive and exclusive lower bound of a number, or None.
         max_key: For a number: key of the list of nodes whose length is the maximum of the number, or "".
         max_count: For a list of nodes: maximum number of nodes, or None.
         shorthand: True if the key may be omitted and its value written directly under the keyword.
@@ -78,15 +56,11 @@ class Key:
         list_key: For a loop variable: key of the list of its values; otherwise "".
         requires_conditions: True if each node under the key must be a condition.
         name: Name of the key in the mission file.
-        attribute: Name of the attribute in the class.
-        kind: Kind of the value.
-        value_type: Type of a constant, or class of a section.
+        attribute: Name of the field.
+        value_type: Type of the value; of an optional key, the type without None.
+        field: The pydantic field: description, default and bounds.
     """
 
-    doc: str
-    default: object = ...
-    ge: float | None = None
-    gt: float | None = None
     max_key: str = ""
     max_count: int | None = None
     shorthand: bool = False
@@ -97,116 +71,265 @@ class Key:
     requires_conditions: bool = False
     name: str = ""
     attribute: str = ""
-    kind: KeyKind = KeyKind.CONSTANT
     value_type: object = None
+    field: FieldInfo
 
     @property
     def is_required(self) -> bool:
         """True if the key has no default, so that the mission must give a value."""
-        return self.default is ...
+        return self.field.is_required()
 
-    @property
-    def section(self) -> type[KeySection]:
-        """Class of the sections under the key."""
-        return cast("type[KeySection]", self.value_type)
+    @cached_property
+    def section(self) -> type[KeySection] | None:
+        """Class of the sections under the key, or None."""
+        types_under_key = list_member_types(self.value_type)
+        sections = (one for one in types_under_key if isinstance(one, type) and issubclass(one, KeySection))
+        return next(sections, None)
 
+    @cached_property
+    def has_nodes(self) -> bool:
+        """True if the value, or a section in the value, contains nodes."""
+        section = self.section
+        if section is not None:
+            return any(key.has_nodes for key in section.keys.values())
+        return self.value_type in (Child, Children)
+
+    @cached_property
+    def is_constant(self) -> bool:
+        """True for a plain value: a number, a text, a boolean, or one of several words."""
+        return self.value_type not in (Child, Children, VariableName, Elements) and not (
+            self.section or Reason in list_member_types(self.value_type)
+        )
+
+    @cached_property
+    def is_plain(self) -> bool:
+        """True for a constant or a list of elements; a mission may write a reference in place of both."""
+        return self.value_type == Elements or self.is_constant
+
+    @cache  # noqa: B019 - keys exist as long as their classes
     def make_validator(self, max_value: int | None = None) -> TypeAdapter[object]:
         """Return the validator of a constant; `max_value` is the upper bound of a number, or None."""
-        return _make_validator(self.value_type, self.ge, self.gt, max_value)
+        constraints = [mark for mark in self.field.metadata if not isinstance(mark, Key)]
+        if max_value is not None:
+            constraints.append(Field(le=max_value))
+        members = get_args(self.value_type) if _is_union(self.value_type) else (self.value_type,)
+        bounded = [
+            # A bound applies to numbers only, not to the words of a `Literal`.
+            member if get_origin(member) is Literal or not constraints else Annotated[(member, *constraints)]
+            for member in members
+        ]
+        return TypeAdapter(cast("type[object]", Union[tuple(bounded)]))  # noqa: UP007
+
+    def interpret(self, value: Value | None, max_value: int | None) -> object:
+        """Return the typed value for a value in a mission.
+
+        A valid value replaces an invalid or unknown one: for a number, a very large number; otherwise the
+        default or the first allowed value. The checks report invalid values.
+        """
+        if self.value_type == Elements:
+            if isinstance(value, Reference):
+                return VariableName(value.name, value.field, value.span)
+            elements = value.value if isinstance(value, Constant) else None
+            return tuple(elements) if isinstance(elements, list) else "items"
+        try:
+            constant = value.value if isinstance(value, Constant) else None
+            return self.make_validator(max_value).validate_json(json.dumps(constant), strict=True)
+        except ValidationError:
+            if self.value_type in (int, float):
+                return sys.maxsize if self.value_type is int else math.inf
+            if not self.is_required:
+                return self.field.default
+            default_values: Mapping[object, object] = {bool: False, str: ""}
+            return next(iter(get_args(self.value_type)), default_values.get(self.value_type))
 
 
-key: Callable[..., Any] = Key
-"""Declare a key in the body of a class: `seconds: float = key(gt=0, doc="Limit [s].")`.
+def key(
+    default: object = ..., *, doc: str, ge: float | None = None, gt: float | None = None, **marks: Any
+) -> Any:
+    """Declare a key, as a field of a class. `marks` are attributes of `Key`.
 
-`KeyOwner` derives name, kind and type from the attribute. The name of the key is the name of the
-attribute, without a trailing underscore. The result is typed as Any, so that mypy accepts `x: int = key()`.
-"""
+    In `seconds: float = key(gt=0, doc="Limit [s].")`, the key has the name of the attribute, without
+    a trailing underscore. The result is typed as Any, so that mypy accepts `x: int = key()`.
+    """
+    field = cast("FieldInfo", Field(default, description=doc, ge=ge, gt=gt))
+    field.metadata.append(Key(field=field, **marks))
+    return field
 
 
-class KeyOwner:
-    """Base of classes that declare keys.
+OwnerT = TypeVar("OwnerT", bound="KeyOwner")
+"""Class of a control node or of a section."""
+
+
+class KeyOwner(Specification):
+    """Base of classes that declare keys, each as a field with the type and the value of the key.
 
     Attributes:
         keys: Declarations of the keys, by their names in the mission file.
+        shorthand_key: Key whose value may directly follow the keyword, or None.
+        inner_keys: Keys of the mapping below the keyword; empty if the value must not be a mapping.
+        sibling_keys: Keys at the level of the keyword.
         any_of: Names of keys; a mission must give at least one of them. Empty if there is no such rule.
+        settings: Constants and references as the mission writes them, by key.
     """
 
     keys: ClassVar[Mapping[str, Key]] = {}
+    shorthand_key: ClassVar[Key | None] = None
+    inner_keys: ClassVar[Mapping[str, Key]] = {}
+    sibling_keys: ClassVar[Mapping[str, Key]] = {}
     any_of: ClassVar[tuple[str, ...]] = ()
 
-    def __init_subclass__(cls, **kwargs: object) -> None:
-        super().__init_subclass__(**kwargs)
-        declarations = {name: value for name, value in vars(cls).items() if isinstance(value, Key)}
-        annotations = get_annotations(cls, eval_str=True) if declarations else {}
+    settings: Mapping[str, Value] = {}
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: object) -> None:
+        super().__pydantic_init_subclass__(**kwargs)
         keys = dict(cls.keys)
-        for attribute, declaration in declarations.items():
-            if attribute not in annotations:
-                name = f"{cls.__qualname__}.{attribute}"
-                raise TypeError(f"{name} has no annotation: write its type before `= key(...)`")
-            key = _complete_declaration(declaration, attribute, annotations[attribute])
-            keys[key.name] = key
-            delattr(cls, attribute)
+        annotations = get_annotations(cls)
+        for attribute, field in cls.model_fields.items():
+            mark = next((mark for mark in field.metadata if isinstance(mark, Key)), None)
+            if mark is not None and attribute in annotations:
+                name = attribute.rstrip("_")
+                key_type = _find_type(field.annotation)
+                keys[name] = replace(mark, name=name, attribute=attribute, value_type=key_type, field=field)
         cls.keys = keys
+        cls.shorthand_key = next((key for key in keys.values() if key.shorthand), None)
+        cls.sibling_keys = {name: key for name, key in keys.items() if key.sibling}
+        inner_keys = {name: key for name, key in keys.items() if not key.sibling}
+        cls.inner_keys = {} if all(key.shorthand for key in inner_keys.values()) else inner_keys
 
-    def set_key_values(self, values: Mapping[str, object]) -> None:
-        """Set the attribute of each key to its value in `values`, or to the default of the key.
+    @classmethod
+    def make(cls: type[OwnerT], settings: Mapping[str, Value], **values: Any) -> OwnerT:
+        """Return an instance with the values of a mission, also with invalid ones.
 
-        Raises:
-            TypeError: A required value is missing, or an attribute in `values` belongs to no key.
+        `values` contains the attributes of the base class, and the values of keys that `settings` lacks.
         """
-        remaining_values = dict(values)
-        for key in self.keys.values():
-            value = remaining_values.pop(key.attribute, key.default)
-            if value is ...:
-                raise TypeError(f"{type(self).__name__} needs a value for {key.attribute}")
-            setattr(self, key.attribute, tuple(value) if isinstance(value, list) else value)
-        if remaining_values:
-            raise TypeError(f"{type(self).__name__} has no key {', '.join(remaining_values)}")
+        constants = cls._interpret(settings, values)
+        return cast("OwnerT", cls.model_construct(None, settings=settings, **values, **constants))
+
+    @classmethod
+    def _interpret(cls, settings: Mapping[str, Value], attributes: Mapping[str, object]) -> dict[str, Any]:
+        """Return the typed values of the plain keys in `settings`, and of the required plain keys."""
+        keys = [key for key in cls.keys.values() if key.is_plain]
+        return {
+            key.attribute: key.interpret(settings.get(key.name), cls.find_max(key, attributes))
+            for key in keys
+            if key.is_required or key.name in settings
+        }
+
+    @classmethod
+    def find_max(cls, key: Key, attributes: Mapping[str, object]) -> int | None:
+        """Return the maximum of a constant: the number of nodes under `key.max_key`; None for no maximum."""
+        return len(list_nodes(attributes.get(cls.keys[key.max_key].attribute))) if key.max_key else None
+
+    def replace(self: OwnerT, **values: Any) -> OwnerT:
+        """Return a copy with other values of some attributes."""
+        if "settings" in values:
+            values |= self._interpret(values["settings"], {**vars(self), **values})
+        return super().replace(**values)
+
+    @classmethod
+    def is_value_optional(cls) -> bool:
+        """Return True if the keyword of a node may stand alone, without a value."""
+        return cls.shorthand_key is not None and not cls.shorthand_key.is_required
+
+    def is_written_as_constant(self, key_name: str) -> bool:
+        """Return True if the mission has a constant at a key, not a param or an argument."""
+        value = self.settings.get(key_name)
+        return isinstance(value, Constant) and not value.origin
+
+    def list_values(self) -> Sequence[tuple[Key, KeyValue]]:
+        """Return every key that has a value, and the value, in the order of the declarations."""
+        values: list[tuple[Key, KeyValue]] = []
+        for name, key in self.keys.items():
+            value = self.settings.get(name) if key.is_plain else getattr(self, key.attribute)
+            if value is not None and value != ():
+                values.append((key, value))
+        return values
+
+    def list_children(self, key_name: str = "") -> Sequence[Node]:
+        """Return the nodes under a key or, without a name, under all keys, including those in sections."""
+        keys = [self.keys[key_name]] if key_name else self.keys.values()
+        return [node for key in keys for node in list_nodes(getattr(self, key.attribute))]
 
 
 class KeySection(KeyOwner):
     """Base class of sections: mappings under a key of a control node; a subclass declares the keys."""
 
-    def __init__(self, **values: object) -> None:
-        self.set_key_values(values)
+
+KeyValue: TypeAlias = Value | VariableName | Node | KeySection | tuple[Node | Reason | KeySection, ...]
+"""Value of a key of a control node."""
+Part: TypeAlias = Node | Reference | VariableName
+"""A part of a node that the expansion of a mission changes."""
+PartT = TypeVar("PartT", bound=Specification)
+"""Class of a node or section."""
 
 
-def _complete_declaration(declaration: Key, attribute: str, annotation: object) -> Key:
-    """Return the declaration with the name, kind and type that its attribute and annotation determine."""
-    # `X | None` declares an optional key of the type `X`.
-    if get_origin(annotation) in (Union, types.UnionType) and types.NoneType in get_args(annotation):
-        member_types = tuple(member for member in get_args(annotation) if member is not types.NoneType)
-        annotation = Union[member_types]  # noqa: UP007
-    value_type = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
-    element_type = get_args(value_type)[0] if get_origin(value_type) is tuple else None
-    kinds: dict[object, KeyKind] = {
-        Child: KeyKind.NODE,
-        Children: KeyKind.NODES,
-        Reasons: KeyKind.REASONS,
-        VariableName: KeyKind.VARIABLE,
-        Elements: KeyKind.ELEMENTS,
-    }
-    kind = kinds.get(value_type, KeyKind.CONSTANT)
-    if isinstance(value_type, type) and issubclass(value_type, KeySection):
-        kind = KeyKind.SECTION
-    elif isinstance(element_type, type) and issubclass(element_type, KeySection):
-        kind, value_type = KeyKind.SECTIONS, element_type
-    elif get_origin(element_type) in (Union, types.UnionType) and Reason in get_args(element_type):
-        (value_type,) = (member for member in get_args(element_type) if member is not Reason)
-        kind = KeyKind.REASONS_OR_SECTIONS
-    name = attribute.rstrip("_")
-    return replace(declaration, name=name, attribute=attribute, kind=kind, value_type=value_type)
+def list_nodes(value: object) -> list[Node]:
+    """Return the nodes in the value of a key, without the descendants of these nodes."""
+    if isinstance(value, Node):
+        return [value]
+    if isinstance(value, tuple):
+        return [node for item in value for node in list_nodes(item)]
+    if isinstance(value, KeySection):
+        return list(value.list_children())
+    return []
 
 
-@cache
-def _make_validator(
-    value_type: object, ge: float | None, gt: float | None, le: float | None
-) -> TypeAdapter[object]:
-    """Return the validator of a type; numbers must be `>= ge`, `> gt` and `<= le`, where None is no bound."""
-    is_union = get_origin(value_type) in (Union, types.UnionType)
-    bounds = Field(ge=ge, gt=gt, le=le)
-    member_types = tuple(
-        Annotated[member, bounds] if member in (int, float) else member
-        for member in (get_args(value_type) if is_union else (value_type,))
-    )
-    return TypeAdapter(cast("type[object]", Union[member_types]))  # noqa: UP007
+def map_parts(owner: PartT, change: Callable[[Part], object]) -> PartT:
+    """Return a copy of a node or section with `change(part)` in place of every part that it contains.
+
+    Parts are nodes without their descendants, references and names of variables. If no part changes, the
+    result is `owner` itself.
+    """
+    changed: dict[str, object] = {}
+    for name, value in vars(owner).items():
+        if isinstance(value, _CONTAINER_TYPES):
+            new_value = _map_value(value, change)
+            if new_value is not value:
+                changed[name] = new_value
+    return owner.replace(**changed) if changed else owner
+
+
+def _map_value(value: object, change: Callable[[Part], object]) -> object:
+    if isinstance(value, Node | Reference | VariableName):
+        return change(value)
+    if isinstance(value, Setting):
+        new_value = _map_value(value.value, change)
+        return value if new_value is value.value else replace(value, value=cast("Value", new_value))
+    if isinstance(value, KeySection):
+        return map_parts(value, change)
+    if isinstance(value, tuple):
+        items = tuple([_map_value(item, change) for item in value])
+        return value if _are_identical(items, value) else items
+    if isinstance(value, dict):
+        values = {name: _map_value(item, change) for name, item in value.items()}
+        return value if _are_identical(values.values(), value.values()) else values
+    return value
+
+
+_CONTAINER_TYPES = (tuple, dict, Specification, VariableName)
+"""Types of the attributes of a node that contain parts."""
+
+
+def _are_identical(values: Iterable[object], others: Iterable[object]) -> bool:
+    return all(value is other for value, other in zip(values, others, strict=True))
+
+
+def _find_type(annotation: object) -> object:
+    """Return the type of a key for the annotation of its field, which lacks the marks of `Annotated`."""
+    if _is_union(annotation) and types.NoneType in get_args(annotation):
+        annotation = Union[tuple(one for one in get_args(annotation) if one is not types.NoneType)]  # noqa: UP007
+    if annotation is Node:
+        return Child
+    return Elements if annotation == get_args(Elements)[0] else annotation
+
+
+def list_member_types(declared_type: object) -> Sequence[object]:
+    """Return the types of the elements of a tuple type, of the members of a union, or the type itself."""
+    if get_origin(declared_type) is tuple:
+        return list_member_types(get_args(declared_type)[0])
+    return get_args(declared_type) if _is_union(declared_type) else (declared_type,)
+
+
+def _is_union(declared_type: object) -> bool:
+    return get_origin(declared_type) in (Union, types.UnionType)

@@ -11,10 +11,16 @@ from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.skill import ANY, EMPTY, HOLDING
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
-from executive.tree.inspection import Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
-from executive.tree.keys import Child, Elements, KeySection, VariableName, key
-from executive.tree.node import ControlNode
-from executive.tree.specification import Reason, format_reasons
+from executive.tree.keys import Elements, KeySection, key
+from executive.tree.node import (
+    ControlNode,
+    Counterpart,
+    NodeAnalysis,
+    NodeBehaviour,
+    NodeFinding,
+    PropagatedFailure,
+)
+from executive.tree.specification import Child, Node, Reason, VariableName, format_reasons
 from executive.tree.tree_node import Failure
 
 NodeRun: TypeAlias = Generator[None, Status | None, Failure | None]
@@ -22,21 +28,19 @@ NodeRun: TypeAlias = Generator[None, Status | None, Failure | None]
 generator continues after the end of the child, and the value of the `yield` is the status of the child."""
 
 
-class GeneratorNode(ControlNode):
-    """Base class of control nodes that run one child after the other, in the order of a generator `run`.
+class GeneratorBehaviour(NodeBehaviour):
+    """Base class of behaviours that run one child after the other, in the order of a generator `run`.
 
     A subclass implements `run` in place of `start` and `step`. In a loop, the iteration after an iteration
     that took only one tick begins in the next tick, so that a loop never blocks a tick. After a longer
     iteration, the next iteration begins in the same tick.
     """
 
-    symbol = "↻"
-
     def start(self) -> None:
         """Begin a new generator."""
         self._run = self.run()
         self._has_tick_passed = False
-        self._running_child: Child | None = None
+        self._running_child: Node | None = None
 
     def step(self) -> Status:
         """Tick the running child, if any; unless it is still running, continue the generator."""
@@ -63,7 +67,7 @@ class GeneratorNode(ControlNode):
         """Run the node from its start to its end."""
         raise NotImplementedError
 
-    def run_child(self, child: Child) -> NodeRun:
+    def run_child(self, child: Node) -> NodeRun:
         """Tick a child once per tick until its end, and return its failure; None after success."""
         status: Status | None = self.tick_child(child)
         if status is Status.RUNNING:
@@ -79,7 +83,7 @@ class GeneratorNode(ControlNode):
         return None
 
 
-class While(GeneratorNode):
+class While(ControlNode):
     """Run the body as long as a condition succeeds; the condition runs before every iteration.
 
     The loop succeeds when the condition fails; a failure of the body is passed on.
@@ -95,15 +99,6 @@ class While(GeneratorNode):
 
     condition: Child = key(doc="Condition; its failure ends the loop with success.")
     do: Child = key(doc="Body of the loop.")
-
-    def run(self) -> NodeRun:
-        """Run condition and body in turn until the condition or the body fails."""
-        while not (failure := (yield from self.run_child(self.condition))):
-            if body_failure := (yield from self.run_child(self.do)):
-                return body_failure
-            yield from self.end_iteration()
-        self.report_choice("done", failure)
-        return None
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes, by fixed-point iteration over condition and body."""
@@ -122,12 +117,26 @@ class While(GeneratorNode):
         """Yield an error if the loop never ends because its condition cannot fail."""
         condition = analysis.get_flow(self.condition)
         if condition is not None and not condition.failures and not analysis.is_halted_by_sibling:
-            message = f"this loop never ends: its condition, {analysis.get_name(self.condition)}, cannot fail"
+            message = f"this loop never ends: its condition, {self.condition.path_name}, cannot fail"
             yield NodeFinding("", "endless", message, "Use `repeat` with `times` or `until`.")
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the cause of a failure: the body, not the condition, failed."""
         return "a failure of the body ends the loop"
+
+    class Behaviour(GeneratorBehaviour):
+        """Runs the node."""
+
+        node: While
+
+        def run(self) -> NodeRun:
+            """Run condition and body in turn until the condition or the body fails."""
+            while not (failure := (yield from self.run_child(self.node.condition))):
+                if body_failure := (yield from self.run_child(self.node.do)):
+                    return body_failure
+                yield from self.end_iteration()
+            self.report_choice("done", failure)
+            return None
 
 
 class CounterLimits(KeySection):
@@ -147,7 +156,7 @@ class CounterLimits(KeySection):
         return [(name, limit) for name in self.keys if (limit := getattr(self, name)) is not None]
 
 
-class Repeat(GeneratorNode):
+class Repeat(ControlNode):
     """Run the body until a number of iterations, an expected failure, or the limit of a counter is reached.
 
     Each of these three conditions ends the loop with success. The loop reads the counters before each
@@ -159,6 +168,7 @@ class Repeat(GeneratorNode):
     """
 
     keyword = "repeat"
+    symbol = "↻"
     any_of = ("times", "until")
     unreachable_reason = "the body runs 0 times"
 
@@ -176,70 +186,42 @@ class Repeat(GeneratorNode):
             conditions.append(f"until {format_reasons(self.until)}")
         return " or ".join(conditions)
 
-    def run(self) -> NodeRun:
-        """Run the body until the loop is complete, or the body fails."""
-        iteration_count = 0
-        while not self._is_complete(iteration_count):
-            if failure := (yield from self.run_child(self.do)):
-                if not failure.matches(self._expected_reasons):
-                    return failure
-                self.report_choice("done", failure)
-                return None
-            iteration_count += 1
-            if not self._is_complete(iteration_count):
-                yield from self.end_iteration()
-        if reached_limit := self._find_reached_limit():
-            self.report_choice(f"done, {reached_limit}")
-        return None
-
     @property
-    def _expected_reasons(self) -> list[Reason]:
+    def expected_reasons(self) -> list[Reason]:
         """Failures that end the loop with success."""
         return [end for end in self.until if isinstance(end, Reason)]
 
     @property
-    def _limits(self) -> list[tuple[str, float]]:
+    def limits(self) -> list[tuple[str, float]]:
         """Counters that have a limit, with their limits."""
         return [limit for end in self.until if isinstance(end, CounterLimits) for limit in end.list_limits()]
 
     @property
-    def _is_empty(self) -> bool:
+    def is_empty(self) -> bool:
         """True if the body never runs."""
-        return self.times == 0 or any(limit == 0 for _, limit in self._limits)
-
-    def _is_complete(self, iteration_count: int) -> bool:
-        """Return True if no further iteration may begin."""
-        return iteration_count == self.times or bool(self._find_reached_limit())
-
-    def _find_reached_limit(self) -> str:
-        """Return the first limit that a counter has reached, as a text: `placed: 4`; "" if none."""
-        limits = (f"{name}: {limit:g}" for name, limit in self._limits if self._read_counter(name) >= limit)
-        return next(limits, "")
-
-    def _read_counter(self, name: str) -> float:
-        return self.clock.now if name == "elapsed" else self.ledger.count_items(name)
+        return self.times == 0 or any(limit == 0 for _, limit in self.limits)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes; the next iteration starts in the state after success of the body."""
-        if self._is_empty:
+        if self.is_empty:
             return Flow(state, {}, None)
         body, entry = find_fixed_point(
             get_flow, self.do, state, lambda body: None if self.times == 1 else body.success
         )
-        reasons = self._expected_reasons
+        reasons = self.expected_reasons
         expected_ends = [end for failure, end in body.failures.items() if failure.may_match(reasons)]
         # A counter may have reached its limit before the first iteration.
-        last_ends = (None if self.times is None else body.success, entry if self._limits else None)
+        last_ends = (None if self.times is None else body.success, entry if self.limits else None)
         success = join_states((*expected_ends, *last_ends))
         failures = {cause: end for cause, end in body.failures.items() if not cause.must_match(reasons)}
         return Flow(success, failures, join_states((body.halted, entry)))
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield an error if only a limit of `placed` can end the loop, and the body places no item."""
-        has_only_placed = {name for name, _ in self._limits} == {"placed"} and not self._expected_reasons
-        if not has_only_placed or self._is_empty or self.times or analysis.is_concurrent:
+        has_only_placed = {name for name, _ in self.limits} == {"placed"} and not self.expected_reasons
+        if not has_only_placed or self.is_empty or self.times or analysis.is_concurrent:
             return
-        skills = analysis.list_skills().values()
+        skills = analysis.list_skills(self).values()
         if not any(skill is None or skill.tool_state in ((HOLDING, EMPTY), (ANY, EMPTY)) for skill in skills):
             message = "this loop never succeeds: its body releases no object, so `placed` does not increase"
             hint = "Add a failure reason or `elapsed` to `until`, or add `times`."
@@ -256,8 +238,43 @@ class Repeat(GeneratorNode):
         """`Repeat` of BehaviorTree.CPP; None with `until`."""
         return None if self.until else Counterpart("Repeat", {"num_cycles": "times"})
 
+    class Behaviour(GeneratorBehaviour):
+        """Runs the node."""
 
-class ForEach(GeneratorNode):
+        node: Repeat
+
+        def run(self) -> NodeRun:
+            """Run the body until the loop is complete, or the body fails."""
+            iteration_count = 0
+            while not self._is_complete(iteration_count):
+                if failure := (yield from self.run_child(self.node.do)):
+                    if not failure.matches(self.node.expected_reasons):
+                        return failure
+                    self.report_choice("done", failure)
+                    return None
+                iteration_count += 1
+                if not self._is_complete(iteration_count):
+                    yield from self.end_iteration()
+            if reached_limit := self._find_reached_limit():
+                self.report_choice(f"done, {reached_limit}")
+            return None
+
+        def _is_complete(self, iteration_count: int) -> bool:
+            """Return True if no further iteration may begin."""
+            return iteration_count == self.node.times or bool(self._find_reached_limit())
+
+        def _find_reached_limit(self) -> str:
+            """Return the first limit that a counter has reached, as a text: `placed: 4`; "" if none."""
+            limits = (
+                f"{name}: {limit:g}" for name, limit in self.node.limits if self._read_counter(name) >= limit
+            )
+            return next(limits, "")
+
+        def _read_counter(self, name: str) -> float:
+            return self.clock.now if name == "elapsed" else self.ledger.count_items(name)
+
+
+class ForEach(ControlNode):
     """Run the body once for every element of a list, in order.
 
     The node reads the list at its start; with an empty list, the node succeeds at once. A failure of the body
@@ -286,42 +303,6 @@ class ForEach(GeneratorNode):
         elements = self.in_ if self.in_ == "items" else f"[{', '.join(map(str, self.in_))}]"
         return f"${self.each} in {elements}"
 
-    def run(self) -> NodeRun:
-        """Write each element of the list to the variable `each` and run the body; then remove the variable.
-
-        Raises:
-            Fault: The variable with the list was never written, or its value is not a list.
-        """
-        elements = self._read_list()
-        try:
-            for number, element in enumerate(elements, 1):
-                self.blackboard[self.each] = element
-                self.report_choice(f"element {number} of {len(elements)}: {_describe_element(element)}")
-                if number > 1:
-                    yield from self.end_iteration()
-                if failure := (yield from self.run_child(self.do)):
-                    return failure
-            return None
-        finally:
-            self.blackboard.pop(self.each, None)
-
-    def _read_list(self) -> tuple[object, ...]:
-        variable = self.in_
-        if not isinstance(variable, VariableName):
-            if variable != "items":
-                return variable
-            return tuple(known.item for known in self.ledger.list_known_items() if known.is_open)
-        value = self.blackboard.get(variable)
-        if variable.field and value is not None:
-            value = getattr(value, variable.field)
-        if isinstance(value, list | tuple):
-            return tuple(value)
-        problem = f"it reads {self.blackboard.describe_missing(variable)}"
-        if variable in self.blackboard:
-            advice = "name a variable that holds a list, or write the elements in the mission"
-            problem = f"${variable} holds a {type(value).__name__}, not a list; {advice}"
-        raise Fault(f"{self.name}: {problem}", self.path)
-
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes; the next iteration starts in the state after success of the body."""
         if self.in_ == ():
@@ -341,6 +322,47 @@ class ForEach(GeneratorNode):
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the element at which the body failed."""
         return f"failed at {failure.last_choice}"
+
+    class Behaviour(GeneratorBehaviour):
+        """Runs the node."""
+
+        node: ForEach
+
+        def run(self) -> NodeRun:
+            """Write each element to the variable `each` and run the body; then remove the variable.
+
+            Raises:
+                Fault: The variable with the list was never written, or its value is not a list.
+            """
+            elements = self._read_list()
+            try:
+                for number, element in enumerate(elements, 1):
+                    self.blackboard[self.node.each] = element
+                    self.report_choice(f"element {number} of {len(elements)}: {_describe_element(element)}")
+                    if number > 1:
+                        yield from self.end_iteration()
+                    if failure := (yield from self.run_child(self.node.do)):
+                        return failure
+                return None
+            finally:
+                self.blackboard.pop(self.node.each, None)
+
+        def _read_list(self) -> tuple[object, ...]:
+            variable = self.node.in_
+            if not isinstance(variable, VariableName):
+                if variable != "items":
+                    return variable
+                return tuple(known.item for known in self.ledger.list_known_items() if known.is_open)
+            value = self.blackboard.get(variable)
+            if variable.field and value is not None:
+                value = getattr(value, variable.field)
+            if isinstance(value, list | tuple):
+                return tuple(value)
+            problem = f"it reads {self.blackboard.describe_missing(variable)}"
+            if variable in self.blackboard:
+                advice = "name a variable that holds a list, or write the elements in the mission"
+                problem = f"${variable} holds a {type(value).__name__}, not a list; {advice}"
+            raise Fault(f"{self.name}: {problem}", self.path)
 
 
 def _describe_element(element: object) -> str:

@@ -1,28 +1,133 @@
-"""Base class of the control nodes of a tree.
+"""Base classes of control nodes, the types of their methods, and the registry of installed control nodes.
 
-A control node is a class that an entry point registers. The class declares its keys in the
-mission file, and implements `start` and `step` for the run, `compute_flow` for the checker, and `explain`
-for the diagnosis.
+A control node is a class that an entry point registers: a pydantic model whose fields are the keys in the
+mission file. Its methods need no run: `compute_flow` for the checker, `explain` for the diagnosis. Its inner
+class `Behaviour` runs the node: `start` and `step`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import ClassVar
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from typing import ClassVar, Protocol, TypeAlias
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.errors import Fault
+from executive.errors import Fault, InputError
 from executive.events import BranchChosen, NodeEnded, NodeStarted
+from executive.plugins import PluginEntry, list_entries
+from executive.skill import Skill
 from executive.tree.flow import Flow, FlowFunction, FlowState
-from executive.tree.inspection import Advice, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
-from executive.tree.keys import Child, KeyKind, KeyOwner, KeySection
+from executive.tree.keys import KeyOwner
+from executive.tree.specification import Node, Reason
 from executive.tree.tree_node import Failure, NodeContext, TreeNode, halt
 
 
-class ControlNode(KeyOwner, TreeNode):
-    """Base class of control nodes.
+@dataclass(frozen=True)
+class NodeFinding:
+    """A mistake in the mission that a control node finds.
+
+    Attributes:
+        place: Place of the mistake: a key of the node, a reason under a key, or a child; "" for the node
+            itself.
+        code: Code of the finding, such as `endless`.
+        message: Description of the mistake, one sentence.
+        hint: Description of a remedy, or "".
+        is_warning: True if the mission can run nevertheless.
+    """
+
+    place: str | Reason | Node
+    code: str
+    message: str
+    hint: str = ""
+    is_warning: bool = False
+
+
+class NodeAnalysis(Protocol):
+    """Static analysis of a control node in a mission and of the children of the node.
+
+    Attributes:
+        is_halted_by_sibling: True if the node is halted when a concurrent node ends.
+        is_concurrent: True if another node may run at the same time.
+    """
+
+    is_halted_by_sibling: bool
+    is_concurrent: bool
+
+    def get_flow(self, child: Node) -> Flow | None:
+        """Return the possible outcomes of a child; None if the child never runs."""
+
+    def compute_flow(self, child: Node, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
+        """Return the possible outcomes of a child that starts in a state.
+
+        If `is_first_tick` is True, only outcomes in the first tick of the child are possible.
+        """
+
+    def list_skills(self, node: Node) -> Mapping[str, type[Skill] | None]:
+        """Return the class of each skill in and below a node, by name; None if not installed."""
+
+
+@dataclass(frozen=True)
+class PropagatedFailure:
+    """A failure that ended a run, as seen by a control node that caused the failure or passed it on.
+
+    Attributes:
+        child: The child that passed the failure on; None if the node itself caused the failure.
+        name: Name of the failure: `Grasp.missed`.
+        reasons: Reasons that denote the failure: `Skill.reason`, and `label.reason` for each label.
+        handled_counts: Number of earlier failures that the node handled, by name of the failure.
+        last_messages: Last message of each handled failure, by name of the failure.
+        last_handled_name: Name of the failure that the node handled last, or "".
+        last_choice: Last decision of the node as a text: `attempt 2 of 3`.
+        duration: Time from the start of the node to its end [s].
+    """
+
+    child: Node | None
+    name: str
+    reasons: frozenset[Reason]
+    handled_counts: Mapping[str, int]
+    last_messages: Mapping[str, str]
+    last_handled_name: str
+    last_choice: str
+    duration: float
+
+    def matches(self, reasons: Sequence[Reason]) -> bool:
+        """Return True if one of `reasons` denotes the failure."""
+        return any(reason in self.reasons for reason in reasons)
+
+
+@dataclass(frozen=True)
+class Advice:
+    """A change of the mission after which a failure would not end the run.
+
+    Attributes:
+        text: Description of the change without the line number, which the diagnosis adds.
+        child: Node that the author should change; None for the node itself.
+    """
+
+    text: str
+    child: Node | None = None
+
+
+@dataclass(frozen=True)
+class Counterpart:
+    """Node type that BehaviorTree.CPP 4 registers, with the semantics of a control node.
+
+    Attributes:
+        name: Name of the node type.
+        ports: By port, a number, or the name of the key whose value the port gets. The mission must set
+            that key.
+    """
+
+    name: str
+    ports: Mapping[str, str | int] = field(default_factory=dict)
+
+
+class ControlNode(KeyOwner, Node):
+    """Base class of control nodes: the specification of a node in a mission.
 
     Attributes:
         keyword: Name of the node in missions, and source of the failures that the node itself causes.
@@ -31,8 +136,8 @@ class ControlNode(KeyOwner, TreeNode):
         remedy: Beginning of the advice to handle a failure with this node, such as `add a retry around`; the
             name of the failing node is appended. "" if this node handles no failures.
         is_condition: True if the node counts as a condition; its keys must then accept only conditions.
-        clock: Clock of the run.
-        ledger: Ledger of the run.
+        unreachable_reason: Reason why a child never runs, if each node of the class has the same reason.
+        Behaviour: Class that runs the node.
     """
 
     keyword: ClassVar[str] = ""
@@ -40,43 +145,29 @@ class ControlNode(KeyOwner, TreeNode):
     symbol: ClassVar[str] = "◇"
     remedy: ClassVar[str] = ""
     is_condition: ClassVar[bool] = False
+    unreachable_reason: ClassVar[str] = ""
+    Behaviour: ClassVar[type[NodeBehaviour]]
 
-    def __init__(self, context: NodeContext, **values: object) -> None:
-        super().__init__(context, self.keyword)
-        self.clock, self.ledger = context.clock, context.ledger
-        self.set_key_values(values)
-        self.children = [child for key in self.keys for child in self.list_children(key)]
-        for child in self.children:
-            child.parent = self
+    @property
+    def type_name(self) -> str:
+        """Keyword of the control node."""
+        return self.keyword
 
-    def list_children(self, key_name: str) -> list[Child]:
-        """Return the nodes under a key, including those in the sections of the key."""
-        return _find_nodes(getattr(self, self.keys[key_name].attribute))
+    @cached_property
+    def children(self) -> Sequence[Node]:
+        """The nodes in the values of the keys and in sections."""
+        return self.list_children()
 
     @property
     def detail(self) -> str:
         """The constants of the node that differ from their defaults, as a text for drawings of the tree."""
-        constants = [key for key in self.keys.values() if key.kind is KeyKind.CONSTANT]
+        constants = [key for key in self.keys.values() if key.is_constant]
         values = [(key, getattr(self, key.attribute)) for key in constants]
-        return ", ".join(f"{key.name}: {value}" for key, value in values if value != key.default)
+        return ", ".join(f"{key.name}: {value}" for key, value in values if value != key.field.default)
 
-    def describe_trigger(self, child: Child) -> str:
+    def describe_trigger(self, child: Node) -> str:
         """Return the failures that trigger a child: `on Grasp.missed`; "" if no failure triggers it."""
         return ""
-
-    # Methods for the run.
-
-    def start(self) -> None:
-        """Begin an activation: the ticks from the start of the node to its end."""
-
-    def step(self) -> Status:
-        """Continue by one tick; return RUNNING, SUCCESS, or FAILURE after a call of `fail`."""
-        raise NotImplementedError
-
-    def clean_up(self) -> None:
-        """End an activation; called once per activation, also after a halt or a fault."""
-
-    # Methods for the checker.
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the outcomes that are possible from a state; `get_flow` returns the outcomes of a child."""
@@ -86,27 +177,24 @@ class ControlNode(KeyOwner, TreeNode):
         """Yield mistakes in the use of this control node in the mission."""
         yield from ()
 
-    @property
-    def unreachable_reason(self) -> str:
-        """Reason why a child never runs; "" if another finding explains this."""
-        return ""
+    def explain_unreachable(self) -> str:
+        """Return the reason why a child never runs; "" if another finding explains this."""
+        return self.unreachable_reason
 
     @property
-    def first_child(self) -> Child | None:
+    def first_child(self) -> Node | None:
         """The child that runs first in each activation of the node; None if unknown."""
         return None
 
     @property
-    def concurrent_children(self) -> tuple[Child, ...]:
+    def concurrent_children(self) -> tuple[Node, ...]:
         """Children that run at the same time; empty if the children run one after the other."""
         return ()
 
     @property
-    def children_halted_by_sibling(self) -> tuple[Child, ...]:
+    def children_halted_by_sibling(self) -> tuple[Node, ...]:
         """Children that the node halts when another child ends. These children may contain endless loops."""
         return ()
-
-    # Methods for the diagnosis.
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return a text that explains why the node passed a failure on; "" if it passes on all failures."""
@@ -120,45 +208,82 @@ class ControlNode(KeyOwner, TreeNode):
         """Yield changes of the mission after which this node would handle a failure."""
         yield from ()
 
-    def list_contingencies(self) -> Iterator[tuple[str, Child]]:
+    def list_contingencies(self) -> Iterator[tuple[str, Node]]:
         """Yield (name in reports, child) for each child that runs only after a failure, or in `finally`."""
         yield from ()
-
-    # Property for the export.
 
     @property
     def counterpart(self) -> Counterpart | None:
         """Node of BehaviorTree.CPP with the same semantics; None if there is none."""
         return None
 
-    # Methods that subclasses call.
 
-    def tick_child(self, child: Child) -> Status:
+class NodeBehaviour(TreeNode):
+    """Base class of the behaviours of control nodes; a subclass implements `start` and `step`.
+
+    Attributes:
+        node: Specification of the node.
+        behaviour_by_child: Behaviour of each child of the specification.
+        clock: Clock of the run.
+        ledger: Ledger of the run.
+    """
+
+    def __init__(
+        self, context: NodeContext, node: ControlNode, build_child: Callable[[Node], Behaviour]
+    ) -> None:
+        super().__init__(context, node.keyword)
+        self.node = node
+        self.behaviour_by_child = {child: build_child(child) for child in node.children}
+        self.clock = context.clock
+        self.ledger = context.ledger
+        self.children = list(self.behaviour_by_child.values())
+        for child in self.children:
+            child.parent = self
+
+    @property
+    def detail(self) -> str:
+        """The constants of the node, as a text for drawings of the tree."""
+        return self.node.detail
+
+    def start(self) -> None:
+        """Begin an activation: the ticks from the start of the node to its end."""
+
+    def step(self) -> Status:
+        """Continue by one tick; return RUNNING, SUCCESS, or FAILURE after a call of `fail`."""
+        raise NotImplementedError
+
+    def clean_up(self) -> None:
+        """End an activation; called once per activation, also after a halt or a fault."""
+
+    def tick_child(self, child: Node) -> Status:
         """Tick a child and return its status."""
-        child.tick_once()
-        status = child.status
+        behaviour = self.behaviour_by_child[child]
+        behaviour.tick_once()
+        status = behaviour.status
         if status is Status.INVALID:
-            raise self._make_status_fault(child)
+            raise self._make_status_fault(behaviour)
         return status
 
-    def _make_status_fault(self, child: Child) -> Fault:
+    def _make_status_fault(self, child: Behaviour) -> Fault:
         return Fault(f"{child.name} was ticked but has no status", self.path)
 
-    def halt_children(self, children: Iterable[Child]) -> None:
+    def halt_children(self, children: Iterable[Node]) -> None:
         """Halt the children and all running nodes below the children, one child after the other.
 
         Raises:
             Fault: The clean-up of a node failed; all other nodes were halted nevertheless.
         """
-        if problems := [problem for child in children for problem in halt(child)]:
+        problems = [problem for child in children for problem in halt(self.behaviour_by_child[child])]
+        if problems:
             raise Fault("; ".join(problems), self.path)
 
-    def get_failure(self, child: Child) -> Failure:
+    def get_failure(self, child: Node) -> Failure:
         """Return the failure of a child; the reason is `failed` for a behaviour that is no `TreeNode`."""
-        failure = getattr(child, "failure", None)
+        behaviour = self.behaviour_by_child[child]
+        failure = getattr(behaviour, "failure", None)
         if isinstance(failure, Failure):
             return failure
-        return Failure("failed", child.feedback_message, child.name, self.path)
+        return Failure("failed", behaviour.feedback_message, behaviour.name, self.path)
 
     def fail(self, failure: Failure) -> Status:
         """End with a failure: set `failure` with the label of this node, and return FAILURE."""
@@ -167,24 +292,23 @@ class ControlNode(KeyOwner, TreeNode):
 
     def fail_with_reason(self, reason: str, message: str) -> Status:
         """End with a failure of this node, with one of the declared `reasons`, and return FAILURE."""
-        return self.fail(Failure(reason, message, self.keyword, self.path))
+        return self.fail(Failure(reason, message, self.node.keyword, self.path))
 
     def report_choice(self, choice: str, cause: Failure | None = None) -> None:
         """Emit an event with a decision of the node, and with the failure that caused the decision."""
         reason, message = (str(cause), cause.message) if cause else ("", "")
         self.emit(BranchChosen(self.path, choice, reason, message))
 
-    # Methods of the py_trees interface.
-
     def tick(self) -> Iterator[Behaviour]:
         """Continue by one tick, then yield the ticked nodes for visitors of py_trees, children first."""
         visited_nodes: list[Behaviour] = []
 
-        def tick_and_visit(child: Child) -> Status:
-            visited_nodes.extend(child.tick())
-            if child.status is Status.INVALID:
-                raise self._make_status_fault(child)
-            return child.status
+        def tick_and_visit(child: Node) -> Status:
+            behaviour = self.behaviour_by_child[child]
+            visited_nodes.extend(behaviour.tick())
+            if behaviour.status is Status.INVALID:
+                raise self._make_status_fault(behaviour)
+            return behaviour.status
 
         # An attribute of the instance hides the method, so that a tick without visitors has no extra cost.
         self.tick_child = tick_and_visit  # type: ignore[method-assign]
@@ -214,7 +338,7 @@ class ControlNode(KeyOwner, TreeNode):
         """
         was_running = self.status is Status.RUNNING
         try:
-            self.halt_children(self.children)
+            self.halt_children(self.node.children)
         finally:
             self.status = new_status
             if was_running:
@@ -230,10 +354,51 @@ class ControlNode(KeyOwner, TreeNode):
         self.emit(NodeEnded(self.path, status.value, reason=reason, message=message, origin=origin))
 
 
-def _find_nodes(value: object) -> list[Child]:
-    """Return all nodes in the value of a key, which is a node, a list, a section or a constant."""
-    if isinstance(value, KeySection):
-        return [node for key in value.keys.values() for node in _find_nodes(getattr(value, key.attribute))]
-    if isinstance(value, tuple):
-        return [node for item in value for node in _find_nodes(item)]
-    return [value] if isinstance(value, Behaviour) else []
+ENTRY_POINT_GROUP = "executive.control_nodes"
+"""Group of the entry points of control nodes."""
+
+ControlNodes: TypeAlias = Mapping[str, type[ControlNode]]
+"""Classes of control nodes by keyword."""
+
+_KEYWORD_PATTERN = re.compile("[a-z][a-z0-9_]*")
+"""Pattern of keywords: a lower-case identifier."""
+
+
+def load_control_nodes() -> ControlNodes:
+    """Return the class of every installed control node by its keyword.
+
+    Raises:
+        InputError: Two packages register the same keyword, or a class cannot be loaded or is incomplete.
+    """
+    return _load_classes(tuple(list_entries(ENTRY_POINT_GROUP, "control node").values()))
+
+
+@cache
+def _load_classes(entries: tuple[PluginEntry, ...]) -> ControlNodes:
+    node_classes = {entry.name: entry.load() for entry in entries}
+    for entry in entries:
+        if problem := _find_problem(entry.name, node_classes[entry.name]):
+            raise InputError(f'the entry point "{entry.name}" ({entry.value}) {problem}')
+    return node_classes
+
+
+def _find_problem(keyword: str, node_class: object) -> str:
+    """Return an error message if `node_class` cannot be used as a control node, else ""."""
+    if not (isinstance(node_class, type) and issubclass(node_class, ControlNode)):
+        return "is not a ControlNode subclass"
+    class_keyword = node_class.keyword
+    if not _KEYWORD_PATTERN.fullmatch(keyword) or class_keyword != keyword:
+        return f'must have the keyword of its class as its name, in lower case: "{class_keyword}"'
+    if node_class.compute_flow is ControlNode.compute_flow:
+        return "has no method compute_flow"
+    if getattr(node_class, "Behaviour", NodeBehaviour).step is NodeBehaviour.step:
+        return "has no inner class Behaviour with a method step"
+    for key in node_class.keys.values():
+        # The key `as` is reserved for the label of a node.
+        if (
+            key.name == "as"
+            or key.attribute in ControlNode.model_fields
+            or hasattr(ControlNode, key.attribute)
+        ):
+            return f'cannot have the key "{key.name}": the name is reserved'
+    return ""

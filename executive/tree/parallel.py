@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Literal
+from typing import Annotated, Literal
 
 from py_trees.common import Status
+from pydantic import Field
 
 from executive.tree.flow import (
     Flow,
@@ -16,9 +17,8 @@ from executive.tree.flow import (
     find_end_tool_states,
     join_states,
 )
-from executive.tree.inspection import Counterpart, PropagatedFailure
 from executive.tree.keys import Children, key
-from executive.tree.node import ControlNode
+from executive.tree.node import ControlNode, Counterpart, NodeBehaviour, PropagatedFailure
 from executive.tree.tree_node import Failure
 
 MAX_CHILDREN = 200
@@ -50,8 +50,8 @@ class Parallel(ControlNode):
     keyword = "parallel"
     symbol = "⇉"
 
-    wait_for: Literal["all", "any", "lead"] | int = key(
-        default="all", ge=1, max_key="do",
+    wait_for: Literal["all", "any", "lead"] | Annotated[int, Field(ge=1)] = key(
+        default="all", max_key="do",
         doc="Number of children that must succeed: `all`, `any` or a number; `lead`: only the first child.",
     )  # fmt: skip
     halt: bool = key(
@@ -61,11 +61,12 @@ class Parallel(ControlNode):
     do: Children = key(shorthand=True, max_count=MAX_CHILDREN, doc="Nodes to run at the same time.")
 
     @property
-    def _has_lead(self) -> bool:
+    def has_lead(self) -> bool:
+        """True if the first child alone decides the end of the node."""
         return self.wait_for == "lead"
 
     @property
-    def _required_count(self) -> int:
+    def required_count(self) -> int:
         """Number of children that must succeed, if no child is the lead."""
         if isinstance(self.wait_for, int):
             return self.wait_for
@@ -74,64 +75,12 @@ class Parallel(ControlNode):
     @property
     def detail(self) -> str:
         """The number of children that must succeed, and the option `halt`, as a text."""
-        if self._has_lead:
+        if self.has_lead:
             return "wait for the lead"
-        child_count, required_count = len(self.do), self._required_count
+        child_count = len(self.do)
+        required_count = self.required_count
         required = "all" if required_count == child_count else f"{required_count} of {child_count}"
         return f"wait for {required}, halt" if self.halt else f"wait for {required}"
-
-    def start(self) -> None:
-        """Begin with all children."""
-        self._running_children = list(self.do)
-        self._missing_successes = self._required_count
-        self._first_failure: Failure | None = None
-
-    def step(self) -> Status:
-        """Tick every running child."""
-        return self._tick_lead() if self._has_lead else self._tick_all()
-
-    def _tick_lead(self) -> Status:
-        """Tick the lead; if the lead is still running, tick the other running children."""
-        lead, *siblings = self._running_children
-        status = self.tick_child(lead)
-        if status is not Status.RUNNING:
-            self.halt_children(siblings)
-            return status if status is Status.SUCCESS else self.fail(self.get_failure(lead))
-        for child in siblings:
-            status = self.tick_child(child)
-            if status is not Status.RUNNING:
-                self._running_children.remove(child)
-            if status is Status.FAILURE:
-                self.report_choice("go on without this branch", self.get_failure(child))
-        return Status.RUNNING
-
-    def _tick_all(self) -> Status:
-        """Tick all running children, count the children that end, and return the status of the node."""
-        statuses = [(child, self.tick_child(child)) for child in self._running_children]
-        running_children = [child for child, status in statuses if status is Status.RUNNING]
-        failures = [self.get_failure(child) for child, status in statuses if status is Status.FAILURE]
-        self._running_children = running_children
-        self._missing_successes -= len(statuses) - len(running_children) - len(failures)
-        self._first_failure = self._first_failure or next(iter(failures), None)
-        if self._missing_successes <= 0:
-            self.halt_children(running_children)
-            self._report_choices("enough others succeeded", failures)
-            return Status.SUCCESS
-        # The node has failed if the success of all running children is not enough.
-        has_failed = self._missing_successes > len(running_children)
-        if running_children and not (has_failed and self.halt):
-            choice = "let the others finish, then fail" if has_failed else "go on with the others"
-            self._report_choices(choice, failures)
-            return Status.RUNNING
-        self.halt_children(running_children)
-        assert self._first_failure is not None
-        later_failures = [failure for failure in failures if failure is not self._first_failure]
-        self._report_choices(f"fail with {self._first_failure}", later_failures)
-        return self.fail(self._first_failure)
-
-    def _report_choices(self, choice: str, failures: Sequence[Failure]) -> None:
-        for failure in failures:
-            self.report_choice(choice, failure)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the combinations of the possible outcomes of the children, which all start in `state`."""
@@ -139,13 +88,15 @@ class Parallel(ControlNode):
         halted_ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
         halted = join_states(flow.halted for flow in flows)
         halted = halted and halted.with_tool_states(combine_tool_states(state.tool_states, halted_ends))
-        if self._has_lead:
-            lead, others = flows[0], halted_ends[1:]
+        if self.has_lead:
+            lead = flows[0]
+            others = halted_ends[1:]
             failures = {cause: _with_siblings(state, end, others) for cause, end in lead.failures.items()}
             return Flow(lead.success and _with_siblings(state, lead.success, others), failures, halted)
-        failures, can_be_halted = {}, self.halt or self._required_count < len(flows)
+        failures = {}
+        can_be_halted = self.halt or self.required_count < len(flows)
         ends = [find_end_tool_states(flow, state, can_be_halted) for flow in flows]
-        can_fail = len([flow for flow in flows if flow.failures]) > len(flows) - self._required_count
+        can_fail = len([flow for flow in flows if flow.failures]) > len(flows) - self.required_count
         for index, flow in enumerate(flows if can_fail else ()):
             others = [*ends[:index], *ends[index + 1 :]]
             failures |= {cause: _with_siblings(state, end, others) for cause, end in flow.failures.items()}
@@ -155,9 +106,9 @@ class Parallel(ControlNode):
         """Return the state after enough children have succeeded; None if too few children can succeed."""
         successes = [flow.success for flow in flows if flow.success is not None]
         success = join_states(successes)
-        if success is None or len(successes) < self._required_count:
+        if success is None or len(successes) < self.required_count:
             return None
-        if self._required_count < len(flows):
+        if self.required_count < len(flows):
             ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
         else:
             ends = [end.tool_states for end in successes]
@@ -173,11 +124,11 @@ class Parallel(ControlNode):
     @property
     def children_halted_by_sibling(self) -> Children:
         """All children except the lead; empty if no child is the lead."""
-        return self.do[1:] if self._has_lead else ()
+        return self.do[1:] if self.has_lead else ()
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the number of children that must succeed, and the failures of the other children."""
-        if self._has_lead:
+        if self.has_lead:
             return "ends with the status of its first child, the lead"
         child_count = len(self.do)
         counts = {"all": f"all {child_count}", "any": f"one of its {child_count}"}
@@ -189,12 +140,71 @@ class Parallel(ControlNode):
     @property
     def counterpart(self) -> Counterpart | None:
         """`ParallelAll` or `Parallel` of BehaviorTree.CPP; None if no node ends under the same conditions."""
-        child_count, required_count = len(self.do), self._required_count
-        if not self._has_lead and (self.halt or required_count == 1):
+        child_count = len(self.do)
+        required_count = self.required_count
+        if not self.has_lead and (self.halt or required_count == 1):
             failure_count = child_count - required_count + 1
             return Counterpart("Parallel", {"success_count": required_count, "failure_count": failure_count})
-        is_all = not self._has_lead and required_count == child_count
+        is_all = not self.has_lead and required_count == child_count
         return Counterpart("ParallelAll", {"max_failures": 1}) if is_all else None
+
+    class Behaviour(NodeBehaviour):
+        """Runs the node."""
+
+        node: Parallel
+
+        def start(self) -> None:
+            """Begin with all children."""
+            self._running_children = list(self.node.do)
+            self._missing_successes = self.node.required_count
+            self._first_failure: Failure | None = None
+
+        def step(self) -> Status:
+            """Tick every running child."""
+            return self._tick_lead() if self.node.has_lead else self._tick_all()
+
+        def _tick_lead(self) -> Status:
+            """Tick the lead; if the lead is still running, tick the other running children."""
+            lead, *siblings = self._running_children
+            status = self.tick_child(lead)
+            if status is not Status.RUNNING:
+                self.halt_children(siblings)
+                return status if status is Status.SUCCESS else self.fail(self.get_failure(lead))
+            for child in siblings:
+                status = self.tick_child(child)
+                if status is not Status.RUNNING:
+                    self._running_children.remove(child)
+                if status is Status.FAILURE:
+                    self.report_choice("go on without this branch", self.get_failure(child))
+            return Status.RUNNING
+
+        def _tick_all(self) -> Status:
+            """Tick all running children, count the children that end, and return the status of the node."""
+            statuses = [(child, self.tick_child(child)) for child in self._running_children]
+            running_children = [child for child, status in statuses if status is Status.RUNNING]
+            failures = [self.get_failure(child) for child, status in statuses if status is Status.FAILURE]
+            self._running_children = running_children
+            self._missing_successes -= len(statuses) - len(running_children) - len(failures)
+            self._first_failure = self._first_failure or next(iter(failures), None)
+            if self._missing_successes <= 0:
+                self.halt_children(running_children)
+                self._report_choices("enough others succeeded", failures)
+                return Status.SUCCESS
+            # The node has failed if the success of all running children is not enough.
+            has_failed = self._missing_successes > len(running_children)
+            if running_children and not (has_failed and self.node.halt):
+                choice = "let the others finish, then fail" if has_failed else "go on with the others"
+                self._report_choices(choice, failures)
+                return Status.RUNNING
+            self.halt_children(running_children)
+            assert self._first_failure is not None
+            later_failures = [failure for failure in failures if failure is not self._first_failure]
+            self._report_choices(f"fail with {self._first_failure}", later_failures)
+            return self.fail(self._first_failure)
+
+        def _report_choices(self, choice: str, failures: Sequence[Failure]) -> None:
+            for failure in failures:
+                self.report_choice(choice, failure)
 
 
 def _with_siblings(entry: FlowState, end: FlowState, others: Iterable[ToolStates]) -> FlowState:

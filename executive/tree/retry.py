@@ -7,12 +7,11 @@ from collections.abc import Iterator, Mapping
 from math import inf, isfinite
 
 from executive.skill import Seconds
-from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, find_fixed_point, join_states
-from executive.tree.inspection import Advice, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
-from executive.tree.keys import Child, KeySection, Reasons, key
-from executive.tree.loops import GeneratorNode, NodeRun
-from executive.tree.specification import Reason, format_reasons
-from executive.tree.tree_node import Failure
+from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
+from executive.tree.keys import KeySection, Reasons, key
+from executive.tree.loops import GeneratorBehaviour, NodeRun
+from executive.tree.node import Advice, ControlNode, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
+from executive.tree.specification import Child, Node, Reason, format_reasons
 
 _GIVE_UP = "give up: the recovery failed"
 """Choice that a retry reports after a failure of its recovery."""
@@ -38,7 +37,7 @@ class Backoff(KeySection):
             return self.max
 
 
-class Retry(GeneratorNode):
+class Retry(ControlNode):
     """Run the body again after a failure.
 
     Failures that `on` does not list, and the failure of the last attempt, are passed on. Before every further
@@ -51,6 +50,7 @@ class Retry(GeneratorNode):
     """
 
     keyword = "retry"
+    symbol = "↻"
 
     attempts: int = key(ge=1, doc="Maximum number of attempts, including the first.")
     on: Reasons = key(default=(), doc="Failures after which the body runs again; every failure if not given.")
@@ -67,64 +67,43 @@ class Retry(GeneratorNode):
         backoff_text = "" if self.backoff is None else f", backoff {self.backoff}"
         return f"up to {self.attempts} attempts, on {reasons}{backoff_text}"
 
-    def run(self) -> NodeRun:
-        """Run the body until it succeeds or no attempt is left; between attempts, wait and run `recover`."""
-        attempt = 1
-        while True:
-            failure = yield from self.run_child(self.do)
-            if not failure or attempt == self.attempts or (self.on and not failure.matches(self.on)):
-                return failure
-            delay = 0.0 if self.backoff is None else self.backoff.compute_delay(attempt)
-            delay_text = f" in {delay:g} s" if delay else ""
-            attempt += 1
-            self.report_choice(f"attempt {attempt} of {self.attempts}{delay_text}", failure)
-            yield from self.clock.sleep(delay)
-            if self.recover and (recovery_failure := (yield from self.run_child(self.recover))):
-                self.report_choice(_GIVE_UP, recovery_failure)
-                return failure
-            yield from self.end_iteration()
-
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes, by fixed-point iteration over body and recovery."""
 
-        def can_retry(failure: PossibleFailure) -> bool:
-            return not self.on or failure.may_match(self.on)
-
-        def compute_retry_state(body: Flow) -> FlowState | None:
-            failures = body.failures.items() if self.attempts != 1 else ()
-            return join_states(end.with_handled_failure(cause) for cause, end in failures if can_retry(cause))
-
         def compute_recovery_flow(body: Flow) -> Flow:
-            retry_state = compute_retry_state(body)
+            retry_state = body.join_handled(self.on) if self.attempts != 1 else None
             if retry_state is None or self.recover is None:
                 return Flow(retry_state, {}, None)
             return get_flow(self.recover, retry_state)
 
         body, _ = find_fixed_point(get_flow, self.do, state, lambda body: compute_recovery_flow(body).success)
         recovery = compute_recovery_flow(body)
+        failures = body.failures
         state_after_failed_recovery = join_states(recovery.failures.values())
-        failures = {
-            failure: end.join(state_after_failed_recovery or end) if can_retry(failure) else end
-            for failure, end in body.failures.items()
-        }
-        delay_state = compute_retry_state(body) if self.backoff else None
+        if state_after_failed_recovery is not None:
+            failures = {
+                failure: end.join(state_after_failed_recovery)
+                if not self.on or failure.may_match(self.on)
+                else end
+                for failure, end in body.failures.items()
+            }
+        delay_state = body.join_handled(self.on) if self.backoff and self.attempts != 1 else None
         return Flow(body.success, failures, join_states((body.halted, recovery.halted, delay_state)))
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield a warning if nothing changes between the attempts, or if there is only one attempt."""
-        skills = analysis.list_skills().values()
+        skills = analysis.list_skills(self).values()
         may_change = any(skill is None or skill.senses or skill.moves or skill.waits for skill in skills)
         if not self.backoff and skills and not may_change:
             message = "this retry changes nothing between its attempts: no node in it looks, moves or waits"
             hint = "Put a look or a motion into `do` or `recover`, or wait with `backoff`."
             yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
         # A param with the value 1 is no mistake, because the param may have another value in another run.
-        if self.attempts == 1 and analysis.is_written_as_constant("attempts"):
+        if self.attempts == 1 and self.is_written_as_constant("attempts"):
             message = "a retry with 1 attempt never runs its body again"
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
-    @property
-    def unreachable_reason(self) -> str:
+    def explain_unreachable(self) -> str:
         """Reason why the recovery never runs; "" if another finding explains this."""
         # `check_failure_names` reports failures in `on` that the body cannot have.
         if self.on and self.attempts > 1:
@@ -163,7 +142,7 @@ class Retry(GeneratorNode):
         elif attempt == attempts and (not self.on or failure.matches(self.on)):
             yield Advice(f"allow more than {attempts} attempt{'s' if attempts > 1 else ''}")
 
-    def list_contingencies(self) -> Iterator[tuple[str, Child]]:
+    def list_contingencies(self) -> Iterator[tuple[str, Node]]:
         """Yield the key `recover` and the node at this key, if the node has a recovery."""
         if self.recover is not None:
             yield "recover", self.recover
@@ -174,6 +153,32 @@ class Retry(GeneratorNode):
         if self.on or self.recover or self.backoff:
             return None
         return Counterpart("RetryUntilSuccessful", {"num_attempts": "attempts"})
+
+    class Behaviour(GeneratorBehaviour):
+        """Runs the node."""
+
+        node: Retry
+
+        def run(self) -> NodeRun:
+            """Run the body until it succeeds or no attempt is left; in between, wait and run `recover`."""
+            attempt = 1
+            while True:
+                failure = yield from self.run_child(self.node.do)
+                if (
+                    not failure
+                    or attempt == self.node.attempts
+                    or (self.node.on and not failure.matches(self.node.on))
+                ):
+                    return failure
+                delay = 0.0 if self.node.backoff is None else self.node.backoff.compute_delay(attempt)
+                delay_text = f" in {delay:g} s" if delay else ""
+                attempt += 1
+                self.report_choice(f"attempt {attempt} of {self.node.attempts}{delay_text}", failure)
+                yield from self.clock.sleep(delay)
+                if self.node.recover and (recovery_failure := (yield from self.run_child(self.node.recover))):
+                    self.report_choice(_GIVE_UP, recovery_failure)
+                    return failure
+                yield from self.end_iteration()
 
 
 def _format_counts(counts: Mapping[str, int]) -> str:
@@ -187,7 +192,7 @@ class Catch(KeySection):
     do: Child = key(doc="Node to run after one of the failures in `on`.")
 
 
-class TryCatch(GeneratorNode):
+class TryCatch(ControlNode):
     """Run the body, a handler if the body fails, and `finally` at the end.
 
     The node succeeds if the body or the handler succeeds. `finally` runs after success and failure, but not
@@ -211,21 +216,9 @@ class TryCatch(GeneratorNode):
         sibling=True, default=None, doc="Node to run at the end, after success and failure."
     )
 
-    def describe_trigger(self, child: Child) -> str:
+    def describe_trigger(self, child: Node) -> str:
         """Return the failures after which the handler `child` runs, as a text: `on Grasp.missed`."""
         return next((f"on {format_reasons(handler.on)}" for handler in self.catch if handler.do is child), "")
-
-    def run(self) -> NodeRun:
-        """Run the body, then the handler of its failure, then `finally`."""
-        failure = yield from self.run_child(self.do)
-        if failure and (handler := self._find_handler(failure)):
-            self.report_choice("catch", failure)
-            failure = yield from self.run_child(handler)
-        failure_of_finally = (yield from self.run_child(self.finally_)) if self.finally_ else None
-        return failure or failure_of_finally
-
-    def _find_handler(self, failure: Failure) -> Child | None:
-        return next((handler.do for handler in self.catch if failure.matches(handler.on)), None)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes.
@@ -233,7 +226,9 @@ class TryCatch(GeneratorNode):
         Each handler starts after the failures that it catches; `finally` starts after body and handlers.
         """
         body = get_flow(self.do, state)
-        success, halted, failures = body.success, body.halted, dict(body.failures)
+        success = body.success
+        halted = body.halted
+        failures = dict(body.failures)
         earlier_reasons: list[Reason] = []
         for handler in self.catch:
             caught_ends = {
@@ -249,7 +244,8 @@ class TryCatch(GeneratorNode):
                 if failure.must_match(handler.on):
                     failures.pop(failure, None)
             flow = get_flow(handler.do, entry)
-            success, halted = join_states((success, flow.success)), join_states((halted, flow.halted))
+            success = join_states((success, flow.success))
+            halted = join_states((halted, flow.halted))
             failures.update(flow.failures)
         flow = Flow(success, failures, halted)
         return flow if self.finally_ is None else _append_finally(self.finally_, flow, get_flow)
@@ -263,13 +259,13 @@ class TryCatch(GeneratorNode):
             caught = [failure for failure in failures if failure.may_match([reason])]
             if caught and all(failure.must_match(earlier_reasons) for failure in caught):
                 earlier_reason = next(name for name in earlier_reasons if caught[0].must_match([name]))
-                place = analysis.describe_place(earlier_reason, reason)
+                place = earlier_reason.span.describe_place(reason.span.source)
                 message = f"{reason} is caught already, as {earlier_reason} in {place}"
                 yield NodeFinding(reason, "unreachable", message, is_warning=True)
             earlier_reasons.append(reason)
 
     @property
-    def first_child(self) -> Child | None:
+    def first_child(self) -> Node | None:
         """The body."""
         return self.do
 
@@ -288,18 +284,37 @@ class TryCatch(GeneratorNode):
         if failure.child is self.do:
             yield Advice("catch this failure in the try")
 
-    def list_contingencies(self) -> Iterator[tuple[str, Child]]:
+    def list_contingencies(self) -> Iterator[tuple[str, Node]]:
         """Yield the handlers with names such as `catch on Grasp.missed`, then `finally`."""
         for handler in self.catch:
             yield f"catch on {format_reasons(handler.on)}", handler.do
         if self.finally_ is not None:
             yield "finally", self.finally_
 
+    class Behaviour(GeneratorBehaviour):
+        """Runs the node."""
 
-def _append_finally(finally_child: Child, flow: Flow, get_flow: FlowFunction) -> Flow:
+        node: TryCatch
+
+        def run(self) -> NodeRun:
+            """Run the body, then the handler of its failure, then `finally`."""
+            failure = yield from self.run_child(self.node.do)
+            if failure:
+                handler = next((one.do for one in self.node.catch if failure.matches(one.on)), None)
+                if handler is not None:
+                    self.report_choice("catch", failure)
+                    failure = yield from self.run_child(handler)
+            failure_of_finally = (
+                (yield from self.run_child(self.node.finally_)) if self.node.finally_ else None
+            )
+            return failure or failure_of_finally
+
+
+def _append_finally(finally_child: Node, flow: Flow, get_flow: FlowFunction) -> Flow:
     """Return the possible outcomes of a node whose `finally_child` runs after each outcome in `flow`."""
     after_success = get_flow(finally_child, flow.success) if flow.success else Flow(None, {}, None)
-    failures, halted = dict(after_success.failures), join_states((flow.halted, after_success.halted))
+    failures = dict(after_success.failures)
+    halted = join_states((flow.halted, after_success.halted))
     for failure, entry in flow.failures.items():
         after_failure = get_flow(finally_child, entry)
         halted = join_states((halted, after_failure.halted))

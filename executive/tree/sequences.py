@@ -5,36 +5,46 @@ Without memory, and in a guard, every tick runs children again.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import ClassVar
 
+from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.errors import Fault
 from executive.events import Event
 from executive.skill import HOLDING
 from executive.tree.flow import UNKNOWN_STATE, Flow, FlowFunction, FlowState, PossibleFailure, join_states
-from executive.tree.inspection import Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
-from executive.tree.keys import Child, Children, KeyOwner, key
-from executive.tree.node import ControlNode
+from executive.tree.keys import Children, KeyOwner, key
+from executive.tree.node import (
+    ControlNode,
+    Counterpart,
+    NodeAnalysis,
+    NodeBehaviour,
+    NodeFinding,
+    PropagatedFailure,
+)
+from executive.tree.specification import Child, Node
 from executive.tree.tree_node import NodeContext
 
 _COMPARED_ATTRIBUTES = ("node", "status", "reason", "choice", "item", "outputs")
 """Attributes of events by which two runs of a child are compared; the numbers in messages may differ."""
 
 
-class ReactiveNode(ControlNode):
+class ReactiveBehaviour(NodeBehaviour):
     """Base class of the control nodes that run children again in every tick.
 
     If a run of a child takes one tick and has the same result as the previous run, its events are discarded.
     Without this rule, a condition that is checked at every tick would fill the journal with equal events.
     """
 
-    def __init__(self, context: NodeContext, **values: object) -> None:
-        super().__init__(context, **values)
+    def __init__(
+        self, context: NodeContext, node: ControlNode, build_child: Callable[[Node], Behaviour]
+    ) -> None:
+        super().__init__(context, node, build_child)
         self._held_events: list[Event] | None = None
         """Events of the child that `tick_again` ticks; None outside of `tick_again`."""
-        self._last_results: dict[Child, list[tuple[object, ...]]] = {}
+        self._last_results: dict[Node, list[tuple[object, ...]]] = {}
 
     def start(self) -> None:
         """Forget all previous results, so that the first run of each child emits events."""
@@ -47,9 +57,9 @@ class ReactiveNode(ControlNode):
         else:
             self._held_events.append(event)
 
-    def tick_again(self, child: Child) -> Status:
+    def tick_again(self, child: Node) -> Status:
         """Tick a child, and return its status; discard its events if it ends as in its previous run."""
-        if child.status is Status.RUNNING:
+        if self.behaviour_by_child[child].status is Status.RUNNING:
             return self.tick_child(child)
         events = self._held_events = []
         status = Status.RUNNING
@@ -65,7 +75,7 @@ class ReactiveNode(ControlNode):
         return status
 
 
-class OrderedNode(ReactiveNode):
+class OrderedNode(ControlNode):
     """Run the children in order until a child returns another status than `continue_status`.
 
     Without memory, every tick begins with the first child. A child that runs again and ends as before emits
@@ -82,35 +92,6 @@ class OrderedNode(ReactiveNode):
         doc="False to run all children again in every tick, from the first to the running child.",
     )
     do: Children
-
-    def start(self) -> None:
-        """Begin with the first child."""
-        super().start()
-        self._child_index = 0
-
-    def step(self) -> Status:
-        """Tick the children in order until one of them decides the status of the tick."""
-        index = previous_index = self._child_index
-        tick = self.tick_child
-        if not self.memory:
-            index = 0
-            tick = self.tick_again
-        status = tick(self.do[index])
-        if status is Status.RUNNING and index == previous_index:
-            return status
-        while status is self.continue_status and index + 1 < len(self.do):
-            index += 1
-            if index > previous_index:
-                self.on_child_change(index)
-            status = tick(self.do[index])
-        if index < previous_index:
-            self.halt_children([self.do[previous_index]])
-            self.on_child_change(index)
-        self._child_index = index
-        return self.fail(self.get_failure(self.do[index])) if status is Status.FAILURE else status
-
-    def on_child_change(self, index: int) -> None:
-        """Called when the node moves to a later or earlier child; a fallback reports this decision."""
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible outcomes.
@@ -145,7 +126,7 @@ class OrderedNode(ReactiveNode):
         """Return the entry state of the next child; None if the child never ends with `continue_status`."""
         if self.continue_status is Status.SUCCESS:
             return flow.success
-        return join_states(end.with_handled_failure(failure) for failure, end in flow.failures.items())
+        return flow.join_handled()
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield a warning if `memory: false` has no effect, halts a child, or repeats an action."""
@@ -160,11 +141,11 @@ class OrderedNode(ReactiveNode):
         # `blocker` is the first slow child that cannot end with `continue_status` in its first tick; if there
         # is none, the last slow child. Each tick of `blocker` halts a running child after it.
         blocker = next((child for child in slow if not self._may_continue_at_once(child, analysis)), slow[-1])
-        name = analysis.get_name(blocker)
+        name = blocker.path_name
         for child in slow[slow.index(blocker) + 1 :]:
             message = (
-                f"{analysis.get_name(child)} takes time, and so does {name}: without memory, every tick "
-                f"runs {name} again, which halts {analysis.get_name(child)}"
+                f"{child.path_name} takes time, and so does {name}: without memory, every tick "
+                f"runs {name} again, which halts {child.path_name}"
             )
             hint = "Only one child may take time: combine these nodes into one child (a list)."
             yield NodeFinding(child, "two-running", message, hint, is_warning=True)
@@ -175,7 +156,7 @@ class OrderedNode(ReactiveNode):
                 hint = "Put the action before this node, or use a condition."
                 yield NodeFinding(child, "repeated-action", message, hint, is_warning=True)
 
-    def _may_continue_at_once(self, child: Child, analysis: NodeAnalysis) -> bool:
+    def _may_continue_at_once(self, child: Node, analysis: NodeAnalysis) -> bool:
         """Return True if a child may end with `continue_status` in its first tick."""
         flow = analysis.compute_flow(child, UNKNOWN_STATE, is_first_tick=True)
         return self._compute_next_entry(flow) is not None
@@ -185,6 +166,40 @@ class OrderedNode(ReactiveNode):
         """`Sequence` or `Fallback` of BehaviorTree.CPP; without memory, their reactive variants."""
         name = "Sequence" if self.continue_status is Status.SUCCESS else "Fallback"
         return Counterpart(name if self.memory else f"Reactive{name}")
+
+    class Behaviour(ReactiveBehaviour):
+        """Runs the node."""
+
+        node: OrderedNode
+
+        def start(self) -> None:
+            """Begin with the first child."""
+            super().start()
+            self._child_index = 0
+
+        def step(self) -> Status:
+            """Tick the children in order until one of them decides the status of the tick."""
+            index = previous_index = self._child_index
+            tick = self.tick_child
+            if not self.node.memory:
+                index = 0
+                tick = self.tick_again
+            status = tick(self.node.do[index])
+            if status is Status.RUNNING and index == previous_index:
+                return status
+            while status is self.node.continue_status and index + 1 < len(self.node.do):
+                index += 1
+                if index > previous_index:
+                    self.on_child_change(index)
+                status = tick(self.node.do[index])
+            if index < previous_index:
+                self.halt_children([self.node.do[previous_index]])
+                self.on_child_change(index)
+            self._child_index = index
+            return self.fail(self.get_failure(self.node.do[index])) if status is Status.FAILURE else status
+
+        def on_child_change(self, index: int) -> None:
+            """Called when the node moves to a later or earlier child; a fallback reports this decision."""
 
 
 class Sequence(OrderedNode):
@@ -207,7 +222,7 @@ class Sequence(OrderedNode):
     do: Children = key(shorthand=True, doc="Nodes to run, in order.")
 
     @property
-    def first_child(self) -> Child | None:
+    def first_child(self) -> Node | None:
         """The first child, which runs once; None without memory, because each tick runs the child again."""
         return self.do[0] if self.memory else None
 
@@ -232,22 +247,27 @@ class Fallback(OrderedNode):
 
     do: Children = key(shorthand=True, doc="Alternatives, in order.")
 
-    def on_child_change(self, index: int) -> None:
-        """Report the number of the next child, and the failure of the child before it."""
-        if index > 0:
-            failure = self.get_failure(self.do[index - 1])
-            self.report_choice(f"choice {index + 1} of {len(self.do)}", failure)
-
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the cause of a failure: all children failed. The text contains the handled failures."""
         causes = ", ".join(f"{name} ({message})" for name, message in failure.last_messages.items())
         earlier_failures = f"; the earlier ones failed with {causes}" if causes else ""
         return f"all {len(self.do)} choices failed{earlier_failures}"
 
-    def list_contingencies(self) -> Iterator[tuple[str, Child]]:
+    def list_contingencies(self) -> Iterator[tuple[str, Node]]:
         """Yield all children except the first, with the names `choice 2`, `choice 3`, …."""
         for number, child in enumerate(self.do[1:], 2):
             yield f"choice {number}", child
+
+    class Behaviour(OrderedNode.Behaviour):
+        """Runs the node."""
+
+        node: Fallback
+
+        def on_child_change(self, index: int) -> None:
+            """Report the number of the next child, and the failure of the child before it."""
+            if index > 0:
+                failure = self.get_failure(self.node.do[index - 1])
+                self.report_choice(f"choice {index + 1} of {len(self.node.do)}", failure)
 
 
 class ConditionList(KeyOwner):
@@ -257,7 +277,6 @@ class ConditionList(KeyOwner):
     """
 
     is_condition: ClassVar[bool] = True
-    memory = True
 
     do: Children = key(shorthand=True, requires_conditions=True, doc="Conditions, in order.")
 
@@ -284,7 +303,7 @@ class AnyCondition(ConditionList, Fallback):
     symbol = "≥1"
 
 
-class Guard(ReactiveNode):
+class Guard(ControlNode):
     """Run the body while a condition holds; when the condition fails, halt the body and fail with `broken`.
 
     Every tick checks the condition before it ticks the body. If the condition fails at the first tick, the
@@ -297,27 +316,9 @@ class Guard(ReactiveNode):
     keyword = "guard"
     reasons = ("broken",)
     symbol = "◉"
-    counterpart = Counterpart("ReactiveSequence")
 
     holds: Child = key(requires_conditions=True, doc="Condition that must succeed at every tick.")
     do: Child = key(doc="Body.")
-
-    def step(self) -> Status:
-        """Check the condition, then tick the body.
-
-        Raises:
-            Fault: The condition returned RUNNING.
-        """
-        status = self.tick_again(self.holds)
-        if status is Status.RUNNING:
-            message = "is a condition, but returned RUNNING; a condition must succeed or fail in one tick"
-            raise Fault(f"{self.holds.name} {message}", self.path)
-        if status is Status.FAILURE:
-            self.halt_children([self.do])
-            cause = self.get_failure(self.holds)
-            return self.fail_with_reason("broken", f"{cause}: {cause.message}")
-        status = self.tick_child(self.do)
-        return self.fail(self.get_failure(self.do)) if status is Status.FAILURE else status
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the outcomes of the body, and `broken` in all states in which a check may fail."""
@@ -337,7 +338,7 @@ class Guard(ReactiveNode):
         body = analysis.get_flow(self.do)
         if condition is None:
             return
-        name = analysis.get_name(self.holds)
+        name = self.holds.path_name
         if body is None:
             message = f"{name} cannot succeed here, so the body of this guard never runs"
             yield NodeFinding(self.holds, "never-holds", message)
@@ -345,7 +346,7 @@ class Guard(ReactiveNode):
             message = f"{name} cannot fail here, so this guard never stops its body"
             yield NodeFinding(self.holds, "useless-guard", message, is_warning=True)
         elif body.halted is None:
-            message = f"this guard cannot stop its body: {analysis.get_name(self.do)} ends in its first tick"
+            message = f"this guard cannot stop its body: {self.do.path_name} ends in its first tick"
             hint = "Use a sequence (a list) of the condition and the body instead of a guard."
             yield NodeFinding(self.do, "useless-guard", message, hint, is_warning=True)
         elif body.success and self._fails_after_release(analysis, body.success):
@@ -365,3 +366,30 @@ class Guard(ReactiveNode):
     def explain(self, failure: PropagatedFailure) -> str:
         """Return why the guard passed on a failure of its body."""
         return "handles no failures of its body"
+
+    @property
+    def counterpart(self) -> Counterpart | None:
+        """`ReactiveSequence` of BehaviorTree.CPP."""
+        return Counterpart("ReactiveSequence")
+
+    class Behaviour(ReactiveBehaviour):
+        """Runs the node."""
+
+        node: Guard
+
+        def step(self) -> Status:
+            """Check the condition, then tick the body.
+
+            Raises:
+                Fault: The condition returned RUNNING.
+            """
+            status = self.tick_again(self.node.holds)
+            if status is Status.RUNNING:
+                message = "is a condition, but returned RUNNING; a condition must succeed or fail in one tick"
+                raise Fault(f"{self.behaviour_by_child[self.node.holds].name} {message}", self.path)
+            if status is Status.FAILURE:
+                self.halt_children([self.node.do])
+                cause = self.get_failure(self.node.holds)
+                return self.fail_with_reason("broken", f"{cause}: {cause.message}")
+            status = self.tick_child(self.node.do)
+            return self.fail(self.get_failure(self.node.do)) if status is Status.FAILURE else status

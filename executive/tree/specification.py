@@ -1,12 +1,17 @@
-"""Specification of the nodes of a mission: positions in the text, values, and names of failures."""
+"""Specifications of nodes: what a mission writes, with positions in the text.
+
+Control nodes, which declare their keys, are in `executive.tree.node`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Annotated, TypeVar
 
-from pydantic import JsonValue
+from pydantic import BaseModel, ConfigDict, JsonValue, SkipValidation, WithJsonSchema
+from pydantic_core import core_schema
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +60,10 @@ class Span:
         return f"line {self.line}" if self.source is source else f"{self.source.path}:{self.line}"
 
 
+NOWHERE = Source("", "").make_span()
+"""Position of a value that no text contains."""
+
+
 @dataclass(frozen=True)
 class Reason:
     """Reason of a failure with its source, written in a mission as `Grasp.missed`.
@@ -62,13 +71,20 @@ class Reason:
     Attributes:
         source: Name of a skill, keyword of a control node, or label of a node.
         reason: Reason as the source declares it, for instance `missed`.
+        span: Position below `on` or `until`; equal reasons may have different positions.
     """
 
     source: str
     reason: str
+    span: Span = field(default=NOWHERE, compare=False, kw_only=True)
 
     def __str__(self) -> str:
         return f"{self.source}.{self.reason}"
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, *_: object) -> dict[str, JsonValue]:
+        """Return the reference to the definition in the schema of missions."""
+        return {"definition": "reason"}
 
 
 def format_reasons(reasons: Iterable[object]) -> str:
@@ -77,7 +93,7 @@ def format_reasons(reasons: Iterable[object]) -> str:
 
 
 @dataclass(frozen=True)
-class Literal:
+class Constant:
     """A constant value.
 
     Attributes:
@@ -132,15 +148,44 @@ class InvalidValue:
     span: Span
 
 
-Value = Literal | Reference | InvalidValue
+Value = Constant | Reference | InvalidValue
 
 
 @dataclass(frozen=True)
 class LocatedName:
-    """A name and its position: a bin in a route, the path of a library, the variable of a loop."""
+    """A name and its position: a bin in a route, or the path of a library."""
 
     name: str
     span: Span
+
+
+class VariableName(str):
+    """Name of a variable of the mission.
+
+    Attributes:
+        field: Name of a field of the value; "" for the whole value.
+        span: Position of the name.
+    """
+
+    field: str
+    span: Span
+
+    def __new__(cls, name: str, field: str = "", span: Span = NOWHERE) -> VariableName:
+        """Return the name of a variable or of a field of its value."""
+        variable = super().__new__(cls, name)
+        variable.field = field
+        variable.span = span
+        return variable
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, *_: object) -> core_schema.CoreSchema:
+        """Return a schema that accepts every value."""
+        return core_schema.any_schema()
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, *_: object) -> dict[str, JsonValue]:
+        """Return the reference to the definition in the schema of missions."""
+        return {"definition": "variable"}
 
 
 @dataclass(frozen=True)
@@ -151,8 +196,140 @@ class Setting:
     value: Value
 
 
-@dataclass(frozen=True)
-class LocatedReason(Reason):
-    """`Skill.reason` or `label.reason` below `on` or `until`, with its position."""
+SpecificationT = TypeVar("SpecificationT", bound="Specification")
+"""Class of a specification."""
 
-    span: Span
+
+class Specification(BaseModel):
+    """Base class of the specifications of nodes and of the sections below their keys.
+
+    Two specifications are equal only if they are the same object. No attribute changes after construction.
+
+    Attributes:
+        span: Position in the file: of the name of the skill or subtree, of the keyword, or of the list or
+            section if there is no keyword.
+    """
+
+    # Schemas are built on first use, because a check needs none of a whole node.
+    model_config = ConfigDict(arbitrary_types_allowed=True, defer_build=True, extra="forbid")
+
+    span: Span = NOWHERE
+
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    def replace(self: SpecificationT, **values: object) -> SpecificationT:
+        """Return a copy with other values of some attributes."""
+        copy = self.model_copy(update=values)
+        for name in _CACHED_ATTRIBUTES:
+            copy.__dict__.pop(name, None)
+        return copy
+
+
+_CACHED_ATTRIBUTES = ("children", "_nodes")
+"""Attributes of nodes that are computed from other attributes."""
+
+
+class Node(Specification):
+    """Base class of the specifications of nodes: what a mission writes, and what checks and diagnosis read.
+
+    Attributes:
+        label: Value of `as:`, or "".
+        label_span: Position of the label in the file, or None.
+        path: Path from the root of the expanded tree; "" before expansion. The path is unique, except that a
+            subtree without label and its body have the same path if the body is a list.
+        is_list: True for a sequence that is written as a list, without keyword.
+    """
+
+    label: str = ""
+    label_span: Span | None = None
+    path: str = ""
+    is_list: bool = False
+
+    @property
+    def children(self) -> Sequence[Node]:
+        """The children of the node, in the order of the keys that its class declares."""
+        return ()
+
+    @property
+    def type_name(self) -> str:
+        """Name of the skill or subtree, keyword of the control node, or "unknown"."""
+        return "unknown"
+
+    @property
+    def path_name(self) -> str:
+        """Name of the node in paths: its label, otherwise its skill, subtree or keyword."""
+        return self.label or self.type_name
+
+    def walk(self) -> Sequence[Node]:
+        """Return this node and every node below it, parents before children."""
+        return self._nodes
+
+    @cached_property
+    def _nodes(self) -> Sequence[Node]:
+        nodes = [self]
+        for child in self.children:
+            nodes.extend(child.walk())
+        return nodes
+
+
+class SkillNode(Node):
+    """A node that runs a skill.
+
+    Attributes:
+        skill: Name of the skill.
+        settings: Values of params and ports in the mission, by name.
+        variables_by_port: Variables of ports without a setting; by default, a variable has the port's name.
+    """
+
+    skill: str
+    settings: Mapping[str, Setting]
+    variables_by_port: Mapping[str, str] = {}
+
+    @property
+    def type_name(self) -> str:
+        """Name of the skill."""
+        return self.skill
+
+
+class InvalidNode(Node):
+    """Placeholder for a node with an error that a finding reports; `parts` are the valid nodes below it."""
+
+    parts: tuple[Node, ...] = ()
+
+    @property
+    def children(self) -> Sequence[Node]:
+        """The nodes in `parts`."""
+        return self.parts
+
+
+class SubtreeNode(Node):
+    """A use of a subtree.
+
+    Attributes:
+        name: Name of the subtree.
+        arguments: Values of the arguments, by name.
+        returns: Variables of the caller, by the name of the returned variable in the subtree.
+        written_variables: Variables of the caller that the subtree writes; () before expansion.
+        body: Expanded subtree; None before expansion.
+    """
+
+    name: str
+    arguments: Mapping[str, Setting]
+    returns: Mapping[str, Setting] = {}
+    written_variables: tuple[str, ...] = ()
+    body: Node | None = None
+
+    @property
+    def type_name(self) -> str:
+        """Name of the subtree."""
+        return self.name
+
+    @property
+    def children(self) -> Sequence[Node]:
+        """The body as the only child; no children before expansion."""
+        return () if self.body is None else (self.body,)
+
+
+Child = Annotated[SkipValidation[Node], WithJsonSchema({"definition": "node"})]
+"""Type of a key with one node."""

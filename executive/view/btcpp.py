@@ -11,17 +11,24 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
-from typing import cast
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from executive.mission import nodes
-from executive.mission.instance import make_inspection_instance
 from executive.mission.mission_file import Mission, Subtree
 from executive.mission.ports import find_written_variables
 from executive.skill import Direction, Param, Port, Skill
-from executive.tree.keys import Key, KeyKind
-from executive.tree.node_registry import load_control_nodes
-from executive.tree.specification import Literal, LocatedName, Reason, Reference, Value
+from executive.tree.keys import Children, Key, KeyOwner, KeySection, KeyValue, Part, map_parts
+from executive.tree.node import ControlNode, load_control_nodes
+from executive.tree.specification import (
+    Child,
+    Constant,
+    Node,
+    Reason,
+    Reference,
+    SkillNode,
+    SubtreeNode,
+    Value,
+    VariableName,
+)
 from executive.view.text import replace_invalid_xml_characters
 
 _REGISTERED_NAMES = frozenset(Path(__file__).with_name("btcpp_names.txt").read_text("utf-8").split())
@@ -70,21 +77,21 @@ class _Exporter:
         SubElement(root, "TreeNodesModel").extend(models)
         return root
 
-    def _add_tree(self, root: Element, tree_id: str, doc: str, body: nodes.Node) -> None:
+    def _add_tree(self, root: Element, tree_id: str, doc: str, body: Node) -> None:
         self._add_node(SubElement(root, "BehaviorTree", ID=tree_id, _description=doc), body)
 
-    def _add_node(self, parent: Element, node: nodes.Node) -> None:
+    def _add_node(self, parent: Element, node: Node) -> None:
         match node:
-            case nodes.SkillNode():
+            case SkillNode():
                 element = self._add_skill(parent, node)
-            case nodes.SubtreeNode():
+            case SubtreeNode():
                 element = self._add_subtree_reference(parent, node)
-            case nodes.InnerNode():
+            case ControlNode():
                 element = self._add_control_node(parent, node)
         if node.label:
             element.set("name", node.label)
 
-    def _add_skill(self, parent: Element, node: nodes.SkillNode) -> Element:
+    def _add_skill(self, parent: Element, node: SkillNode) -> Element:
         skill = self._skills[node.skill]
         values = {name: _format_pointer(name) for name in skill.ports}
         values |= {name: _format(setting.value) for name, setting in node.settings.items()}
@@ -92,7 +99,7 @@ class _Exporter:
         declarations: tuple[_Declaration, ...] = (*skill.params.values(), *skill.ports.values())
         return self._add_element(parent, kind, node.skill, declarations, values)
 
-    def _add_subtree_reference(self, parent: Element, node: nodes.SubtreeNode) -> Element:
+    def _add_subtree_reference(self, parent: Element, node: SubtreeNode) -> Element:
         subtree = self._mission.subtrees[node.name]
         ports = []
         values = {}
@@ -114,45 +121,45 @@ class _Exporter:
         element.set("_autoremap", "true")
         return element
 
-    def _find_written_variables(self, body: nodes.Node) -> set[str]:
+    def _find_written_variables(self, body: Node) -> set[str]:
         """Return the variables that a body and the subtrees in the body may write."""
         names = find_written_variables(body, self._skills)
         for use in body.walk():
-            if isinstance(use, nodes.SubtreeNode):
+            if isinstance(use, SubtreeNode):
                 names |= self._find_written_variables(self._mission.subtrees[use.name].body)
                 names |= {getattr(setting.value, "name", "") for setting in use.returns.values()}
         return names
 
-    def _add_control_node(self, parent: Element, node: nodes.InnerNode) -> Element:
-        counterpart = make_inspection_instance(node).counterpart
+    def _add_control_node(self, parent: Element, node: ControlNode) -> Element:
+        counterpart = node.counterpart
         # A value that refers to an argument is unknown here, and must be passed as a port.
-        unknown_keys = {name for name, value in node.values.items() if isinstance(value, Reference)}
+        unknown_keys = {name for name, value in node.settings.items() if isinstance(value, Reference)}
         if counterpart is None or unknown_keys - {*counterpart.ports.values()}:
-            return self._add_custom_node(parent, node.declaring_class.keyword, node)
+            return self._add_custom_node(parent, node.keyword, node)
         element = SubElement(parent, counterpart.name)
         for port, value in counterpart.ports.items():
-            element.set(port, _format(node.values[value]) if isinstance(value, str) else str(value))
+            element.set(port, _format(node.settings[value]) if isinstance(value, str) else str(value))
         for child in node.children:
             self._add_node(element, child)
         return element
 
-    def _add_custom_node(self, parent: Element, name: str, part: nodes.KeyedValues) -> Element:
+    def _add_custom_node(self, parent: Element, name: str, part: KeyOwner) -> Element:
         """Add a custom node for `part`, which is a control node, or a section that contains nodes."""
-        keys = part.declaring_class.keys.values()
-        ports = [key for key in keys if not _has_nodes(key)]
-        values = {key.name: _format(value) for key, value in part.iterate_keys() if key in ports}
-        kinds = [(key.kind, key.is_required) for key in keys if _has_nodes(key)]
-        kind = "Decorator" if kinds == [(KeyKind.NODE, True)] else "Control"
+        keys = part.keys.values()
+        ports = [key for key in keys if not key.has_nodes]
+        values = {key.name: _format(value) for key, value in part.list_values() if key in ports}
+        kinds = [(key.value_type, key.is_required) for key in keys if key.has_nodes]
+        kind = "Decorator" if kinds == [(Child, True)] else "Control"
         element = self._add_element(parent, kind, name, ports, values)
-        for key, value in part.iterate_keys():
+        for key, value in part.list_values():
             key_element = element
-            if key.kind in (KeyKind.NODE, KeyKind.NODES) and key.name != "do":
-                kind = "Decorator" if key.kind is KeyKind.NODE else "Control"
+            if key.value_type in (Child, Children) and key.name != "do":
+                kind = "Decorator" if key.value_type == Child else "Control"
                 key_element = self._add_element(element, kind, f"{name}-{key.name}", (), {})
             for child in value if isinstance(value, tuple) else (value,):
-                if isinstance(child, nodes.Node):
+                if isinstance(child, Node):
                     self._add_node(key_element, child)
-                elif isinstance(child, nodes.NodeSection) and _has_nodes(key):
+                elif isinstance(child, KeySection) and key.has_nodes:
                     self._add_custom_node(element, f"{name}-{key.name}", child)
         return element
 
@@ -170,24 +177,30 @@ class _Exporter:
         return element
 
 
-def _replace_params(part: nodes.PartT, values: Mapping[str, Value]) -> nodes.PartT:
-    """Return a part of a mission with the values of params in place of references to the params."""
-    if isinstance(part, Reference):
-        return cast("nodes.PartT", values.get(part.name, part))
-    return nodes.map_parts(part, lambda inner_part: _replace_params(inner_part, values))
+def _replace_params(node: Node, values: Mapping[str, Value]) -> Node:
+    """Return a node with the values of params in place of references to the params."""
+
+    def replace(part: Part) -> object:
+        if isinstance(part, Node):
+            return _replace_params(part, values)
+        return values.get(part.name, part) if isinstance(part, Reference) else part
+
+    return map_parts(node, replace)
 
 
-def _format(value: nodes.KeyValue) -> str:
+def _format(value: KeyValue) -> str:
     """Return a value as the text of a port: a constant, a list, or a pointer to a variable."""
     match value:
-        case Literal(value=constant):
+        case Constant(value=constant):
             return _format_constant(constant)
         case Reference(name=name, field=field) if field:
             return _format_pointer(f"{name}.{field}")
-        case Reference(name=name) | LocatedName(name=name):
+        case Reference(name=name):
             return _format_pointer(name)
-        case nodes.NodeSection() as section:
-            return ",".join(f"{key.name}={_format(one)}" for key, one in section.iterate_keys())
+        case VariableName():
+            return _format_pointer(value)
+        case KeySection() as section:
+            return ",".join(f"{key.name}={_format(one)}" for key, one in section.list_values())
         case tuple() as items:
             return ";".join(str(one) if isinstance(one, Reason) else _format(one) for one in items)
     raise TypeError(f"{value} cannot be written as the value of a port")
@@ -196,22 +209,19 @@ def _format(value: nodes.KeyValue) -> str:
 def _make_port_model(port: _Declaration) -> Element:
     if isinstance(port, Key):
         value_type = port.value_type
-        is_output = port.kind is KeyKind.VARIABLE
+        default = None if port.is_required else port.field.default
+        doc = port.field.description
+        is_output = port.value_type is VariableName
     else:
         value_type = port.type
+        default = port.default
+        doc = port.doc
         is_output = getattr(port, "direction", None) is Direction.OUT
     model = Element("output_port" if is_output else "input_port", name=_escape(port.name))
-    attributes = {"type": _TYPE_NAMES.get(value_type), "default": _format_constant(port.default)}
+    attributes = {"type": _TYPE_NAMES.get(value_type), "default": _format_constant(default)}
     model.attrib |= {name: text for name, text in attributes.items() if text}
-    model.text = port.doc
+    model.text = doc
     return model
-
-
-def _has_nodes(key: Key) -> bool:
-    """Return True if the value of a key contains nodes."""
-    if key.kind in (KeyKind.SECTION, KeyKind.SECTIONS):
-        return any(map(_has_nodes, key.section.keys.values()))
-    return key.kind in (KeyKind.NODE, KeyKind.NODES)
 
 
 def _escape(name: str) -> str:

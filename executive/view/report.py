@@ -21,8 +21,8 @@ import yaml
 from markupsafe import Markup
 
 from executive.errors import ExecutiveError
-from executive.mission.file_search import get_shipped_folder
 from executive.mission.outline import OutlineNode
+from executive.mission.yaml_files import get_shipped_folder
 from executive.perception.evidence import describe_unknown_labels
 from executive.record.diagnosis import list_labelled_sentences, make_resume_command
 from executive.record.journal import find_run_end, find_run_start, read_journal

@@ -31,9 +31,9 @@ from executive.skill import Skill
 from executive.tree.decorators import Timeout
 from executive.tree.retry import Retry
 from executive.tree.sequences import Sequence as SequenceNode
-from executive.tree.skill_leaf import SkillLeaf, Wiring
-from executive.tree.tree_node import Blackboard, NodeContext
+from executive.tree.tree_node import Blackboard, NodeContext, SkillLeaf, Wiring
 from tests.benchmarks.report import Figures, run_command
+from tests.node_behaviours import build
 
 SIZES = (10, 100, 1000)
 """Numbers of nodes of the measured trees, control nodes and leaves together."""
@@ -111,9 +111,9 @@ def build_ours(nodes: int, last_skill: type[Skill], *observers: Observer) -> Beh
 
     skills = [*[_SucceedAtOnce] * (nodes - 4), last_skill]
     leaves = [SkillLeaf(make_site(skill.__name__), "leaf", skill, Wiring(), cell) for skill in skills]
-    body = SequenceNode(make_site("do"), do=leaves)
-    timeout = Timeout(make_site("timeout"), seconds=TIMEOUT, do=body)
-    return Retry(make_site("retry"), attempts=3, do=timeout)
+    body = build(make_site("do"), SequenceNode, do=leaves)
+    timeout = build(make_site("timeout"), Timeout, seconds=TIMEOUT, do=body)
+    return build(make_site("retry"), Retry, attempts=3, do=timeout)
 
 
 def build_bare(nodes: int, last_status: Status) -> Behaviour:

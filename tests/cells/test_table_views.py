@@ -11,7 +11,7 @@ from executive.cells.fake import FakeCell
 from executive.cells.sim.cell import SimCell
 from executive.cells.table_views import find_view_errors
 from executive.mission.cell_file import load_cell, read_cell
-from executive.mission.file_search import get_shipped_folder
+from executive.mission.yaml_files import get_shipped_folder
 
 CELLS = get_shipped_folder() / "cells"
 TRANSFORM = "{rotation: [2.2214, -2.2214, 0], translation: [0, 0.5, 1.2]}"

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
-from executive.mission.file_search import list_shipped_missions
+from executive.mission.yaml_files import list_shipped_missions
 from executive.plugins import load_skills
 
 MISSION = """\

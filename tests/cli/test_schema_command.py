@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from executive.cli.main import main
 from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
 from executive.plugins import load_skills
-from executive.tree.node_registry import load_control_nodes
+from executive.tree.node import load_control_nodes
 
 
 @pytest.mark.parametrize(

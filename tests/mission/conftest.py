@@ -15,7 +15,7 @@ from executive.cells.sim.kind import SimCellChecks
 from executive.mission import cell_file
 from executive.mission.load import LoadedMission, load_mission
 from executive.skill import In, Metres, Out, Skill, param, port
-from executive.tree.node_registry import load_control_nodes
+from executive.tree.node import load_control_nodes
 
 
 class Look(Skill):

@@ -12,11 +12,10 @@ import pytest
 from executive.cell.config import CellConfig
 from executive.cells.fake import FakeCell
 from executive.errors import InputError
-from executive.mission import nodes
-from executive.mission.file_search import find_mission, get_shipped_folder
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
-from executive.tree.specification import Reference
+from executive.mission.yaml_files import find_mission, get_shipped_folder
+from executive.tree.specification import Reference, SkillNode
 
 Load = Callable[..., LoadedMission]
 
@@ -24,9 +23,9 @@ HEAD = "mission: m\ncell: cells/small.yaml\n"
 PARAMS = HEAD + "params: {tries: 2, high: 0.2, name: a, wide: true, kinds: [cube]}\ntree: Look\n"
 
 
-def skill(loaded: LoadedMission, name: str) -> nodes.SkillNode:
+def skill(loaded: LoadedMission, name: str) -> SkillNode:
     walked = loaded.tree.walk()
-    return next(node for node in walked if isinstance(node, nodes.SkillNode) and node.skill == name)
+    return next(node for node in walked if isinstance(node, SkillNode) and node.skill == name)
 
 
 def test_overrides_take_the_type_of_the_default(load: Load) -> None:

@@ -11,12 +11,11 @@ import pytest
 from jsonschema import Draft7Validator
 from referencing import Registry
 
-from executive.mission.file_search import get_shipped_folder
 from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
-from executive.mission.yaml_text import parse_yaml
+from executive.mission.yaml_files import get_shipped_folder, parse_yaml
 from executive.plugins import load_skills
 from executive.skill import Skill
-from executive.tree.node_registry import load_control_nodes
+from executive.tree.node import load_control_nodes
 from executive.tree.specification import Source
 
 MISSIONS = get_shipped_folder()

@@ -9,9 +9,9 @@ import pytest
 
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
-from executive.mission.nodes import SkillNode
 from executive.mission.ports import find_control_node_outputs, find_wires
 from executive.skill import Direction, Skill
+from executive.tree.specification import SkillNode
 
 Load = Callable[..., LoadedMission]
 
@@ -84,7 +84,7 @@ def test_a_loop_in_a_closed_subtree_has_a_variable_of_its_own(load: Load) -> Non
         "    returns: [held]\n"
         "    do: [Look, {for_each: {each: kind, in: [cube], do: {Pick: {only: $kind}}}}]\n"
     )
-    names = [variable.name for node in loaded.tree.walk() for _, variable in find_control_node_outputs(node)]
+    names = [variable for node in loaded.tree.walk() for _, variable in find_control_node_outputs(node)]
     assert names == ["get.kind"]
 
 

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from math import inf
 from typing import Any
 
 from hand_set_clock import Clock
-from py_trees.behaviour import Behaviour
 
 from executive.events import Emit, discard_event
 from executive.tree.decorators import Invert, Succeed, Timeout
-from executive.tree.keys import VariableName
 from executive.tree.loops import CounterLimits, ForEach, Repeat, While
 from executive.tree.parallel import Parallel
 from executive.tree.retry import Backoff, Catch, Retry, TryCatch
 from executive.tree.sequences import Fallback
 from executive.tree.sequences import Sequence as SequenceNode
-from executive.tree.specification import Reason
+from executive.tree.specification import Reason, VariableName
 from executive.tree.tree_node import Blackboard, NodeContext
+from tests.node_behaviours import build, specify
 
 Names = Iterable[tuple[str, str]]
 
@@ -35,22 +34,20 @@ def names_of(pairs: Names) -> tuple[Reason, ...]:
     return tuple(Reason(*pair) for pair in pairs)
 
 
-def sequence(site: NodeContext, children: Sequence[Behaviour]) -> SequenceNode:
-    return SequenceNode(site, do=children)
+def sequence(site: NodeContext, children: Any) -> Any:
+    return build(site, SequenceNode, do=children)
 
 
-def fallback(site: NodeContext, children: Sequence[Behaviour]) -> Fallback:
-    return Fallback(site, do=children)
+def fallback(site: NodeContext, children: Any) -> Any:
+    return build(site, Fallback, do=children)
 
 
-def parallel(
-    site: NodeContext, children: Sequence[Behaviour], wait_for: Any = None, halt: bool = False
-) -> Parallel:
-    return Parallel(site, do=children, wait_for="all" if wait_for is None else wait_for, halt=halt)
+def parallel(site: NodeContext, children: Any, wait_for: Any = "all", halt: bool = False) -> Any:
+    return build(site, Parallel, do=children, wait_for=wait_for, halt=halt)
 
 
-def lead(site: NodeContext, children: Sequence[Behaviour]) -> Parallel:
-    return Parallel(site, do=children, wait_for="lead")
+def lead(site: NodeContext, children: Any) -> Any:
+    return build(site, Parallel, do=children, wait_for="lead")
 
 
 def make_backoff(first: float, factor: float = 1.0, max: float = inf) -> Backoff:
@@ -59,50 +56,46 @@ def make_backoff(first: float, factor: float = 1.0, max: float = inf) -> Backoff
 
 def retry(
     site: NodeContext,
-    body: Behaviour,
+    body: Any,
     attempts: int,
     on: Names = (),
-    recover: Behaviour | None = None,
-    backoff: Backoff | None = None,
+    recover: Any = None,
+    backoff: Any = None,
     clock: Any = None,
-) -> Retry:
+) -> Any:
     site = replace(site, clock=clock or site.clock)
-    return Retry(site, attempts=attempts, on=names_of(on), recover=recover, backoff=backoff, do=body)
+    return build(site, Retry, attempts=attempts, on=names_of(on), recover=recover, backoff=backoff, do=body)
 
 
-def repeat(
-    site: NodeContext, body: Behaviour, times: int | None = None, until: Names = (), **limits: float
-) -> Repeat:
+def repeat(site: NodeContext, body: Any, times: int | None = None, until: Names = (), **limits: float) -> Any:
     ends = (*names_of(until), *((CounterLimits(**limits),) if limits else ()))
-    return Repeat(site, times=times, until=ends, do=body)
+    return build(site, Repeat, times=times, until=ends, do=body)
 
 
-def while_loop(site: NodeContext, condition: Behaviour, body: Behaviour) -> While:
-    return While(site, condition=condition, do=body)
+def while_loop(site: NodeContext, condition: Any, body: Any) -> Any:
+    return build(site, While, condition=condition, do=body)
 
 
-def for_each(site: NodeContext, body: Behaviour, blackboard: Blackboard, each: str, source: Any) -> ForEach:
+def for_each(site: NodeContext, body: Any, blackboard: Blackboard, each: str, source: Any) -> Any:
     elements = VariableName(source) if isinstance(source, str) else tuple(source)
-    return ForEach(replace(site, blackboard=blackboard), each=VariableName(each), in_=elements, do=body)
+    site = replace(site, blackboard=blackboard)
+    return build(site, ForEach, each=VariableName(each), in_=elements, do=body)
 
 
 def try_catch(
-    site: NodeContext,
-    body: Behaviour,
-    handlers: Iterable[tuple[Names, Behaviour]] = (),
-    last: Behaviour | None = None,
-) -> TryCatch:
-    catch = tuple(Catch(on=names_of(names), do=do) for names, do in handlers)
-    return TryCatch(site, do=body, catch=catch, finally_=last)
+    site: NodeContext, body: Any, handlers: Iterable[tuple[Names, Any]] = (), last: Any = None
+) -> Any:
+    catch = tuple(Catch(on=names_of(names), do=specify(do)) for names, do in handlers)
+    return build(site, TryCatch, do=body, catch=catch, finally_=last)
 
 
-def timeout(site: NodeContext, body: Behaviour, seconds: float, clock: Any) -> Timeout:
-    return Timeout(replace(site, clock=clock), seconds=seconds, do=body)
+def timeout(site: NodeContext, body: Any, seconds: float, clock: Any) -> Any:
+    return build(replace(site, clock=clock), Timeout, seconds=seconds, do=body)
 
 
-def invert(site: NodeContext, body: Behaviour) -> Invert:
-    return Invert(site, do=body)
+def invert(site: NodeContext, body: Any) -> Any:
+    return build(site, Invert, do=body)
 
 
-def succeed(site: NodeContext, body: Behaviour | None = None) -> Succeed:
-    return Succeed(site, do=body)
+def succeed(site: NodeContext, body: Any = None) -> Any:
+    return build(site, Succeed, do=body)

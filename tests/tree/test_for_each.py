@@ -14,8 +14,7 @@ from executive.errors import Fault
 from executive.events import BranchChosen
 from executive.skill import In, Skill, port
 from executive.tree.loops import ForEach
-from executive.tree.skill_leaf import SkillLeaf, Wiring
-from executive.tree.tree_node import Blackboard, halt
+from executive.tree.tree_node import Blackboard, SkillLeaf, Wiring, halt
 
 
 class Use(Skill):

@@ -12,10 +12,11 @@ from executive.events import NodeEnded, NodeStarted
 from executive.testing.run_mission import make_substitute, run_mission
 from executive.tree.sequences import Guard
 from skills.conditions import HasElapsed
+from tests.node_behaviours import build
 
 
-def make_guard(site: Any, holds: Any, do: Any) -> Guard:
-    return Guard(site("guard"), holds=holds, do=do)
+def make_guard(site: Any, holds: Any, do: Any) -> Any:
+    return build(site("guard"), Guard, holds=holds, do=do)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +64,7 @@ def test_only_the_first_check_and_a_changed_check_are_events(
 
 
 def test_a_guard_in_a_guard_keeps_its_events_to_itself(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
-    inner = Guard(site("in"), holds=sequence(site("in/holds"), [leaf("C")]), do=leaf("B", "R R R S"))
+    inner = build(site("in"), Guard, holds=sequence(site("in/holds"), [leaf("C")]), do=leaf("B", "R R R S"))
     ticks(make_guard(site, sequence(site("guard/holds"), [leaf("D")]), inner))
     starts = [event.node for event in events if isinstance(event, NodeStarted)]
     assert starts == ["guard", "guard/holds", "in", "in/holds"]

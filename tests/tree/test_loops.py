@@ -13,10 +13,13 @@ from py_trees.common import Status
 
 from executive.errors import Fault
 from executive.events import BranchChosen, NodeEnded
-from executive.tree.keys import Child, key
-from executive.tree.loops import GeneratorNode, NodeRun
+from executive.tree.keys import key
+from executive.tree.loops import GeneratorBehaviour, NodeRun
+from executive.tree.node import ControlNode
 from executive.tree.retry import Backoff, Retry
+from executive.tree.specification import Child
 from executive.tree.tree_node import NodeContext
+from tests.node_behaviours import build
 
 
 def test_a_failed_condition_is_a_success_with_a_report(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
@@ -29,17 +32,18 @@ def test_a_failed_condition_is_a_success_with_a_report(leaf: Any, site: Any, tic
 def test_the_generator_of_a_halted_node_is_closed_before_the_node_ends(
     leaf: Any, site: Any, events: Any
 ) -> None:
-    class Lamp(GeneratorNode):
+    class Lamp(ControlNode):
         keyword = "lamp"
         do: Child = key(doc="Body.")
 
-        def run(self) -> NodeRun:
-            try:
-                return (yield from self.run_child(self.do))
-            finally:
-                self.report_choice("lamp off")
+        class Behaviour(GeneratorBehaviour):
+            def run(self) -> NodeRun:
+                try:
+                    return (yield from self.run_child(self.node.do))
+                finally:
+                    self.report_choice("lamp off")
 
-    node = Lamp(site("here"), do=leaf("A", "R"))
+    node = build(site("here"), Lamp, do=leaf("A", "R"))
     node.tick_once()
     node.stop()
     assert events[-2:] == [BranchChosen("here", "lamp off", "", ""), NodeEnded("here", "INVALID")]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import executive
 from executive.mission.grammar import SEQUENCE_KEYWORD, USE_KEYWORD
-from executive.tree.node_registry import load_control_nodes
+from executive.tree.node import load_control_nodes
 
 PERMITTED = {
     ("mission/grammar.py", f'"{SEQUENCE_KEYWORD}"'),

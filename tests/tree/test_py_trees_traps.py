@@ -14,6 +14,7 @@ from executive.errors import Fault
 from executive.tree.parallel import Parallel
 from executive.tree.sequences import Fallback, Sequence
 from executive.tree.tree_node import halt
+from tests.node_behaviours import build
 
 
 class Terminated(Leaf):
@@ -38,7 +39,7 @@ class Returning(Behaviour):
 def test_children_that_finished_are_not_terminated_by_a_new_round_nor_by_a_halt(kind: Any, site: Any) -> None:
     log: list[str] = []
     end = "lost" if kind is Fallback else "S"
-    node = kind(site(), do=[Terminated("A", (end,), log), Terminated("B", ("S", "R R"), log)])
+    node = build(site(), kind, do=[Terminated("A", (end,), log), Terminated("B", ("S", "R R"), log)])
     node.tick_once()
     node.tick_once()
     halt(node)

@@ -9,10 +9,11 @@ from build_nodes import sequence
 
 from executive.events import BranchChosen, NodeStarted
 from executive.tree.sequences import Fallback, Sequence
+from tests.node_behaviours import build
 
 
 def reactive(kind: Any, site: Any, children: Any) -> Any:
-    return kind(site("node"), memory=False, do=children)
+    return build(site("node"), kind, memory=False, do=children)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,7 @@ from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.skill import In, Out, Skill, param, port
-from executive.tree.skill_leaf import SkillLeaf, Wiring
-from executive.tree.tree_node import Blackboard, halt
+from executive.tree.tree_node import Blackboard, SkillLeaf, Wiring, halt
 
 
 class Worker(Skill):

@@ -28,9 +28,8 @@ from executive.skill import Seconds
 from executive.tree.flow import (
     Flow, FlowFunction, FlowState, combine_tool_states, find_end_tool_states, join_states
 )
-from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Children, key
-from executive.tree.node import ControlNode
+from executive.tree.node import ControlNode, NodeBehaviour, PropagatedFailure
 
 
 class Race(ControlNode):
@@ -42,24 +41,6 @@ class Race(ControlNode):
     head_start: Seconds = key(default=0.0, ge=0, doc="Time before the other branches begin [s].")
     do: Children = key(shorthand=True, doc="The branches.")
 
-    def start(self) -> None:
-        self._running = list(self.do)
-        self._begin = self.clock.now + self.head_start
-
-    def step(self) -> Status:
-        for child in list(self._running):
-            if child is not self.do[0] and self.clock.now < self._begin:
-                continue
-            status = self.tick_child(child)
-            if status is Status.SUCCESS:
-                self.halt_children(other for other in self._running if other is not child)
-                return status
-            if status is Status.FAILURE:
-                self._running.remove(child)
-                if not self._running:
-                    return self.fail(self.get_failure(child))
-        return Status.RUNNING
-
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         flows = [get_flow(child, state) for child in self.do]
         ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
@@ -70,16 +51,33 @@ class Race(ControlNode):
         ends = [end for flow in flows for end in flow.failures.items()]
         return Flow(success, {failure: end.with_tool_states(tools) for failure, end in ends}, halted)
 
-    # A method of earlier versions, which nothing calls now.
-    def min_time(self, get_min_time: MinTimeFunction) -> float:
-        return min(get_min_time(child) for child in self.do)
-
     @property
     def concurrent_children(self) -> Children:
         return self.do
 
     def explain(self, failure: PropagatedFailure) -> str:
         return f"none of the {len(self.do)} branches succeeded"
+
+    class Behaviour(NodeBehaviour):
+        node: "Race"
+
+        def start(self) -> None:
+            self._running = list(self.node.do)
+            self._begin = self.clock.now + self.node.head_start
+
+        def step(self) -> Status:
+            for child in list(self._running):
+                if child is not self.node.do[0] and self.clock.now < self._begin:
+                    continue
+                status = self.tick_child(child)
+                if status is Status.SUCCESS:
+                    self.halt_children(other for other in self._running if other is not child)
+                    return status
+                if status is Status.FAILURE:
+                    self._running.remove(child)
+                    if not self._running:
+                        return self.fail(self.get_failure(child))
+            return Status.RUNNING
 '''
 
 MISSION = """
@@ -165,8 +163,9 @@ def test_a_failure_that_it_passes_on_is_explained(project: Path) -> None:
         ("class Race:\n    pass\n", "is not a ControlNode subclass"),
         (RACE.replace('keyword = "race"', 'keyword = "run"'), 'in lower case: "run"'),
         (RACE.replace("def compute_flow", "def flow"), "has no method compute_flow"),
-        (RACE.replace("do: Children", "status: Children"), 'cannot have the key "status"'),
-        (RACE.replace("do: Children =", "do ="), "has no annotation"),
+        (RACE.replace("do: Children", "label: Children"), 'cannot have the key "label"'),
+        (RACE.replace("class Behaviour", "class Other"), "has no inner class Behaviour"),
+        (RACE.replace("do: Children =", "do ="), "requires a type annotation"),
     ],
 )
 def test_a_broken_class_is_one_clear_message(project: Path, source: str, message: str) -> None:

@@ -11,10 +11,10 @@ from executive.mission.outline import list_child_indices, make_outline
 from executive.skill import In, Metres, Out, Skill, param, port
 from executive.tree.retry import Catch, Retry, TryCatch
 from executive.tree.sequences import Sequence
-from executive.tree.skill_leaf import SkillLeaf, Wiring
 from executive.tree.specification import Reason
-from executive.tree.tree_node import NodeContext, make_inspection_context
+from executive.tree.tree_node import Blackboard, NodeContext, SkillLeaf, Wiring
 from executive.view.text import draw_text, fold_subtrees
+from tests.node_behaviours import build, specify
 
 CELL: Any = SimpleNamespace()
 MISSED = (Reason("Pick", "missed"),)
@@ -34,7 +34,8 @@ class Pick(Skill):
 
 
 def make_site(path: str, label: str = "") -> NodeContext:
-    return make_inspection_context(path, label)
+    nothing: Any = None
+    return NodeContext(path, nothing, nothing, Blackboard(), label)
 
 
 def pick(path: str, label: str = "", wiring: Wiring | None = None) -> SkillLeaf:
@@ -49,17 +50,19 @@ def in_subtree(node: Behaviour, *subtrees: str) -> Behaviour:
 
 def look(path: str, height: float = 0.2) -> Behaviour:
     wiring = Wiring({"height": height})
-    return in_subtree(Sequence(make_site(path), do=[pick(f"{path}/Pick", wiring=wiring)]), "look")
+    return in_subtree(build(make_site(path), Sequence, do=[pick(f"{path}/Pick", wiring=wiring)]), "look")
 
 
 def tree() -> Behaviour:
     """Return a retry in a try, whose catch and recovery use the subtree `look`."""
-    retry = Retry(
-        make_site("tree/try/retry"), attempts=3, on=MISSED, do=pick("tree/try/retry/do/Pick"),
+    retry = build(
+        make_site("tree/try/retry"), Retry, attempts=3, on=MISSED, do=pick("tree/try/retry/do/Pick"),
         recover=look("tree/try/retry/recover/look"),
     )  # fmt: skip
-    catch = [Catch(on=MISSED, do=look("tree/try/catch/1/look", 0.3))]
-    return TryCatch(make_site("tree/try"), do=retry, catch=catch, finally_=look("tree/try/finally/look"))
+    catch = [Catch(on=MISSED, do=specify(look("tree/try/catch/1/look", 0.3)))]
+    return build(
+        make_site("tree/try"), TryCatch, do=retry, catch=catch, finally_=look("tree/try/finally/look")
+    )
 
 
 def test_every_node_knows_its_children_what_it_is_to_its_parent_and_which_subtree_begins_with_it():
@@ -73,7 +76,9 @@ def test_every_node_knows_its_children_what_it_is_to_its_parent_and_which_subtre
 
 
 def test_ports_and_reasons_stand_below_the_skill():
-    nodes = make_outline(Sequence(make_site("tree"), do=[pick("tree/Pick"), pick("tree/other", "other")]))
+    nodes = make_outline(
+        build(make_site("tree"), Sequence, do=[pick("tree/Pick"), pick("tree/other", "other")])
+    )
     assert draw_text(nodes, shows_ports=True, shows_reasons=True).splitlines() == [
         "tree",
         "├─ Pick  (height: 0.2, only: $item, held: $thing)",
@@ -106,6 +111,6 @@ def test_a_folded_tree_shows_every_subtree_once():
 def test_a_folded_subtree_stays_within_those_around_it():
     first, second = look("tree/1:look"), look("tree/2:wide/look")
     shown = fold_subtrees(
-        make_outline(Sequence(make_site("tree"), do=[first, in_subtree(second, "wide", "look")]))
+        make_outline(build(make_site("tree"), Sequence, do=[first, in_subtree(second, "wide", "look")]))
     )
     assert [(node.title, node.subtrees) for node in shown[2:]] == [("Pick", ()), ("look", ("wide",))]

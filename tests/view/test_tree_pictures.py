@@ -7,8 +7,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from executive.mission.outline import Connection, OutlineNode
-from executive.tree.node import ControlNode
-from executive.tree.node_registry import load_control_nodes
+from executive.tree.node import ControlNode, load_control_nodes
 from executive.view.svg import NodeBox, NodeResult, make_group_id, make_svg, place_boxes
 
 RETRY = "up to 3 attempts, on Grasp.missed, Grasp.blocked"

@@ -24,7 +24,7 @@ from executive.cells.sim.world import SimVisuals, World
 from executive.cells.without_hardware import CellWithoutHardware, FinalObject
 from executive.errors import InputError
 from executive.events import Emit
-from executive.mission.file_search import get_shipped_folder
+from executive.mission.yaml_files import get_shipped_folder
 from executive.motion.planner import build_planner
 from executive.perception.detectors.requests import ClosableDetector
 from executive.perception.envelope import build_rated_detectors

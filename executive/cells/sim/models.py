@@ -29,7 +29,7 @@ from executive.cells.sim import model_files
 from executive.cells.sim.model_files import find_model, make_rotation
 from executive.errors import InputError
 from executive.geometry import Array, Pose
-from executive.mission.file_search import get_shipped_folder
+from executive.mission.yaml_files import get_shipped_folder
 from executive.processes import build_command
 
 DEFAULT_MESH_MASS = 0.05

@@ -34,10 +34,9 @@ from executive.cells.sim.camera import Light
 from executive.cells.sim.world import PATTERN_COUNT, PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE, World
 from executive.errors import InputError
 from executive.geometry import Pose
-from executive.mission.file_search import read_source
 from executive.mission.findings import Finding, MissionError, make_error, sort_findings, suggest_choice
 from executive.mission.validate import find_span, validate
-from executive.mission.yaml_text import YamlNode, parse_yaml
+from executive.mission.yaml_files import YamlNode, parse_yaml, read_source
 from executive.perception import camera_model
 from executive.perception.camera_model import compute_calibration, compute_field_of_view
 

@@ -1,21 +1,126 @@
-"""Parser of YAML text to a tree of nodes with their positions in the text.
+"""Search for the files of missions and cells, and parsing of their YAML text to nodes with positions.
 
-The parser rejects tags and merge keys and limits the size of the tree, so that a file can neither execute
-code nor exhaust the memory. The node of an alias has the position of the anchor.
+A file can neither execute code nor exhaust the memory: tags are errors, and the size of the tree is limited.
 """
 
 from __future__ import annotations
 
 import math
+import os.path
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
 
 import yaml
 from pydantic import JsonValue
 
-from executive.mission.findings import Finding, describe_value, make_error
+import executive
+from executive.cell.paths import has_outside_link, is_outside_path
+from executive.errors import InputError
+from executive.mission.findings import Finding, describe_value, make_error, suggest_choice
 from executive.tree.specification import Source, Span
+
+_MAX_FILE_SIZE = 1_000_000
+"""Maximum size of a mission or cell file [byte]."""
+
+
+def get_shipped_folder() -> Path:
+    """Return the folder of the shipped missions, in a wheel or in a checkout."""
+    package = Path(executive.__file__).parent
+    wheel_folder = package / "shipped"
+    return wheel_folder if wheel_folder.is_dir() else package.parent / "missions"
+
+
+def list_shipped_missions() -> list[str]:
+    """Return the names of the shipped missions."""
+    return sorted(path.stem for path in get_shipped_folder().glob("*.yaml"))
+
+
+def find_mission(name: str | Path) -> Path:
+    """Return the mission file with the path `name`, or the shipped mission with this name.
+
+    Raises:
+        InputError: There is no such file and no such shipped mission.
+    """
+    path = Path(name)
+    # Unlike the methods of Path, these functions return False for invalid file names.
+    if os.path.isfile(path):
+        return path
+    if os.path.lexists(path):
+        raise InputError(f'"{name}" is {_describe_kind(path)}, not a file')
+    stem = PurePosixPath(str(name).removeprefix("missions/").removesuffix(".yaml"))
+    if len(stem.parts) == 1 and os.path.isfile(shipped_path := get_shipped_folder() / f"{stem}.yaml"):
+        return shipped_path
+    hint = suggest_choice(str(stem), list_shipped_missions(), "Shipped missions")
+    raise InputError(f'there is no mission file and no shipped mission "{name}". {hint}')
+
+
+def find_file_below(folder: Path, reference: str, shipped_subfolders: Sequence[str] = ("",)) -> Path:
+    """Return the file with the relative path `reference` in `folder`, otherwise in a shipped subfolder.
+
+    Raises:
+        InputError: The reference leaves the folder, or the file does not exist.
+    """
+    if is_outside_path(reference):
+        advice = 'give a relative path without ".."'
+        raise InputError(f'"{reference}" is outside the folder of the file that names it; {advice}')
+    roots = (folder, *(get_shipped_folder() / subfolder for subfolder in shipped_subfolders))
+    for root in roots:
+        path = root / reference
+        if os.path.isfile(path):
+            if has_outside_link(root, reference):
+                raise InputError(f'"{reference}" is a link to a file outside {root}')
+            return path
+        if os.path.lexists(path):
+            raise InputError(f'"{reference}" in {_shorten_path(root)} is {_describe_kind(path)}, not a file')
+    subfolder = PurePosixPath(reference).parent
+    existing_files = {
+        path.relative_to(root).as_posix()
+        for root in roots
+        if os.path.isdir(root / subfolder)
+        for path in (root / subfolder).glob("*.yaml")
+    }
+    hint = suggest_choice(reference, sorted(existing_files), "Existing files")
+    folders = " or ".join(dict.fromkeys(map(_shorten_path, roots)))
+    raise InputError(f'there is no file "{reference}" in {folders}. {hint}')
+
+
+def read_source(path: Path) -> Source:
+    """Return the text of a file.
+
+    Raises:
+        InputError: The file is missing, too large, or not UTF-8 text.
+    """
+    try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path} is {_describe_kind(path)}, not a file")
+        if path.stat().st_size > _MAX_FILE_SIZE:
+            limit = f"{_MAX_FILE_SIZE} bytes, the maximum size of a mission or a cell"
+            raise InputError(f"{path} is larger than {limit}")
+        return Source(_shorten_path(path), path.read_bytes().decode("utf-8-sig"))
+    except FileNotFoundError:
+        raise InputError(f"there is no file {path}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not UTF-8 text: byte {error.start} is invalid") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from None
+
+
+def _describe_kind(path: str | Path) -> str:
+    if os.path.isdir(path):
+        return "a folder"
+    return "a pipe or a device" if os.path.exists(path) else "a link to nothing"
+
+
+def _shorten_path(path: Path) -> str:
+    """Return the path relative to the working directory; a path outside this directory is unchanged."""
+    try:
+        cwd = Path.cwd()
+    except FileNotFoundError:  # The working directory was deleted.
+        return str(path)
+    return str(path.relative_to(cwd)) if path.is_absolute() and path.is_relative_to(cwd) else str(path)
+
 
 _MAX_DEPTH = 50
 """Maximum depth of the nesting of lists and mappings."""
@@ -34,7 +139,6 @@ _ADVICE_BY_MESSAGE = {
 }
 """Advice on syntax errors, by the start of PyYAML's message."""
 _DEPTH_MESSAGE = f"lists and mappings are nested more than {_MAX_DEPTH} levels deep"
-"""Message of a finding about nesting deeper than `_MAX_DEPTH`."""
 _FAST_LOADER: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """Parser of libyaml, which takes a quarter of the time; the Python parser if PyYAML lacks libyaml."""
 _LIBYAML_DIFFERENCE = re.compile(r"[^\n\x20-\x7e\xa1-\u1fff]|[?]|---|:\s*[,}\]]")
@@ -123,12 +227,11 @@ class YamlMapping(_Node):
 YamlNode = YamlScalar | YamlSequence | YamlMapping
 
 
-def iterate_scalars(node: YamlNode) -> Iterator[YamlScalar]:
-    """Yield every scalar of a node in the order of the text, without keys."""
+def list_scalars(node: YamlNode) -> list[YamlScalar]:
+    """Return every scalar of a node in the order of the text, without keys."""
     if isinstance(node, YamlScalar):
-        yield node
-    for child in list_children(node):
-        yield from iterate_scalars(child)
+        return [node]
+    return [scalar for child in list_children(node) for scalar in list_scalars(child)]
 
 
 def list_children(node: YamlNode) -> tuple[YamlNode, ...]:
@@ -140,7 +243,7 @@ def list_children(node: YamlNode) -> tuple[YamlNode, ...]:
 
 def flatten(node: YamlNode) -> YamlNode:
     """Return a list of lists as the list of their scalars, in order; return other nodes unchanged."""
-    return replace(node, items=tuple(iterate_scalars(node))) if isinstance(node, YamlSequence) else node
+    return replace(node, items=tuple(list_scalars(node))) if isinstance(node, YamlSequence) else node
 
 
 def parse_yaml(source: Source, text: str | None = None) -> tuple[YamlNode | None, list[Finding]]:
@@ -239,7 +342,8 @@ class _Composer:
         return self._read_mapping(event, depth)
 
     def _read_scalar(self, event: yaml.ScalarEvent) -> YamlScalar:
-        text, span = event.value, self._make_span(event)
+        text = event.value
+        span = self._make_span(event)
         if _SURROGATE.search(text):
             self._add_error(span, "yaml", "a surrogate (U+D800 to U+DFFF) is no character")
             text = _SURROGATE.sub("?", text)
@@ -265,14 +369,14 @@ class _Composer:
 
     def _make_span(self, event: yaml.Event, length: int = 0) -> Span:
         """Return the span of an event; if `length` is 0, the span covers the first line of the event."""
-        start, end = event.start_mark, event.end_mark
+        start = event.start_mark
+        end = event.end_mark
         assert start is not None and end is not None, "PyYAML locates every event"
         if not length:
             length = max(1, end.column - start.column) if start.line == end.line else _LINE_LENGTH
         return Span(self.source, start.line + 1, start.column + 1, length)
 
     def _add_fatal_error(self, span: Span, code: str, message: str) -> _IncompleteTree:
-        """Add an error that prevents a complete tree, and return the exception to raise."""
         self._add_error(span, code, message)
         return _IncompleteTree()
 
@@ -281,7 +385,6 @@ class _Composer:
 
 
 def _compute_height(node: YamlNode) -> int:
-    """Return the depth of the nesting in a node; 0 for a scalar."""
     height_below = max(map(_compute_height, list_children(node)), default=0)
     return 0 if isinstance(node, YamlScalar) else 1 + height_below
 
