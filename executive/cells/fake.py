@@ -19,9 +19,9 @@ from executive.cell.frame import Box, Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
 from executive.cell.protocols import Clock, Routes
 from executive.cell.workcell import CellOptions, KeyPath
-from executive.cells.log_file import LogFile
 from executive.cells.table_views import find_view_errors
 from executive.cells.without_hardware import CellWithoutHardware, FinalObject, SilentOperator
+from executive.cells.world_log import LogFile
 from executive.errors import InputError, Unavailable
 from executive.events import Emit, discard_event
 from executive.geometry import GRAVITY, Array, Pose

@@ -10,7 +10,7 @@ import numpy as np
 from executive.cell.arm import Goal, Motion, Task
 from executive.cell.config import CellConfig
 from executive.cell.protocols import STEP, Clock
-from executive.cells.sim import command_log
+from executive.cells import world_log
 from executive.cells.sim.rebuild import WorldRebuilder
 from executive.cells.sim.tool import LIP_LENGTH
 from executive.cells.sim.world import BODY_B, LINK_A, NORMAL_FORCE, POSITION_A, World, name_load
@@ -217,7 +217,7 @@ class SimArm(PlanningArm[Trajectory]):
         self.send_command()
         if has_ended:
             self._motion, self._braking_times = None, None
-            self._world.log.append(command_log.MOTION_END)
+            self._world.log.append(world_log.MOTION_END)
 
     @property
     def _end_q(self) -> Array:

@@ -13,7 +13,6 @@ from executive.cell.workcell import CellOptions
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.camera import ArmOcclusion, SimCamera
 from executive.cells.sim.collision import ClearanceChecker
-from executive.cells.sim.command_log import CommandLog, read_commands
 from executive.cells.sim.kind import SimCellChecks, find_missing_depth_sensors
 from executive.cells.sim.models import build_simulated_class
 from executive.cells.sim.rebuild import WorldRebuilder
@@ -22,6 +21,7 @@ from executive.cells.sim.spawn import build_initial_world, derive_seeds
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import SimVisuals, World
 from executive.cells.without_hardware import CellWithoutHardware, FinalObject
+from executive.cells.world_log import CommandLog, read_commands
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.text.file_search import get_shipped_folder

@@ -12,7 +12,7 @@ import numpy as np
 import pybullet
 
 from executive.cell.device_config import ToolConfig
-from executive.cells.sim import command_log
+from executive.cells import world_log
 from executive.cells.sim.world import POSITION_A, World
 from executive.geometry import Array, Pose
 
@@ -223,14 +223,14 @@ class SuctionTool:
 
     def close(self) -> None:
         """Switch the vacuum on, and hold a body within reach if the seal is strong enough."""
-        self._world.log.append(command_log.VACUUM_ON)
+        self._world.log.append(world_log.VACUUM_ON)
         self._is_vacuum_on = True
         if self._grip is None:
             self._try_to_seal()
 
     def open(self) -> None:
         """Release the held body and switch the vacuum off."""
-        self._world.log.append(command_log.VACUUM_OFF)
+        self._world.log.append(world_log.VACUUM_OFF)
         self._is_vacuum_on = False
         self._separating_body = None
         if self._grip is not None:
@@ -240,7 +240,7 @@ class SuctionTool:
 
     def break_seal(self) -> None:
         """Break the seal, so that the held body falls."""
-        self._world.log.append(command_log.SEAL_BREAK)
+        self._world.log.append(world_log.SEAL_BREAK)
         if self._grip is not None:
             self._separating_body = self._grip.body
             self.dropped_bodies.add(self._grip.body)

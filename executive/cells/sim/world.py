@@ -23,10 +23,10 @@ from executive.cell.device_config import Colour
 from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, list_bin_boxes
 from executive.cell.protocols import STEP
 from executive.cell.workcell import Shape
-from executive.cells.sim import command_log
-from executive.cells.sim.command_log import CommandLog
+from executive.cells import world_log
 from executive.cells.sim.model_files import find_model
 from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, locate_object
+from executive.cells.world_log import CommandLog
 from executive.geometry import Array, Pose
 from executive.motion.iiwa14_kinematics import FLANGE_OFFSET
 
@@ -220,7 +220,7 @@ class World:
 
     def remove_object(self, body: int) -> None:
         """Remove a loose object from the world."""
-        self.log.append(command_log.REMOVE, body)
+        self.log.append(world_log.REMOVE, body)
         self.removed_objects[body] = self.labels[body], self.get_object_pose(body).position
         del self.labels[body], self.models[body]
         self.client.removeBody(body)
@@ -242,7 +242,7 @@ class World:
     def place_object(self, body: int, X_WO: Pose) -> None:
         """Move a loose object to `X_WO`, at rest."""
         self.rest_positions.setdefault(body, []).append(X_WO.position)
-        self.log.append(command_log.SET_POSE, body, *X_WO.position, *X_WO.quaternion)
+        self.log.append(world_log.SET_POSE, body, *X_WO.position, *X_WO.quaternion)
         X_WI = X_WO @ compute_upright_pose(self.models[body]) @ get_inertial_pose(self.client, body)
         self.client.resetBasePositionAndOrientation(body, X_WI.position, X_WI.quaternion)
 
@@ -261,7 +261,7 @@ class World:
 
         If a command precedes every physics step, the full position gain leaves a tracking error of 0.0005°.
         """
-        self.log.append(command_log.JOINT_TARGETS, time, *q)
+        self.log.append(world_log.JOINT_TARGETS, time, *q)
         joint_count = self.robot.joint_count
         self.client.setJointMotorControlArray(
             self.arm, range(joint_count), pybullet.POSITION_CONTROL, targetPositions=q.tolist(),
@@ -289,7 +289,7 @@ class World:
 
     def step(self) -> None:
         """Advance the physics by 1/240 s."""
-        self.log.append(command_log.IDLE_STEP if self.is_idle else command_log.RUN_STEP)
+        self.log.append(world_log.IDLE_STEP if self.is_idle else world_log.RUN_STEP)
         self.client.stepSimulation()
         self.step_count += 1
 
