@@ -12,8 +12,7 @@ from pathlib import Path
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.layout import build_object_class
 from executive.cell.protocols import Localizer
-from executive.cells.sim.scene_file import load_scene
-from executive.cells.sim.spawn import find_max_object_count
+from executive.cells.sim.scene import find_max_object_count, load_scene
 from executive.errors import InputError, explain_os_errors
 from executive.mission.findings import suggest_choice
 from executive.mission.parse.cell_file import load_cell

@@ -25,7 +25,7 @@ from executive.campaign.results import (
     get_database_path,
 )
 from executive.campaign.sweep_summary import SweepResults, summarize_runs
-from executive.cells.sim.scene_file import load_scene
+from executive.cells.sim.scene import load_scene
 from executive.errors import InputError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.text.file_search import read_source

@@ -144,7 +144,7 @@ def _load_mission(
     for warning in loaded_mission.warnings if record.views else ():
         click.echo(str(warning), err=True)
     if run_options.scene is not None:
-        from executive.cells.sim.scene_file import load_scene
+        from executive.cells.sim.scene import load_scene
 
         # Only simulated cells read the scene file, but its errors are reported for every cell.
         load_scene(run_options.scene, loaded_mission.cell_config)

@@ -39,8 +39,7 @@ from executive.cells.sim.models import (
     find_model_errors,
     load_mesh,
 )
-from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, build_world
-from executive.cells.sim.spawn import spawn_objects
+from executive.cells.sim.scene import DECLARED_SCENE, SceneConfig, build_world, spawn_objects
 from executive.cells.sim.world import WOOD_TEXTURE
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, intersect_plane, project

@@ -17,7 +17,7 @@ from executive.cell.layout import build_bin
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import build_simulated_class, load_mesh
-from executive.cells.sim.spawn import spawn_objects
+from executive.cells.sim.scene import spawn_objects
 from executive.cells.sim.tool import TOUCH_DISTANCE, compute_breakaway_force, measure_contact
 from executive.cells.sim.world import World
 from executive.errors import InputError, Unreachable

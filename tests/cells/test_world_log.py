@@ -22,7 +22,8 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
-    written, cell = CommandLog(path), load_empty_cell()
+    cell = load_empty_cell()
+    written = CommandLog(path)
     joints = [1 / 3, *np.random.default_rng(1).normal(size=7)]
     motion = build_planner(cell).plan(np.radians(cell.arm.poses_deg["home"]), Goal((0.5, 0.0, 0.1)))
     written.append(log.JOINT_TARGETS, *joints)

@@ -9,7 +9,6 @@ import colorsys
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
 import cv2
 import numpy as np
@@ -20,7 +19,16 @@ from executive.cell.device_config import CameraConfig, Colour, NoiseConfig, Rang
 from executive.cell.layout import build_bins
 from executive.cell.objects import BIN_THICKNESS, UNKNOWN_LABEL, Bin
 from executive.cells.sim.camera import Light, Region
-from executive.cells.sim.models import add_body, build_drop_world, load_mesh, locate_object
+from executive.cells.sim.models import (
+    DAMAGED_MODEL_NUMBER,
+    SETTLING_STEP_COUNT,
+    add_body,
+    build_drop_world,
+    load_mesh,
+    load_unknown_model,
+    locate_object,
+    scale_model,
+)
 from executive.cells.sim.world import PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE, World, add_bin
 from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
 from executive.perception.camera_model import intersect_plane
@@ -145,20 +153,20 @@ def draw_noise(noise: NoiseConfig, rng: np.random.Generator) -> NoiseConfig:
     return NoiseConfig(gain=gain, read=read)
 
 
-MAX_SPARSE_OBJECT_COUNT, MAX_DENSE_OBJECT_COUNT = 7, 20
-"""Maximum number of objects in a sparse scene and in a dense scene."""
+MAX_SPARSE_OBJECT_COUNT = 7
+"""Maximum number of objects in a sparse scene."""
+MAX_DENSE_OBJECT_COUNT = 20
+"""Maximum number of objects in a dense scene."""
 SCALE_FACTORS = (0.75, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.3)
 """Scale factors of objects whose size differs from the size of their class."""
-UNKNOWN_MODEL_COUNT, DAMAGED_MODEL_NUMBER = 1000, 168
-"""Number of shapes in `random_urdfs` of pybullet_data, and index of the shape with a damaged mesh."""
 TRAINING_MODEL_NUMBERS = tuple(number for number in range(800) if number != DAMAGED_MODEL_NUMBER)
 """Indices of the shapes for unknown objects in training; all other shapes are reserved for tests."""
-TABLE_X_RANGE, TABLE_Y_RANGE = (-0.05, 0.86), (-0.71, 0.71)
-"""Ranges of the x and y coordinates of objects on the table top [m]."""
+TABLE_X_RANGE = (-0.05, 0.86)
+"""Range of the x coordinates of objects on the table top [m]."""
+TABLE_Y_RANGE = (-0.71, 0.71)
+"""Range of the y coordinates of objects on the table top [m]."""
 MIN_BASE_DISTANCE = 0.16
 """Minimum distance of an object from the axis of the base of the arm [m]."""
-SETTLING_STEP_COUNT = 360
-"""Number of physics steps in which dropped objects come to rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,20 +236,6 @@ def draw_objects(config: CellConfig, count: int, table_colour: Colour, rng: Gene
             model = scale_model(model, float(rng.choice(SCALE_FACTORS)))
         objects.append(SceneObject(label, model, Pose.identity(), colour))
     return objects
-
-
-def scale_model(model: ObjectConfig, factor: float) -> ObjectConfig:
-    """Return the model of an object scaled by `factor`."""
-    names = ("scale", "height", "radius", "ring")
-    return model.model_copy(update={name: getattr(model, name) * factor for name in names})
-
-
-@cache
-def load_unknown_model(number: int) -> ObjectConfig:
-    """Return shape `number` (0 to 999) of `random_urdfs` in pybullet_data; most shapes are 12 cm long."""
-    name = f"random_urdfs/{number:03d}/{number:03d}.urdf"
-    mesh = load_mesh(ObjectConfig(urdf=name, height=1.0, radius=1.0))
-    return ObjectConfig(urdf=name, height=mesh.top - mesh.bottom, radius=mesh.radius)
 
 
 def draw_arrangement(

@@ -16,8 +16,7 @@ from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.kind import SimCellChecks, find_missing_depth_sensors
 from executive.cells.sim.models import build_simulated_class
 from executive.cells.sim.rebuild import WorldRebuilder
-from executive.cells.sim.scene_file import load_scene
-from executive.cells.sim.spawn import build_initial_world, derive_seeds
+from executive.cells.sim.scene import build_initial_world, derive_seeds, load_scene
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import SimVisuals, World
 from executive.cells.without_hardware import CellWithoutHardware, FinalObject

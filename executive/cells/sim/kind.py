@@ -15,7 +15,7 @@ from executive.cell.workcell import CellOptions, KeyPath, Workcell
 from executive.cells.sim.camera import ArmOcclusion, SimCamera, get_camera_pose
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import compute_mass, find_model_errors
-from executive.cells.sim.spawn import find_object_count_errors
+from executive.cells.sim.scene import find_object_count_errors
 from executive.cells.sim.world import World
 from executive.cells.table_views import find_view_errors
 from executive.events import Emit

@@ -9,7 +9,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 
 import cv2
@@ -47,11 +47,15 @@ ROLLING_FRICTION = 0.0005
 TRIAL_TIMEOUT = 30
 """Maximum duration of the trial of a model, with the start of the process [s]."""
 DROP_HEIGHT = 0.002
-"""Height above the table at which the model is released [m]."""
-STEP_COUNT = 360
-"""Number of physics steps of a trial."""
+"""Height above its support at which an object is released [m]."""
+SETTLING_STEP_COUNT = 360
+"""Number of physics steps in which released objects come to rest."""
 MAX_REST_ERROR = 0.005
 """Maximum distance of visual, collision shape and declared heights from each other at rest [m]."""
+UNKNOWN_MODEL_COUNT = 1000
+"""Number of shapes in `random_urdfs` of pybullet_data."""
+DAMAGED_MODEL_NUMBER = 168
+"""Index of the shape in `random_urdfs` with a damaged mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +240,7 @@ def try_model(config: ObjectConfig) -> None:
     mesh = load_mesh(config)
     _place_mesh(config, Pose.identity(), "collision")  # refuses shapes that PyBullet would ignore
     body = add_body(client, config, Pose.of([0, 0, DROP_HEIGHT - mesh.bottom]))
-    for _ in range(STEP_COUNT):
+    for _ in range(SETTLING_STEP_COUNT):
         client.stepSimulation()
     vertices = locate_object(client, body, config).apply(mesh.vertices)
     visual = np.array([vertices.min(axis=0), vertices.max(axis=0)])
@@ -307,6 +311,20 @@ def _place_mesh(config: ObjectConfig, X_OL: Pose, tag: str = "visual") -> Mesh:
     path = find_model(config.mesh or config.urdf)
     points, faces = model_files.read_mesh(path) if config.mesh else model_files.read_shapes(path, tag)
     return Mesh(X_OL.apply(points * config.scale), faces)
+
+
+def scale_model(model: ObjectConfig, factor: float) -> ObjectConfig:
+    """Return the model of an object scaled by `factor`."""
+    names = ("scale", "height", "radius", "ring")
+    return model.model_copy(update={name: getattr(model, name) * factor for name in names})
+
+
+@cache
+def load_unknown_model(number: int) -> ObjectConfig:
+    """Return shape `number` (0 to 999) of `random_urdfs` in pybullet_data; most shapes are 12 cm long."""
+    name = f"random_urdfs/{number:03d}/{number:03d}.urdf"
+    mesh = load_mesh(ObjectConfig(urdf=name, height=1.0, radius=1.0))
+    return ObjectConfig(urdf=name, height=mesh.top - mesh.bottom, radius=mesh.radius)
 
 
 SUBPIXEL_COUNT = 4
