@@ -36,7 +36,7 @@ from executive.cells.sim.models import (
     load_unknown_model,
     scale_model,
 )
-from executive.cells.sim.world import PATTERN_COUNT, TEXTURES, WOOD_TEXTURE, World
+from executive.cells.sim.world import TEXTURES, WOOD_TEXTURE, World
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
 from executive.mission.findings import Finding, MissionError, make_error, sort_findings, suggest_choice
@@ -58,9 +58,8 @@ MAX_FOV_DEG = 178.0
 
 def _check_texture(name: str) -> str:
     if name not in TEXTURES:
-        raise ValueError(
-            f'must be "wood", "plain", or "pattern 0" to "pattern {PATTERN_COUNT - 1}", not "{name}"'
-        )
+        last_pattern = TEXTURES[-1]
+        raise ValueError(f'must be "wood", "plain", or "pattern 0" to "{last_pattern}", not "{name}"')
     return name
 
 
@@ -307,10 +306,7 @@ def build_initial_world(
 def spawn_objects(world: World, seed: int, unknown: UnknownConfig | None = None) -> tuple[int, ...]:
     """Put random objects on the table, simulate until they are at rest, and return the bodies.
 
-    Args:
-        world: The world of the objects, whose cell file states the classes and the range of their number.
-        seed: Seed of all random choices.
-        unknown: Section of additional objects without a class, or None.
+    The cell file of the world states the classes and the range of their number.
 
     Raises:
         InputError: The workspace has no room for the objects.
