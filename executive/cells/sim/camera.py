@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated
@@ -20,6 +20,7 @@ from executive.cell.frame import Frame
 from executive.cell.layout import compute_max_pile_height
 from executive.cell.objects import Bin
 from executive.cell.protocols import Clock
+from executive.cell.workcell import KeyPath
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 from executive.motion.joints import Kinematics
@@ -312,6 +313,14 @@ def _compute_edge_mask(depth: Array, config: DepthConfig) -> Mask:
     edge_mask = (cv2.morphologyEx(distances, cv2.MORPH_GRADIENT, kernel) > config.edge).astype(np.uint8)
     width = 2 * config.edge_width + 1
     return cv2.dilate(edge_mask, np.ones((width, width), np.uint8)).astype(bool)
+
+
+def find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for each camera without a depth sensor if the cell localizes by depth."""
+    for name, camera in config.cameras.items():
+        if config.localization == "depth" and camera.depth is None:
+            message = f'localization "depth" needs a camera with depth, and {name} has none; give it a '
+            yield ("localization",), message + 'section "depth: {}", or use "plane"'
 
 
 class SimCamera(MountedCamera):

@@ -11,9 +11,8 @@ from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
 from executive.cells.sim.arm import SimArm
-from executive.cells.sim.camera import ArmOcclusion, SimCamera
+from executive.cells.sim.camera import ArmOcclusion, SimCamera, find_missing_depth_sensors
 from executive.cells.sim.collision import ClearanceChecker
-from executive.cells.sim.kind import SimCellChecks, find_missing_depth_sensors
 from executive.cells.sim.models import build_simulated_class
 from executive.cells.sim.rebuild import WorldRebuilder
 from executive.cells.sim.scene import build_initial_world, derive_seeds, load_scene
@@ -33,7 +32,7 @@ MIN_CENTRE_HEIGHT = -0.05
 """Minimum height of the centre of an object that is still on the table [m]."""
 
 
-class SimCell(SimCellChecks, CellWithoutHardware):
+class SimCell(CellWithoutHardware):
     """The simulated cell of a cell file; implements `executive.cell.workcell.Workcell`.
 
     Args:

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes, StepClock
 from executive.cell.workcell import CellOptions, KeyPath, Workcell
-from executive.cells.sim.camera import ArmOcclusion, SimCamera, get_camera_pose
+from executive.cells.sim.camera import (
+    ArmOcclusion,
+    SimCamera,
+    find_missing_depth_sensors,
+    get_camera_pose,
+)
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import compute_mass, find_model_errors
 from executive.cells.sim.scene import find_object_count_errors
@@ -89,13 +94,21 @@ def _find_occluding_bin(config: CellConfig, world: World, camera_position: Array
     return next((name for name, body in world.bin_bodies.items() if body in hit_bodies), None)
 
 
-class SimCellChecks:
-    """Checks of a cell file; base class of the simulated cell and of its kind."""
+class SimCellKind:
+    """The kind of the simulated cells; implements `executive.cell.workcell.CellKind`."""
 
     compute_mass = staticmethod(compute_mass)
 
-    @staticmethod
-    def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
+    def __call__(
+        self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
+    ) -> Workcell:
+        """Return a simulated cell."""
+        # A check of a mission needs neither the arm nor the ledger, whose import takes 0.3 s.
+        from executive.cells.sim.cell import SimCell
+
+        return SimCell(config, seed=seed, routes=routes, emit=emit, options=options)
+
+    def check(self, config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
         """Return key and message of each requirement of a cell file that the simulated cell cannot fulfil.
 
         The requirements concern the arm and its reach, the models, the detectors, the room for the objects,
@@ -114,32 +127,10 @@ class SimCellChecks:
             *(() if model_errors else find_pose_errors(config)),
         )
 
-    @staticmethod
-    def labels(config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
+    def labels(self, config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
         """Return the classes that each detector knows, or None if unknown; no detector model is loaded."""
         return find_detectable_labels(config.detectors, cell_folder)
 
 
-class SimCellKind(SimCellChecks):
-    """The kind of the simulated cells; implements `executive.cell.workcell.CellKind`."""
-
-    def __call__(
-        self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
-    ) -> Workcell:
-        """Return a simulated cell."""
-        # A check of a mission needs neither the simulator's arm and camera nor the ledger.
-        from executive.cells.sim.cell import SimCell
-
-        return SimCell(config, seed=seed, routes=routes, emit=emit, options=options)
-
-
 SIM_CELL_KIND = SimCellKind()
 """Object of the entry point."""
-
-
-def find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each camera without a depth sensor if the cell localizes by depth."""
-    for name, camera in config.cameras.items():
-        if config.localization == "depth" and camera.depth is None:
-            message = f'localization "depth" needs a camera with depth, and {name} has none; give it a '
-            yield ("localization",), message + 'section "depth: {}", or use "plane"'
