@@ -20,9 +20,9 @@ from PIL import ExifTags, Image
 from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter, ValidationError
 
 from executive.cell.frame import Box
-from executive.cell.paths import has_outside_link
 from executive.errors import MAX_QUOTATION_LENGTH, InputError
 from executive.geometry import Array
+from executive.mission.text.file_search import has_outside_link
 from executive.training.dataset import LabelledImage
 
 IMAGE_SUFFIXES = (

@@ -21,9 +21,9 @@ import pybullet
 import pybullet_data
 from numpy.typing import ArrayLike, NDArray
 
-from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
+from executive.mission.text.file_search import has_outside_link, is_outside_path
 
 MAX_MODEL_SIZE = 20_000_000
 """Maximum size of a model file [byte], to limit the duration of the check."""

@@ -12,14 +12,13 @@ import numpy as np
 
 from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.objects import BIN_THICKNESS
-from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.mission.findings import Finding, MissionError, make_error, sort_findings
 from executive.mission.parse.overrides import CELL_PREFIX, make_override_source, override_cell
 from executive.mission.parse.validate import KeyPath, find_span, validate
 from executive.mission.source import Source, Span
-from executive.mission.text.file_search import find_file_below, read_source
+from executive.mission.text.file_search import find_file_below, has_outside_link, is_outside_path, read_source
 from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, flatten, parse_yaml
 
 BASE_KEY = "base"

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
 import executive
-from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.mission.findings import suggest_choice
 from executive.mission.source import Source
@@ -75,6 +74,17 @@ def find_file_below(folder: Path, reference: str, shipped_subfolders: Sequence[s
     hint = suggest_choice(reference, sorted(existing_files), "Existing files")
     folders = " or ".join(dict.fromkeys(map(_shorten_path, roots)))
     raise InputError(f'there is no file "{reference}" in {folders}. {hint}')
+
+
+def is_outside_path(path_text: str) -> bool:
+    """Return True if a path may lead out of its folder: it is absolute, or contains `..` or a backslash."""
+    path = PurePosixPath(path_text)
+    return path.is_absolute() or ".." in path.parts or "\\" in path_text
+
+
+def has_outside_link(folder: Path, path_text: str) -> bool:
+    """Return True if a relative path leads out of a folder through a symbolic link."""
+    return not (folder / path_text).resolve().is_relative_to(folder.resolve())
 
 
 def read_source(path: Path) -> Source:
