@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from executive.cell.config import CellConfig, DetectorConfig
-from executive.cell.layout import build_object_class
 from executive.cell.protocols import Localizer
 from executive.cells.sim.scene import find_max_object_count, load_scene
 from executive.errors import InputError, explain_os_errors
@@ -200,7 +199,7 @@ def _build_localizer(cell: CellConfig) -> Localizer | None:
     """Return the localizer of the cell; None for the method `ray`, which needs a simulated world."""
     if cell.localization == "ray":
         return None
-    classes = {label: build_object_class(label, config) for label, config in cell.objects.items()}
+    classes = {label: config.build_class(label) for label, config in cell.objects.items()}
     return CellLocalizer(cell.localization, classes)
 
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from executive.cell.arm import Arm
 from executive.cell.config import CellConfig
-from executive.cell.layout import build_bins, build_object_classes
 from executive.cell.objects import UNKNOWN_LABEL, Bin, Target
 from executive.cell.protocols import STEP, Cell, Detector, Localizer, Routes, StepClock, Tool
 from executive.cell.workcell import AUDIT_KEYS, CellOptions, Visuals
@@ -148,9 +147,11 @@ class CellWithoutHardware:
         self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
     ) -> None:
         del seed
-        self.config, self.routes = config, dict(routes)
+        self.config = config
+        self.routes = dict(routes)
         self.steps = self.last_command_step = 0
-        bins, classes = build_bins(config), build_object_classes(config)
+        bins = config.build_bins()
+        classes = {label: section.build_class(label) for label, section in config.objects.items()}
         ignored = set(config.unknown.ignore).difference(classes)
         self.accounts = Tracker(
             config.ledger, config.table, bins, classes, self.routes, options.quotas, emit, ignored

@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 
 from executive.cell.arm import Goal
 from executive.cell.config import CellConfig
-from executive.cell.layout import find_unreachable_places
 from executive.cell.workcell import KeyPath
-from executive.geometry import Array
+from executive.errors import Unreachable
 from executive.motion.clearance_model import SAMPLING_MARGIN
 from executive.motion.iiwa14_kinematics import IIWA14_JOINT_COUNT, Iiwa14
 from executive.motion.joints import JointLimits, JointRange, Kinematics
@@ -58,12 +57,6 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
     The tool must reach each slot of each bin and the safe place, from travel height down to the release
     height in one inverse kinematics branch. Each named pose must be within the joint limits.
     """
-    planner = build_planner(config)
-
-    def require_reachable(position: Array, floor_height: float) -> None:
-        height = floor_height + config.max_object_height
-        planner.require_reachable(Goal((float(position[0]), float(position[1]), height)))
-
     ranges = config.arm.limits.position_ranges_deg
     for name, pose in config.arm.poses_deg.items():
         for joint, (angle, (lower, upper)) in enumerate(zip(pose, ranges, strict=True), start=1):
@@ -71,4 +64,16 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
                 limit = f"{upper:g}" if lower == -upper else f"{lower:g} to {upper:g}"
                 message = f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}'
                 yield ("arm", "poses_deg", name), message
-    yield from find_unreachable_places(config, require_reachable)
+    safe_x, safe_y, safe_z = config.safe_place
+    places: list[tuple[KeyPath, str, list[list[float]], float]] = [
+        (("bins", name, "position"), f'the bin "{name}"', bin.slots.tolist(), float(bin.position[2]))
+        for name, bin in config.build_bins().items()
+    ]
+    places.append((("safe_place",), "the safe place", [[safe_x, safe_y]], safe_z))
+    planner = build_planner(config)
+    for key_path, place_name, positions, surface_height in places:
+        try:
+            for x, y in positions:
+                planner.require_reachable(Goal((x, y, surface_height + config.max_object_height)))
+        except Unreachable as error:
+            yield key_path, f"{place_name} is out of reach: {error}"

@@ -12,14 +12,14 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from types import GeneratorType
 from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from executive.cell.arm import Goal, Motion, Task, reject_generator
+from executive.cell.arm import Goal, Motion, Task
 from executive.cell.config import CellConfig
-from executive.cell.layout import compute_travel_height
 from executive.cell.protocols import STEP, Clock
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit, MotionPlanned
@@ -75,7 +75,7 @@ class Planner:
         Raises:
             Unreachable: The arm cannot reach both; the message states the joint limit or the distance.
         """
-        approach_height = max(0.0, compute_travel_height(self._config) - goal.position[2])
+        approach_height = max(0.0, self._config.travel_height - goal.position[2])
         find_configuration_pairs(self.kinematics, goal, approach_height, np.zeros(self.limits.joint_count))
 
     def describe_unreachable(self, goal: Goal) -> str:
@@ -309,7 +309,11 @@ class PlanningArm(Generic[M]):
             Fault: The arm is moving, or did not plan the motion.
         """
         self._require_rest("start a motion")
-        reject_generator(motion)
+        if isinstance(motion, GeneratorType):
+            raise Fault(
+                f"the generator {motion.__name__}(...) was passed to the arm where a motion is expected: "
+                f'"yield from" is missing. Write "motion = yield from {motion.__name__}(...)"'
+            )
         if not isinstance(motion, kind):
             raise Fault(f"the arm follows its own planned motions, not a {type(motion).__name__}")
         return motion

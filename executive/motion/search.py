@@ -13,7 +13,6 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.layout import compute_travel_height
 from executive.cell.protocols import STEP
 from executive.errors import Unreachable
 from executive.geometry import Array, make_tool_down_pose
@@ -76,7 +75,7 @@ class MotionSearch:
         self._kinematics = kinematics
         self._limits = limits
         self._connector = Connector(limits)
-        self._travel_height = compute_travel_height(config)
+        self._travel_height = config.travel_height
         self._end = end
         self._straight_part_length = config.motion.straight
         discs = make_tool_discs(config, task.load)

@@ -13,7 +13,6 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.layout import build_bin
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import build_simulated_class, load_mesh
@@ -98,7 +97,7 @@ class SceneGenerator:
         self._planner = planner
         self._world = world
         self._random = np.random.default_rng(seed)
-        self._bins = [build_bin(name, bin) for name, bin in cell.bins.items()]
+        self._bins = list(cell.build_bins().values())
         self._tallest = max(kind.height for kind in cell.objects.values())
 
     def draw(self) -> Scene:

@@ -16,7 +16,6 @@ from numpy.random import Generator
 
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import CameraConfig, Colour, NoiseConfig, Range
-from executive.cell.layout import build_bins
 from executive.cell.objects import BIN_THICKNESS, UNKNOWN_LABEL, Bin
 from executive.cells.sim.camera import Light, Region
 from executive.cells.sim.models import (
@@ -262,7 +261,7 @@ def draw_arrangement(
         margin = rng.uniform(0.0, 0.02 + 0.006 * count)
         low = np.maximum(low, np.array([config.table.x[0], config.table.y[0]]) - margin)
         high = np.minimum(high, np.array([config.table.x[1], config.table.y[1]]) + margin)
-    all_bins = list(build_bins(config).values())
+    all_bins = list(config.build_bins().values())
     bins = [bin for bin in all_bins if _overlaps_rectangle(bin, low, high)]
     random_number = rng.random()
     if random_number < 0.15:

@@ -17,7 +17,6 @@ from pydantic import Field
 from executive.cell.config import CellConfig
 from executive.cell.device_config import CameraConfig, Colour, DepthConfig, NoiseConfig, Section
 from executive.cell.frame import Frame
-from executive.cell.layout import compute_max_pile_height
 from executive.cell.objects import Bin
 from executive.cell.protocols import Clock
 from executive.cell.workcell import KeyPath
@@ -217,7 +216,7 @@ class ArmOcclusion:
         self._X_TF = Pose.of([0.0, 0.0, -config.tool.length])
         self._load_radius = max(model.radius for model in config.objects.values()) + MAX_LOAD_OFFSET
         self._load_height = config.max_object_height
-        heights = (0.0, compute_max_pile_height(config))
+        heights = (0.0, config.max_pile_height)
         self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
 
     def compute_visibility_mask(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:

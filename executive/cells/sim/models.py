@@ -21,7 +21,6 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.frame import Box
-from executive.cell.layout import build_object_class
 from executive.cell.objects import ObjectClass
 from executive.cell.protocols import STEP
 from executive.cell.workcell import KeyPath
@@ -166,7 +165,7 @@ def compute_mass(config: ObjectConfig) -> float:
 
 def build_simulated_class(label: str, config: ObjectConfig) -> ObjectClass:
     """Return the object class of a section of a cell file, with the mass of the simulated objects."""
-    return replace(build_object_class(label, config), mass=compute_mass(config))
+    return replace(config.build_class(label), mass=compute_mass(config))
 
 
 def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:

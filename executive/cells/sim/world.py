@@ -18,9 +18,9 @@ import pybullet
 from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.cell.config import BinConfig, CellConfig, ObjectConfig
+from executive.cell.config import NECK_LENGTH, TOOL_RADIUS, BinConfig, CellConfig, ObjectConfig
 from executive.cell.device_config import Colour
-from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, list_bin_boxes
+from executive.cell.objects import BIN_THICKNESS
 from executive.cell.protocols import STEP
 from executive.cell.workcell import Shape
 from executive.cells import world_log
@@ -321,7 +321,19 @@ def name_load(label: str) -> str:
 
 def add_bin(client: BulletClient, bin: BinConfig) -> int:
     """Create the static body of a bin, with floor and walls, and return the body."""
-    half_sizes, centres = map(list, zip(*list_bin_boxes(bin.size), strict=True))
+    length, width, height = bin.size
+    half_thickness = BIN_THICKNESS / 2
+    half_outer_width = width / 2 + BIN_THICKNESS
+    wall_x = (length + BIN_THICKNESS) / 2
+    wall_y = (width + BIN_THICKNESS) / 2
+    wall_z = height / 2
+    floor_size = [length / 2 + BIN_THICKNESS, half_outer_width, half_thickness]
+    end_size = [half_thickness, half_outer_width, wall_z]
+    side_size = [length / 2, half_thickness, wall_z]
+    half_sizes = [floor_size, end_size, end_size, side_size, side_size]
+    end_centres = [[wall_x, 0.0, wall_z], [-wall_x, 0.0, wall_z]]
+    side_centres = [[0.0, wall_y, wall_z], [0.0, -wall_y, wall_z]]
+    centres = [[0.0, 0.0, half_thickness], *end_centres, *side_centres]
     shape = {"shapeTypes": [pybullet.GEOM_BOX] * len(half_sizes), "halfExtents": half_sizes}
     colours = [[*bin.colour, 1]] * len(half_sizes)
     collision = client.createCollisionShapeArray(**shape, collisionFramePositions=centres)
