@@ -194,7 +194,9 @@ class CellWrapper:
     """
 
     def __init__(self, inner: Workcell) -> None:
-        self.inner, self.cell, self.accounts = inner, inner.cell, inner.accounts
+        self.inner = inner
+        self.cell = inner.cell
+        self.accounts = inner.accounts
 
     @property
     def steps(self) -> int:

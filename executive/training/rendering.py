@@ -259,7 +259,7 @@ class SceneRenderer:
         if is_holding:
             objects.append(arrangements.draw_held_object(world.get_tool_pose(), self._config, rng))
         objects_by_body = {world.add_object(o.label, o.X_WO, o.colour, o.model): o for o in objects}
-        world.table_top.paint(colour, texture)
+        world.paint_table(colour, texture)
         rendered = render(world, matrix, X_WC, region, light)
         scale = IMAGE_SIZE / (region[2] - region[0])
         labelled = self._label_image(rendered, MIN_CONTRAST * noise.read, objects_by_body, region[:2], scale)

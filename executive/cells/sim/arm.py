@@ -50,9 +50,12 @@ class ContactMonitor:
 
         The lip is exempt if `lip_may_touch`.
         """
-        now, last_steps = self._world.step_count, self._last_contact_steps
-        oldest_step = now - SEPARATION_STEP_COUNT
-        self._last_contact_steps = {pair: step for pair, step in last_steps.items() if step >= oldest_step}
+        now = self._world.step_count
+        self._last_contact_steps = {
+            pair: step
+            for pair, step in self._last_contact_steps.items()
+            if step >= now - SEPARATION_STEP_COUNT
+        }
         for part, body, position, force in self._iterate_contacts():
             if (part, body) in self._last_contact_steps:
                 self._last_contact_steps[part, body] = now
@@ -70,7 +73,8 @@ class ContactMonitor:
 
     def _iterate_contacts(self) -> Iterator[tuple[str, int, Sequence[float], float]]:
         """Yield part of the robot, touched body, contact point [m] and normal force [N] of each contact."""
-        world, held_body = self._world, self._get_held_body()
+        world = self._world
+        held_body = self._get_held_body()
         robot = (world.arm,) if held_body is None else (world.arm, held_body)
         for body in robot:
             for point in world.client.getContactPoints(bodyA=body) or ():
@@ -146,16 +150,12 @@ class SimArm(PlanningArm[Trajectory]):
 
     @property
     def at_rest(self) -> bool:
-        """True while the arm neither follows a motion nor brakes."""
+        """True while no motion runs."""
         return self._motion is None
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
-        """Plan the next motion, from the end of the running motion, before `plan` requests it.
-
-        Raises:
-            Fault: The cell file has no such pose.
-        """
-        if self._braking_times is None:  # a braking arm does not reach the end of the motion
+        """Plan the next motion from the end of the running motion; while the arm brakes, do nothing."""
+        if self._braking_times is None:
             super().plan_ahead(goal, task)
 
     def start(self, motion: Motion) -> None:
@@ -216,7 +216,8 @@ class SimArm(PlanningArm[Trajectory]):
         self._commanded_q = self._motion.state_at(self._motion_time)[0]
         self.send_command()
         if has_ended:
-            self._motion, self._braking_times = None, None
+            self._motion = None
+            self._braking_times = None
             self._world.log.append(world_log.MOTION_END)
 
     @property
@@ -225,16 +226,15 @@ class SimArm(PlanningArm[Trajectory]):
         return self._commanded_q if self._motion is None else self._motion.end
 
     def _describe_disturbance(self, tolerance: float) -> str:
-        """Return a sentence if a joint is over `tolerance` [rad] away from its command, else ""."""
         error = _describe_difference(self.q, self._commanded_q, tolerance)
         return f"something holds or pushes the arm off its path: {error}" if error else ""
 
 
 def _describe_difference(q: Array, expected_q: Array, tolerance: float) -> str:
     """Return a clause if a joint at `q` `(n,)` [rad] is over `tolerance` [rad] away from `expected_q`."""
-    errors = np.abs(q - expected_q).tolist()
-    joint = errors.index(max(errors))
-    degrees, allowed = math.degrees(errors[joint]), math.degrees(tolerance)
-    return (
-        f"joint {joint + 1} is {degrees:.2f}° away; {allowed:.1f}° are allowed" if degrees > allowed else ""
-    )
+    errors = np.degrees(np.abs(q - expected_q))
+    joint = int(errors.argmax())
+    allowed = math.degrees(tolerance)
+    if errors[joint] <= allowed:
+        return ""
+    return f"joint {joint + 1} is {errors[joint]:.2f}° away; {allowed:.1f}° are allowed"

@@ -49,8 +49,10 @@ def draw_light(rng: np.random.Generator) -> Light:
     shadow = bool(rng.random() < 0.35)
     if rng.random() < 0.2:
         return Light(shadow=shadow)
-    azimuth, elevation = rng.uniform(0, math.tau), rng.uniform(math.radians(18), math.pi / 2)
-    x, y = math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth)
+    azimuth = rng.uniform(0, math.tau)
+    elevation = rng.uniform(math.radians(18), math.pi / 2)
+    x = math.cos(elevation) * math.cos(azimuth)
+    y = math.cos(elevation) * math.sin(azimuth)
     red, green, blue = rng.uniform(0.72, 1.0, 3)
     random_number = rng.random()
     brightness = 1.0 if random_number < 0.5 else 1.5
@@ -133,7 +135,8 @@ def draw_camera(
     if camera.mount == "wrist":
         return matrix, X_WC
     target = intersect_plane(matrix, X_WC, (centre[0], centre[1]), 0.0)
-    angle, tilt = rng.uniform(0, math.tau), MAX_TILT * float(rng.choice([0.0, 0.1, 0.3, 1.0])) * rng.random()
+    angle = rng.uniform(0, math.tau)
+    tilt = MAX_TILT * float(rng.choice([0.0, 0.1, 0.3, 1.0])) * rng.random()
     rotation, _ = cv2.Rodrigues(tilt * np.array([math.cos(angle), math.sin(angle), 0.0]))
     rotation = np.asarray(rotation) @ rotate_about_z(rng.normal(0, math.radians(3)))
     offset = (X_WC.position - target) * (1 + rng.uniform(-1, 1) * MAX_DISTANCE_CHANGE)
@@ -148,8 +151,8 @@ def draw_noise(noise: NoiseConfig, rng: np.random.Generator) -> NoiseConfig:
     """
     if rng.random() < 0.6:
         return noise
-    gain, read = noise.gain + rng.exponential(0.06), noise.read * math.exp(rng.uniform(-1, 2.2))
-    return NoiseConfig(gain=gain, read=read)
+    gain = noise.gain + rng.exponential(0.06)
+    return NoiseConfig(gain=gain, read=noise.read * math.exp(rng.uniform(-1, 2.2)))
 
 
 MAX_SPARSE_OBJECT_COUNT = 7
@@ -229,7 +232,8 @@ def draw_objects(config: CellConfig, count: int, table_colour: Colour, rng: Gene
         model = config.objects[label]
         colour = draw_object_colour(model.colours, table_colour, rng)
         if rng.random() < unknown_fraction:
-            label, model = UNKNOWN_LABEL, load_unknown_model(int(rng.choice(TRAINING_MODEL_NUMBERS)))
+            label = UNKNOWN_LABEL
+            model = load_unknown_model(int(rng.choice(TRAINING_MODEL_NUMBERS)))
             model = scale_model(model, rng.uniform(0.4, 1.0))
         elif rng.random() < scaled_fraction:
             model = scale_model(model, float(rng.choice(SCALE_FACTORS)))
@@ -316,13 +320,13 @@ def _move_tool(world: World, X_WT: Pose) -> None:
 
 
 def _draw_rotation(rng: Generator) -> Array:
-    """Return a random rotation matrix with uniform distribution."""
     return Pose.of(np.zeros(3), rng.normal(size=4)).rotation
 
 
 def _overlaps_rectangle(bin: Bin, low: Array, high: Array) -> bool:
     """Return True if a bin overlaps the rectangle from `low` to `high` `(2,)` [m] by over 4 cm."""
-    centre, half_size = bin.position[:2], bin.size[:2] / 2
+    centre = bin.position[:2]
+    half_size = bin.size[:2] / 2
     return bool((centre + half_size > low + 0.04).all() and (centre - half_size < high - 0.04).all())
 
 
@@ -367,7 +371,8 @@ def _place_side_by_side(
     for candidate in objects:
         radius = candidate.model.radius
         for _ in range(30):
-            point, floor_height = rng.uniform(low, high), 0.0
+            point = rng.uniform(low, high)
+            floor_height = 0.0
             if bins and rng.random() < 0.35:
                 bin = bins[int(rng.integers(len(bins)))]
                 max_offset = np.maximum(bin.size[:2] / 2 - radius, 0.0)

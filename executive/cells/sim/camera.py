@@ -96,7 +96,8 @@ class RenderedImage:
 def render(world: World, matrix: Array, X_WC: Pose, region: Region, light: Light) -> RenderedImage:
     """Render a region of a camera image at full resolution."""
     left, top, right, bottom = region
-    width, height = right - left, bottom - top
+    width = right - left
+    height = bottom - top
     # TinyRenderer samples the lower left corner of a pixel; a shift by half a pixel samples the centre.
     shifted_region = (left + 0.5, top - 0.5, right + 0.5, bottom - 0.5)
     _, _, rgba, depth_buffer, segmentation = world.client.getCameraImage(
@@ -135,7 +136,9 @@ class FixedViewRenderer:
     """
 
     def __init__(self, world: World, region: Region, light: Light) -> None:
-        self._world, self._region, self._light = world, region, light
+        self._world = world
+        self._region = region
+        self._light = light
         self._client = world.client
         static_bodies = (world.floor, world.table, *world.bin_bodies.values())
         self._static_shapes = [shape for body in static_bodies for shape in self._list_shapes(body)]
@@ -155,7 +158,8 @@ class FixedViewRenderer:
         if background is None or view != self._background_view:
             object_shapes = [shape for body in self._world.labels for shape in self._list_shapes(body)]
             background = self._render_without(self._arm_shapes + object_shapes, matrix, X_WC)
-            self._background, self._background_view = background, view
+            self._background = background
+            self._background_view = view
         foreground = self._render_without(self._static_shapes, matrix, X_WC)
         is_in_front = foreground.depth_buffer <= background.depth_buffer
         return replace(
@@ -259,7 +263,8 @@ def _compute_occlusion_mask(
                 # around the camera, which would occlude the whole image.
                 if z <= radius:
                     continue
-                column, row = round(x / z), round(y / z)
+                column = round(x / z)
+                row = round(y / z)
                 # OpenCV cannot draw circles with very large coordinates.
                 if abs(column) <= 4 * size[0] and abs(row) <= 4 * size[1]:
                     cv2.circle(mask, (column, row), max(1, round(matrix[0, 0] * radius / z)), 1, -1)
@@ -372,7 +377,7 @@ class SimCamera(MountedCamera):
         return self._occlusion.is_table_visible(self.matrix, self._compute_pose(), self._size)
 
     def describe_displacement(self, frame: Frame) -> str:
-        """Return a message if a frame shows a displacement of the camera from the declared pose, else ""."""
+        """Compare the bins in a frame with their places in the cell file."""
         return describe_displacement(frame, self._bins)
 
     def _get_true_view(self) -> tuple[Array, Pose]:
@@ -380,7 +385,6 @@ class SimCamera(MountedCamera):
         return compute_calibration(self._true_config)[0], get_camera_pose(self._world, self._true_config)
 
     def _capture_images(self) -> tuple[Image, Array | None]:
-        """Return colour and depth image of the current frame; without a depth sensor, the latter is None."""
         rendered = self._render(*self._get_true_view())
         rng = np.random.default_rng([self._seed, self._frame_count])
         image = add_noise(rendered.image, self._true_config.noise, rng)

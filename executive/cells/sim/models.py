@@ -103,9 +103,9 @@ class Mesh:
         normals = np.cross(b - a, c - a)
         lengths = np.linalg.norm(normals, axis=1)
         has_area = lengths > 0  # triangles without an area have no normal
-        normals, a = normals[has_area] / lengths[has_area, None].clip(1e-12), a[has_area]
+        normals = normals[has_area] / lengths[has_area, None].clip(1e-12)
         # A matrix of all distances would take 2 GB for 20,000 triangles.
-        planes = zip(a, normals, strict=True)
+        planes = zip(a[has_area], normals, strict=True)
         return all(((self.vertices - point) @ normal).max() < 1e-4 for point, normal in planes)
 
 
@@ -332,7 +332,8 @@ SUBPIXEL_COUNT = 4
 
 def compute_bounding_box(pixels: Array) -> Box:
     """Return the box around projected vertices `(N, 2)` [pixel]."""
-    (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
+    left, top = pixels.min(axis=0)
+    right, bottom = pixels.max(axis=0)
     return float(left), float(top), float(right), float(bottom)
 
 
@@ -344,7 +345,8 @@ def compute_silhouette_area(mesh: Mesh, pixels: Array) -> float:
     size = np.ceil((pixels.max(axis=0) - corner + 1) * SUBPIXEL_COUNT).astype(int)
     mask = np.zeros((size[1], size[0]), np.uint8)
     triangles = ((pixels - corner) * SUBPIXEL_COUNT)[mesh.triangles]
-    (ax, ay), (bx, by) = (triangles[:, 1] - triangles[:, 0]).T, (triangles[:, 2] - triangles[:, 0]).T
+    ax, ay = (triangles[:, 1] - triangles[:, 0]).T
+    bx, by = (triangles[:, 2] - triangles[:, 0]).T
     # The triangles on the side of the camera, whose corners are clockwise, cover the whole silhouette.
     for triangle in triangles[ax * by - ay * bx > 0].round().astype(np.int32):
         cv2.fillConvexPoly(mask, triangle, 1)

@@ -220,7 +220,7 @@ def build_world(config: CellConfig, scene: SceneConfig, *, gui: bool = False) ->
     """Return the world of a scene, without objects; its `config` contains the changes of the scene."""
     world = World(apply_scene(config, scene), gui=gui)
     if (scene.table.colour, scene.table.texture) != ((1.0, 1.0, 1.0), WOOD_TEXTURE):
-        world.table_top.paint(scene.table.colour, scene.table.texture)
+        world.paint_table(scene.table.colour, scene.table.texture)
     return world
 
 
