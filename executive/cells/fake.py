@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
@@ -37,16 +36,10 @@ from executive.perception.localization import CellLocalizer
 
 DEFAULT_CONFIDENCE = 0.9
 """Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""
-
 MAX_SEAL_OFFSET = 0.012
 """Maximum horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
-
 TOUCH_DISTANCE = 0.002
 """Maximum vertical distance between the cup and the top of an object for contact [m]."""
-
-DEFAULT_BREAKAWAY_FORCE = 7.9
-"""Breakaway force of the seals of the fake tool, unless a test changes it [N]."""
-
 LOAD_NOISE = 1e-9
 """Amplitude of the noise of the load of the fake tool [N], so that the load cell does not seem broken."""
 
@@ -82,13 +75,7 @@ class FakeObject:
 class FakeWorld:
     """Objects and bins of a fake cell.
 
-    Attributes:
-        classes: Classes of the objects, by label.
-        bins: The bins of the cell.
-        objects: The objects, in the order in which they were added.
-        removed_objects: The objects that were removed from the world.
-        held_object: The object that the tool holds, or None.
-        is_commanded: True if arm or tool has received a command since the last control step.
+    `is_commanded` is True if arm or tool has received a command since the last control step.
     """
 
     classes: Mapping[str, ObjectClass]
@@ -99,13 +86,7 @@ class FakeWorld:
     is_commanded: bool = False
 
     def put(self, label: str, x: float, y: float) -> FakeObject:
-        """Put a new object on the table, and return it.
-
-        Args:
-            label: Class of the object.
-            x: Position of the centre along x [m].
-            y: Position of the centre along y [m].
-        """
+        """Put a new object of a class on the table, with its centre at `x` and `y` [m], and return it."""
         position = np.array([x, y, self.classes[label].height / 2])
         fake_object = FakeObject(label, position, [position.copy()])
         self.objects.append(fake_object)
@@ -118,7 +99,8 @@ class FakeWorld:
 
     def release(self, *, is_dropped: bool = False) -> None:
         """Let the held object fall straight down; if it is dropped, it rolls to a free position."""
-        if (fake_object := self.held_object) is None:
+        fake_object = self.held_object
+        if fake_object is None:
             return
         self.held_object = None
         fake_object.position[2] = self.classes[fake_object.label].height / 2
@@ -145,9 +127,11 @@ class FakeWorld:
     def find_bin(self, fake_object: FakeObject) -> Bin | None:
         """Return the bin that contains an object; if there is none, the bin on whose wall the object lies."""
         wall_margin = BIN_THICKNESS + self.classes[fake_object.label].radius / 2
-        margins_and_bins = itertools.product((0.0, wall_margin), self.bins)
-        places = (bin for margin, bin in margins_and_bins if bin.contains(fake_object.position, margin))
-        return next(places, None)
+        for margin in (0.0, wall_margin):
+            for bin in self.bins:
+                if bin.contains(fake_object.position, margin):
+                    return bin
+        return None
 
     def find_touched_object(self, tip_position: Array) -> FakeObject | None:
         """Return the object that a cup at `tip_position` `(3,)` [m] touches from above, or None."""
@@ -162,77 +146,61 @@ class FakeWorld:
         return None
 
 
+@dataclass(eq=False)
 class FakeTool:
     """A suction cup that seals on every touched object, unless `can_seal` returns False.
 
-    Args:
-        world: The world with the objects.
-        get_tip_position: Returns the position of the tool tip `(3,)` [m].
-        load_std: Declared standard deviation of a reading of `load` [N].
-
-    Attributes:
-        can_seal: Function that returns True if the cup can seal on the touched object; set by tests.
-        breakaway_force: Force that every seal withstands [N].
-        load_error: Error of `load` [N]; set by tests.
+    Tests set `can_seal`, the force that every seal withstands [N], and the error of `load` [N].
     """
 
-    def __init__(self, world: FakeWorld, get_tip_position: Callable[[], Array], load_std: float) -> None:
-        self._world = world
-        self._get_tip_position = get_tip_position
-        self.load_std = load_std
-        self.load_error = 0.0
-        self._noise = LOAD_NOISE
-        self.can_seal: Callable[[], bool] = lambda: True
-        self.breakaway_force = DEFAULT_BREAKAWAY_FORCE
+    world: FakeWorld
+    get_tip_position: Callable[[], Array]
+    load_std: float
+    can_seal: Callable[[], bool] = field(default=lambda: True)
+    breakaway_force: float = 7.9
+    load_error: float = 0.0
+    _noise: float = LOAD_NOISE
 
     @property
     def touching(self) -> bool:
         """True while the cup touches an object or the table."""
-        tip_position = self._get_tip_position()
-        return self._world.find_touched_object(tip_position) is not None or float(tip_position[2]) <= 0.0
+        tip_position = self.get_tip_position()
+        return self.world.find_touched_object(tip_position) is not None or float(tip_position[2]) <= 0.0
 
     @property
     def holding(self) -> bool:
-        """True while the tool holds an object."""
-        return self._world.held_object is not None
+        return self.world.held_object is not None
 
     @property
     def holding_force(self) -> float:
-        """Breakaway force of the seal [N]; 0 while the tool holds nothing."""
         return self.breakaway_force if self.holding else 0.0
 
     @property
     def load(self) -> float:
         """Weight of the held object by the mass of its class, plus `load_error` and alternating noise [N]."""
         self._noise = -self._noise
-        held = self._world.held_object
-        force = self._world.classes[held.label].mass * GRAVITY if held else 0.0
+        held = self.world.held_object
+        force = self.world.classes[held.label].mass * GRAVITY if held else 0.0
         return force + self.load_error + self._noise
 
     def close(self) -> None:
-        """Seal the cup on the touched object."""
-        self._world.is_commanded = True
-        touched = self._world.find_touched_object(self._get_tip_position())
+        self.world.is_commanded = True
+        touched = self.world.find_touched_object(self.get_tip_position())
         if touched is not None and self.can_seal():
             touched.is_dropped = False
-            self._world.held_object = touched
+            self.world.held_object = touched
 
     def open(self) -> None:
-        """Release the held object; it falls straight down."""
-        self._world.is_commanded = True
-        self._world.release()
+        self.world.is_commanded = True
+        self.world.release()
 
     def break_seal(self) -> None:
-        """Break the seal: the held object falls straight down, and rolls off other objects and bin walls."""
-        self._world.release(is_dropped=True)
+        """Drop the held object; it rolls off other objects and bin walls."""
+        self.world.release(is_dropped=True)
 
 
 class FakeCamera(MountedCamera):
-    """The camera of a cell file, with blank images.
-
-    Attributes:
-        occluded_regions: Regions of the image that frames mark as occluded [pixel]; set by tests.
-    """
+    """The camera of a cell file, with blank images and the `occluded_regions` [pixel] that a test sets."""
 
     def __init__(
         self, config: CellConfig, arm: FakeArm, clock: Clock, get_change_count: Callable[[], int]
@@ -244,7 +212,7 @@ class FakeCamera(MountedCamera):
         self._corners = np.array([(x, y, 0.0) for x in config.table.x for y in config.table.y])
 
     def sees_table(self) -> bool:
-        """Return True if the whole workspace is in the image, without regard to occlusion."""
+        """Return True if the whole workspace is in the image; occlusion does not count."""
         return compute_hull_mask(self._corners, self.matrix, self._compute_pose(), self._size) is not None
 
     def _capture_images(self) -> tuple[NDArray[np.uint8], None]:
@@ -262,35 +230,28 @@ class FakeCamera(MountedCamera):
 class FakeDetector:
     """A detector that finds every object in a view, unless a test replaces `make_answer`.
 
-    Attributes:
-        name: Name of the detector in the cell file.
-        config: Section of the detector in the cell file.
-        world: The world with the true objects.
-        clock: Clock of the run.
-        get_view_region: Returns the image region [pixel] of a view, which is `table` or `full`.
-        make_answer: Returns the detections, or a message if the detector is unavailable. Its arguments are
-            the number of the request (from 1) and the true detections.
-        request_count: Number of requests so far.
+    `make_answer` returns the detections, or a message if the detector is unavailable. Its arguments are the
+    number of the request (from 1) and the true detections.
     """
 
     name: str
     config: DetectorConfig
     world: FakeWorld
     clock: Clock
-    get_view_region: Callable[[str], Box]
+    get_view_box: Callable[[str], Box]
     make_answer: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = field(
         default=lambda _request_number, true_detections: true_detections
     )
     request_count: int = 0
 
     def request(self, frame: Frame, view: str) -> PendingSearch:
-        """Return a request for the objects in a view of a frame, with the latency of the cell file."""
         self.request_count += 1
-        left, top, right, bottom = self.get_view_region(view)
+        left, top, right, bottom = self.get_view_box(view)
         true_detections = []
         for fake_object in self.world.objects:
             x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
-            column, row = x / depth, y / depth
+            column = x / depth
+            row = y / depth
             is_inside = depth > 0 and left <= column < right and top <= row < bottom
             if is_inside and fake_object is not self.world.held_object:
                 half_side = frame.matrix[0, 0] / depth * self.world.classes[fake_object.label].radius
@@ -303,15 +264,12 @@ class FakeDetector:
             future.set_exception(Unavailable(answer))
         else:
             future.set_result(list(answer))
-        due_time = self.clock.now + self.config.latency
-        return PendingSearch(future, due_time, self.clock, self.name, self.config.error_rates)
-
-    def close(self) -> None:
-        """Do nothing: the detector holds no resources."""
+        answer_time = self.clock.now + self.config.latency
+        return PendingSearch(future, answer_time, self.clock, self.name, self.config.error_rates)
 
 
 def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
-    """Put objects of random classes on random grid points; the cell file limits the number of objects."""
+    """Put objects of random classes on random grid points, as many as the cell file permits."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(*config.table.objects, endpoint=True))
     points = list_grid_points(config)
@@ -330,30 +288,16 @@ def list_grid_points(config: CellConfig) -> list[tuple[float, float]]:
 class FakeArm(PlanningArm[StraightMotion]):
     """An arm that moves on straight joint paths, stops without braking, and never hits an obstacle by itself.
 
-    `StraightPlanner` plans its motions.
-
-    Args:
-        world: The world that contains the held object.
-        config: The cell file.
-        clock: Clock of the run.
-        emit: Receives the events of the arm.
-
-    Attributes:
-        q: Joint positions `(n,)` [rad].
-        poses: Joint positions `(n,)` [rad] of each named pose; a run begins at `home`.
-        tool_velocity: Velocity zero `(3,)` [m/s]: a released object falls straight down.
-        collision: Description of the obstacle that stopped the last motion, or None.
-        contact_point: Position of the tool `(x, y, z)` [m] at the last `next_obstacle`, or None.
-        next_obstacle: Name of an obstacle in the middle of the next motion, or None; set by tests.
-        commands: Names of the executed commands, `start` or `stop`, in order, for tests.
+    The tool velocity is zero: a released object falls straight down. For tests, `commands` contains the
+    executed commands, `start` or `stop`, and `next_obstacle` names an obstacle in the middle of the next
+    motion.
     """
 
     q = np.zeros(0)
 
     def __init__(self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit) -> None:
         planner = build_planner(config)
-        straight_planner = StraightPlanner(config, planner.kinematics)
-        super().__init__(config, planner, straight_planner.plan, clock, emit)
+        super().__init__(config, planner, StraightPlanner(config, planner.kinematics).plan, clock, emit)
         self.q = self.poses["home"]
         self.tool_velocity = np.zeros(3)
         self.next_obstacle: str | None = None
@@ -364,7 +308,6 @@ class FakeArm(PlanningArm[StraightMotion]):
 
     @property
     def at_rest(self) -> bool:
-        """True while no motion runs."""
         return not self._path
 
     @property
@@ -372,11 +315,6 @@ class FakeArm(PlanningArm[StraightMotion]):
         return self._path[-1] if self._path else self.q
 
     def start(self, motion: Motion) -> None:
-        """Begin to follow a motion.
-
-        Raises:
-            Fault: The arm is moving, or did not plan the motion.
-        """
         self._path = list(self._require_own_motion(motion, StraightMotion).qs)
         self._half_length = len(self._path) // 2
         self.commands.append("start")
@@ -392,13 +330,12 @@ class FakeArm(PlanningArm[StraightMotion]):
         self._path = []
 
     def stop(self) -> None:
-        """End the running motion without braking."""
         if self._path:
             self.commands.append("stop")
         self._path = []
 
     def stop_after_collision(self, message: str) -> None:
-        """Stop the running motion and set `collision` to a message; do nothing if the arm is at rest."""
+        """Stop the running motion, if any, with a message as `collision`."""
         if self._path:
             self.collision = message
             self.stop()
@@ -422,26 +359,10 @@ SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yello
 
 
 class FakeCell(CellWithoutHardware):
-    """The cell of a cell file without physics; implements `executive.cell.workcell.Workcell`.
+    """The cell of a cell file without physics; by default the shipped cell `overhead` without objects.
 
-    Bins, classes, table, poses, camera, detectors and ledger follow the cell file. The arm moves on straight
-    joint paths, the tool always seals, and every detector finds all objects.
-
-    Args:
-        config: The cell file; by default the result of `load_empty_cell`.
-        seed: Random seed for the classes and positions of the objects.
-        routes: Names of the permitted bins of each class.
-        emit: Receives the events of the cell.
-        options: Options of the run; by default, the operator requests nothing.
-
-    Attributes:
-        world: Objects and bins.
-        arm: The fake arm.
-        tool: The fake tool.
-        camera: The fake camera.
-        detectors: The fake detectors by name.
-        detector: The first detector.
-        ledger: The ledger of the run, the same object as `accounts`.
+    The arm moves on straight joint paths, the tool always seals, and every detector finds all objects. By
+    default, the operator requests nothing. `detector` is the first detector, `ledger` the same as `accounts`.
 
     Raises:
         InputError: `options` request a window, or the state of a resumed run cannot be read.
@@ -461,7 +382,9 @@ class FakeCell(CellWithoutHardware):
         if options.gui:
             raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
         super().__init__(config, seed=seed, routes=routes, emit=emit, options=options)
-        classes, clock, bins = self.cell.classes, self.cell.clock, tuple(self.cell.bins.values())
+        clock = self.cell.clock
+        classes = self.cell.classes
+        bins = tuple(self.cell.bins.values())
         self.ledger = self.accounts
         self.world = FakeWorld(classes, bins)
         put_random_objects(self.world, config, seed)
@@ -483,7 +406,6 @@ class FakeCell(CellWithoutHardware):
 
     @staticmethod
     def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Yield key and message for an unsupported arm, places out of reach, lack of room, and bad views."""
         del cell_folder
         if arm_errors := tuple(find_arm_errors(config)):
             yield from arm_errors
@@ -491,15 +413,12 @@ class FakeCell(CellWithoutHardware):
         yield from find_places_out_of_reach(config)
         place_count = len(list_grid_points(config))
         if config.table.objects[1] > place_count:
-            yield (
-                ("table", "objects"),
-                f"the table has room for {place_count} objects, not for {config.table.objects[1]}",
-            )
+            message = f"the table has room for {place_count} objects, not for {config.table.objects[1]}"
+            yield ("table", "objects"), message
         yield from find_view_errors(config)
 
     @staticmethod
     def labels(config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return None for every detector: a fake detector knows all classes."""
         del cell_folder
         return dict.fromkeys(config.detectors)
 
@@ -509,7 +428,6 @@ class FakeCell(CellWithoutHardware):
         self.log_state()
 
     def log_state(self) -> None:
-        """Write the current state of the world to the log."""
         if self._log is None:
             return
         held = self.world.held_object
@@ -535,7 +453,6 @@ class FakeCell(CellWithoutHardware):
             raise InputError(f'the world in "{path}" is damaged: {error}; run the mission again') from error
 
     def advance(self) -> None:
-        """Advance arm and ledger by one control step, and log the state."""
         if self.world.is_commanded:
             self.last_command_step = self.steps
             self.world.is_commanded = False
@@ -546,13 +463,12 @@ class FakeCell(CellWithoutHardware):
     def _list_final_objects(self) -> Iterator[FinalObject]:
         for each in (*self.world.objects, *self.world.removed_objects):
             bin = self.world.find_bin(each)
+            name = bin.name if bin else ""
             is_held = each is self.world.held_object
             is_removed = each in self.world.removed_objects
-            name = bin.name if bin else ""
             yield FinalObject(each.label, name, each.rest_positions, each.is_dropped, is_held, is_removed)
 
     def close(self) -> None:
-        """Close the arm and the log."""
         self.arm.close()
         if self._log is not None:
             self._log.close()

@@ -116,7 +116,6 @@ class SilentOperator:
         self._requests = list(requests)
 
     def ask(self, choices: Sequence[str]) -> str | None:
-        """Return the next class of the list, or None at the end of the list."""
         del choices
         return self._requests.pop(0) if self._requests else None
 
@@ -199,18 +198,15 @@ class CellWithoutHardware:
         )
 
     def log_to(self, path: Path) -> None:
-        """Do nothing: without hardware or physics, there is no world to log."""
+        del path  # without hardware or physics, there is no world to log
 
     def advance(self) -> None:
-        """Count one control step."""
         self.steps += 1
 
     def visuals(self) -> Visuals | None:
-        """Return None: the cell has no shapes to show."""
         return None
 
     def audit(self) -> Mapping[str, int] | None:
-        """Return the number of objects by `AUDIT_KEYS`; None if the true positions are unknown."""
         if (objects := self._list_final_objects()) is None:
             return None
         gate = self.config.ledger.gate

@@ -46,16 +46,10 @@ class ContactMonitor:
         self._last_contact_steps = {(part, body): step for part, body, _, _ in self._iterate_contacts()}
 
     def find_new_contact(self, lip_may_touch: bool) -> tuple[str, Sequence[float] | None]:
-        """Return description and point [m] of a new forbidden contact; without one, "" and None.
-
-        The lip is exempt if `lip_may_touch`.
-        """
+        """Return description and point [m] of a new forbidden contact; without one, "" and None."""
         now = self._world.step_count
-        self._last_contact_steps = {
-            pair: step
-            for pair, step in self._last_contact_steps.items()
-            if step >= now - SEPARATION_STEP_COUNT
-        }
+        oldest = now - SEPARATION_STEP_COUNT
+        self._last_contact_steps = {k: step for k, step in self._last_contact_steps.items() if step >= oldest}
         for part, body, position, force in self._iterate_contacts():
             if (part, body) in self._last_contact_steps:
                 self._last_contact_steps[part, body] = now
@@ -137,12 +131,10 @@ class SimArm(PlanningArm[Trajectory]):
 
     @property
     def q(self) -> Array:
-        """Measured joint positions `(n,)` [rad]."""
         return self._world.get_joint_positions()
 
     @property
     def tool_velocity(self) -> Array:
-        """Velocity of the tool centre point in the world `(3,)` [m/s], from the measured joint velocities."""
         states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
         q, q_change = np.array([(state[0], state[1] * DIFFERENTIATION_STEP) for state in states]).T
         compute_pose = self.planner.kinematics.compute_tool_pose
@@ -150,7 +142,6 @@ class SimArm(PlanningArm[Trajectory]):
 
     @property
     def at_rest(self) -> bool:
-        """True while no motion runs."""
         return self._motion is None
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
@@ -159,9 +150,7 @@ class SimArm(PlanningArm[Trajectory]):
             super().plan_ahead(goal, task)
 
     def start(self, motion: Motion) -> None:
-        """Begin to follow a motion. The arm must be at rest at the start of the motion.
-
-        If something has pushed the arm away from the start, the arm stays there, which counts as a collision.
+        """Begin to follow a motion; if something has pushed the arm off its start, report a collision.
 
         Raises:
             Fault: The arm is moving, was not sent to the start, or did not plan the motion.
@@ -181,7 +170,6 @@ class SimArm(PlanningArm[Trajectory]):
         self._world.log.append_motion(trajectory)
 
     def stop(self) -> None:
-        """Begin to brake along the path of the running motion, if any."""
         if self._motion is not None and self._braking_times is None:
             limits = self.planner.limits
             self._braking_times = list(plan_braking(self._motion, self._motion_time, limits))
@@ -222,7 +210,6 @@ class SimArm(PlanningArm[Trajectory]):
 
     @property
     def _end_q(self) -> Array:
-        """Joint positions `(n,)` [rad] at the end of the running motion, or now if the arm is at rest."""
         return self._commanded_q if self._motion is None else self._motion.end
 
     def _describe_disturbance(self, tolerance: float) -> str:

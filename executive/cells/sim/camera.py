@@ -373,11 +373,9 @@ class SimCamera(MountedCamera):
             self._render = partial(render, world, region=region, light=light)
 
     def sees_table(self) -> bool:
-        """Return True if the whole workspace is in the image now and not occluded by the arm."""
         return self._occlusion.is_table_visible(self.matrix, self._compute_pose(), self._size)
 
     def describe_displacement(self, frame: Frame) -> str:
-        """Compare the bins in a frame with their places in the cell file."""
         return describe_displacement(frame, self._bins)
 
     def _get_true_view(self) -> tuple[Array, Pose]:

@@ -62,7 +62,8 @@ class SimCell(CellWithoutHardware):
         for _, message in find_missing_depth_sensors(config):
             raise InputError(f"cell {config.cell}: {message}")
         super().__init__(config, seed=seed, routes=routes, emit=emit, options=options)
-        clock, bins = self.cell.clock, self.cell.bins.values()
+        clock = self.cell.clock
+        bins = tuple(self.cell.bins.values())
         _, camera_seed, detector_seed, load_seed = derive_seeds(seed)
         scene = load_scene(options.scene, config)
         world = self._world = build_initial_world(config, seed, gui=options.gui, scene=scene)
@@ -81,7 +82,7 @@ class SimCell(CellWithoutHardware):
             occlusion=ArmOcclusion(world, planner.kinematics, config, lambda: self._tool.holding),
             get_change_count=lambda: self.accounts.change_count,
             light=scene.light,
-            bins=tuple(bins),
+            bins=bins,
         )
         classes = {label: build_simulated_class(label, section) for label, section in config.objects.items()}
         localizer = CellLocalizer(config.localization, classes, bins, self._world.cast_ray)
@@ -94,26 +95,22 @@ class SimCell(CellWithoutHardware):
         self._connect(options, self._arm, self._tool, self._camera, self._detectors, localizer)
 
     def log_to(self, path: Path) -> None:
-        """Record all later commands for the simulated world in a log file."""
         self._world.log = CommandLog(path)
         self._arm.send_command()
 
     def advance(self) -> None:
-        """Execute one control step, which is one physics step."""
         self._arm.advance()
         self._world.step()
         super().advance()
         self._tool.advance()
 
     def visuals(self) -> SimVisuals:
-        """Return the shapes of the world for display."""
         return SimVisuals(self._world)
 
     def _list_final_objects(self) -> Iterator[FinalObject]:
         return list_final_objects(self._world, self._tool, self.cell.bins)
 
     def close(self) -> None:
-        """Close the detectors, the planner and the physics servers."""
         for detector in self._detectors.values():
             detector.close()
         self._arm.close()
@@ -125,7 +122,8 @@ class SimCell(CellWithoutHardware):
         rebuilder = WorldRebuilder(self._world, self._tool)
         for command in read_commands(log):
             rebuilder.execute(command)
-        self.steps, self.last_command_step = rebuilder.step_count, rebuilder.last_command_step
+        self.steps = rebuilder.step_count
+        self.last_command_step = rebuilder.last_command_step
         self._world.log = CommandLog(log, resume=True)
         return rebuilder
 
@@ -133,12 +131,14 @@ class SimCell(CellWithoutHardware):
 def list_final_objects(world: World, tool: SuctionTool, bins: Mapping[str, Bin]) -> Iterator[FinalObject]:
     """Yield the objects of a simulated world, including removed objects, at the end of a run."""
     for body, positions in world.rest_positions.items():
-        is_removed, is_dropped = body not in world.labels, body in tool.dropped_bodies
+        is_removed = body not in world.labels
         if is_removed:
             label, position = world.removed_objects[body]
         else:
-            label, position = world.labels[body], world.get_object_pose(body).position
+            label = world.labels[body]
+            position = world.get_object_pose(body).position
         # The centre of an object that leans on a bin wall may be above the wall.
         names = (name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS))
         bin_name = None if position[2] < MIN_CENTRE_HEIGHT else next(names, "")
+        is_dropped = body in tool.dropped_bodies
         yield FinalObject(label, bin_name, positions, is_dropped, body == tool.held_body, is_removed)

@@ -102,18 +102,12 @@ class SimCellKind:
     def __call__(
         self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
     ) -> Workcell:
-        """Return a simulated cell."""
         # A check of a mission needs neither the arm nor the ledger, whose import takes 0.3 s.
         from executive.cells.sim.cell import SimCell
 
         return SimCell(config, seed=seed, routes=routes, emit=emit, options=options)
 
     def check(self, config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return key and message of each requirement of a cell file that the simulated cell cannot fulfil.
-
-        The requirements concern the arm and its reach, the models, the detectors, the room for the objects,
-        the clearance of the poses, and the view of the cameras.
-        """
         if arm_errors := tuple(find_arm_errors(config)):
             return arm_errors
         model_errors = tuple(find_model_errors(config))
@@ -128,7 +122,6 @@ class SimCellKind:
         )
 
     def labels(self, config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return the classes that each detector knows, or None if unknown; no detector model is loaded."""
         return find_detectable_labels(config.detectors, cell_folder)
 
 

@@ -198,12 +198,10 @@ class SuctionTool:
 
     @property
     def holding(self) -> bool:
-        """True while a seal holds a body."""
         return self._grip is not None
 
     @property
     def holding_force(self) -> float:
-        """Breakaway force of the seal [N]; 0 while the tool holds nothing."""
         return 0.0 if self._grip is None else self._grip.breakaway_force
 
     @property
@@ -225,14 +223,12 @@ class SuctionTool:
         return 0.0 if self._grip is None else math.hypot(*self._grip.pull)
 
     def close(self) -> None:
-        """Switch the vacuum on, and hold a body within reach if the seal is strong enough."""
         self._world.log.append(world_log.VACUUM_ON)
         self._is_vacuum_on = True
         if self._grip is None:
             self._try_to_seal()
 
     def open(self) -> None:
-        """Release the held body and switch the vacuum off."""
         self._world.log.append(world_log.VACUUM_OFF)
         self._is_vacuum_on = False
         self._separating_body = None

@@ -385,7 +385,6 @@ class SimVisuals:
         self.shapes: Sequence[Shape] = tuple(_make_shapes(world))
 
     def poses(self) -> Mapping[str, Pose]:
-        """Return the poses of the links of the arm and of the loose objects, by name."""
         client = self._world.client
         states = client.getLinkStates(self._world.arm, self._link_indices, computeForwardKinematics=True)
         poses_by_name = {f"link {number}": Pose.of(*state[4:6]) for number, state in enumerate(states, 1)}
