@@ -198,7 +198,7 @@ class CellWithoutHardware:
         )
 
     def log_to(self, path: Path) -> None:
-        del path  # without hardware or physics, there is no world to log
+        """Do nothing: without hardware or physics, there is no world to log."""
 
     def advance(self) -> None:
         self.steps += 1

@@ -172,15 +172,15 @@ class SimArm(PlanningArm[Trajectory]):
     def stop(self) -> None:
         if self._motion is not None and self._braking_times is None:
             limits = self.planner.limits
-            self._braking_times = list(plan_braking(self._motion, self._motion_time, limits))
+            self._braking_times = plan_braking(self._motion, self._motion_time, limits).tolist()
 
     def stop_after_collision(self, message: str) -> None:
         """Set `collision` to a message, brake, and move back; do nothing at rest or while the arm brakes."""
         if self._motion is not None and self._braking_times is None:
             self.collision = message
-            braking_times = plan_braking(self._motion, self._motion_time, self.planner.limits)
-            retreat_times = plan_retreat(self._motion_time, float(braking_times[-1]))
-            self._braking_times = [*braking_times.tolist(), *retreat_times.tolist()]
+            braking_times = plan_braking(self._motion, self._motion_time, self.planner.limits).tolist()
+            retreat_times = plan_retreat(self._motion_time, braking_times[-1]).tolist()
+            self._braking_times = braking_times + retreat_times
 
     def send_command(self) -> None:
         """Send the current command to the motors."""

@@ -11,7 +11,7 @@ from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
 from executive.cells.sim.arm import SimArm
-from executive.cells.sim.camera import ArmOcclusion, SimCamera, find_missing_depth_sensors
+from executive.cells.sim.camera import SimCamera, find_missing_depth_sensors
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import build_simulated_class
 from executive.cells.sim.rebuild import WorldRebuilder
@@ -72,14 +72,12 @@ class SimCell(CellWithoutHardware):
         self._tool = SuctionTool(world, config.tool, load_seed)
         rebuilder = None if options.resume is None else self._rebuild_world(options.resume.log_path)
         self._arm = SimArm(world, planner, config, clock, lambda: self._tool.held_body, emit, rebuilder)
-        name, camera_config = next(iter(config.cameras.items()))
         self._camera = build_camera(
-            self._world,
-            name,
-            camera_config,
+            world,
+            config,
             clock,
             camera_seed,
-            occlusion=ArmOcclusion(world, planner.kinematics, config, lambda: self._tool.holding),
+            is_loaded=lambda: self._tool.holding,
             get_change_count=lambda: self.accounts.change_count,
             light=scene.light,
             bins=bins,

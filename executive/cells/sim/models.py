@@ -112,38 +112,33 @@ class Mesh:
 def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
     """Add an object to the world, with its upright frame O at the pose `X_WO`, and return the body.
 
+    A mesh has uniform density.
+
     Raises:
         InputError: The model is missing or invalid.
     """
     X_WL = X_WO @ compute_upright_pose(config)
-    body = _add_mesh(client, config, X_WL) if config.mesh else _add_urdf(client, config, X_WL)
-    if config.urdf and config.mass is not None:
-        client.changeDynamics(body, -1, mass=config.mass)
+    path = model_files.convert_model(find_model(config.mesh or config.urdf))
+    if config.mesh:
+        # PyBullet replaces each group (`g`) of a Wavefront file by its convex hull, enlarged by 1 mm.
+        shape = {"fileName": path, "meshScale": [config.scale] * 3}
+        centroid = compute_upright_pose(config).inverse().apply(load_mesh(config).centroid)
+        collision = client.createCollisionShape(pybullet.GEOM_MESH, **shape)
+        visual = client.createVisualShape(pybullet.GEOM_MESH, **shape)
+        mass = compute_mass(config)
+        body = client.createMultiBody(mass, collision, visual, X_WL.position, X_WL.quaternion, centroid)
+    else:
+        try:
+            body = client.loadURDF(path, X_WL.position, X_WL.quaternion, globalScaling=config.scale)
+        except pybullet.error as error:
+            raise InputError(
+                f"PyBullet cannot load the model {Path(config.urdf).name}: {error} Name <robot> and <link>, "
+                "and give <inertial> an <inertia>."
+            ) from error
+        if config.mass is not None:
+            client.changeDynamics(body, -1, mass=config.mass)
     client.changeDynamics(body, -1, rollingFriction=ROLLING_FRICTION, spinningFriction=ROLLING_FRICTION)
-    return body
-
-
-def _add_urdf(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
-    """Add the object of a URDF, with the frame L of the file at the pose `X_WL`, and return the body."""
-    try:
-        path = model_files.convert_model(find_model(config.urdf))
-        return int(client.loadURDF(path, X_WL.position, X_WL.quaternion, globalScaling=config.scale))
-    except pybullet.error as error:
-        problem = f"PyBullet cannot load the model {Path(config.urdf).name}: {error}"
-        raise InputError(f"{problem} Name <robot> and <link>, and give <inertial> an <inertia>.") from error
-
-
-def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
-    """Add an object of uniform density with a mesh, and return the body.
-
-    PyBullet replaces each group (`g`) of a Wavefront file by its convex hull, enlarged by 1 mm.
-    """
-    shape = {"fileName": model_files.convert_model(find_model(config.mesh)), "meshScale": [config.scale] * 3}
-    centroid = compute_upright_pose(config).inverse().apply(load_mesh(config).centroid)
-    collision = client.createCollisionShape(pybullet.GEOM_MESH, **shape)
-    visual = client.createVisualShape(pybullet.GEOM_MESH, **shape)
-    mass = compute_mass(config)
-    return int(client.createMultiBody(mass, collision, visual, X_WL.position, X_WL.quaternion, centroid))
+    return int(body)
 
 
 def compute_mass(config: ObjectConfig) -> float:

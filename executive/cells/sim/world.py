@@ -157,7 +157,9 @@ class World:
         position = [*TABLE_CENTRE, -TABLE_HEIGHT]
         quaternion = self.client.getQuaternionFromEuler([0, 0, np.pi / 2])
         self.table = self.client.loadURDF(urdf, position, quaternion, useFixedBase=True, flags=flags)
-        self._textures = {PLAIN_TEXTURE: -1}
+        shapes = self.client.getVisualShapeData(self.table, pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS)
+        # A world without visual shapes needs no textures.
+        self._textures = {PLAIN_TEXTURE: -1, WOOD_TEXTURE: shapes[0][8] if shapes else -1}
         self.arm = self._load_arm(flags)
         self.bin_bodies = {name: add_bin(self.client, bin) for name, bin in config.bins.items()}
         self.labels: dict[int, str] = {}
@@ -172,20 +174,14 @@ class World:
     def paint_table(self, colour: Colour, texture: str) -> None:
         """Give the table a texture of `TEXTURES`, with RGB values multiplied by `colour`."""
         if texture not in self._textures:
-            self._textures[texture] = self._load_texture(texture)
+            seed = TEXTURES.index(texture)
+            # PyBullet caches textures by path, so that each texture needs its own path.
+            with tempfile.TemporaryDirectory() as folder:
+                path = str(Path(folder) / f"{seed}.png")
+                cv2.imwrite(path, generate_pattern(seed))
+                self._textures[texture] = int(self.client.loadTexture(path))
         texture_id = self._textures[texture]
         self.client.changeVisualShape(self.table, -1, textureUniqueId=texture_id, rgbaColor=[*colour, 1])
-
-    def _load_texture(self, texture: str) -> int:
-        if texture == WOOD_TEXTURE:
-            flags = pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS
-            return int(self.client.getVisualShapeData(self.table, flags)[0][8])
-        seed = TEXTURES.index(texture)
-        # PyBullet caches textures by path, so that each texture needs its own path.
-        with tempfile.TemporaryDirectory() as folder:
-            path = str(Path(folder) / f"{seed}.png")
-            cv2.imwrite(path, generate_pattern(seed))
-            return int(self.client.loadTexture(path))
 
     def add_object(
         self, label: str, X_WO: Pose, colour: Sequence[float], model: ObjectConfig | None = None
