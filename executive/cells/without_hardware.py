@@ -12,7 +12,7 @@ import numpy as np
 
 from executive.cell.arm import Arm
 from executive.cell.config import CellConfig
-from executive.cell.objects import UNKNOWN_LABEL, Bin, Target
+from executive.cell.objects import UNKNOWN_LABEL, Bin
 from executive.cell.protocols import STEP, Cell, Detector, Localizer, Routes, StepClock, Tool
 from executive.cell.workcell import AUDIT_KEYS, CellOptions, Visuals
 from executive.events import Emit, TargetSelected
@@ -148,7 +148,8 @@ class CellWithoutHardware:
         del seed
         self.config = config
         self.routes = dict(routes)
-        self.steps = self.last_command_step = 0
+        self.steps = 0
+        self.last_command_step = 0
         bins = config.build_bins()
         classes = {label: section.build_class(label) for label, section in config.objects.items()}
         ignored = set(config.unknown.ignore).difference(classes)
@@ -156,9 +157,6 @@ class CellWithoutHardware:
             config.ledger, config.table, bins, classes, self.routes, options.quotas, emit, ignored
         )
         no_device: Any = None
-
-        def emit_selection(target: Target, bin: str) -> None:
-            emit(TargetSelected(target.item, target.label, target.frame, bin))
 
         self.cell = Cell(
             clock=StepClock(lambda: self.steps * STEP),
@@ -176,7 +174,9 @@ class CellWithoutHardware:
             descent=config.motion.descent,
             slow_descent=config.motion.slow_descent,
             descent_speed=config.motion.descent_speed,
-            report_selection=emit_selection,
+            report_selection=lambda target, bin: emit(
+                TargetSelected(target.item, target.label, target.frame, bin)
+            ),
             quotas=options.quotas,
         )
 

@@ -136,7 +136,11 @@ class ClearanceChecker:
             for key, approach in closest.items():
                 min_distance = min(approach.min_distance, start_distances.get(key, math.inf))
                 if approach.distance < min_distance - ROUNDING_ERROR:
-                    raise Blocked(self._describe_violation(approach))
+                    x, y, z = self.world.get_tool_pose().position
+                    raise Blocked(
+                        f"the motion would bring {approach}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m; "
+                        f"the minimum clearance is {self._margin:.3f} m"
+                    )
 
     def find_violation(self, q: Array) -> ClosestApproach | None:
         """Return the closest approach of the unloaded arm at `q` `(n,)` [rad], or None if it is allowed."""
@@ -148,13 +152,6 @@ class ClearanceChecker:
     def close(self) -> None:
         """Close the world of the check."""
         self.world.close()
-
-    def _describe_violation(self, approach: ClosestApproach) -> str:
-        x, y, z = self.world.get_tool_pose().position
-        return (
-            f"the motion would bring {approach}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m; "
-            f"the minimum clearance is {self._margin:.3f} m"
-        )
 
     def _list_pairs(self, load: ObjectClass | None, obstacles: Sequence[tuple[str, int]]) -> list[BodyPair]:
         """Return all pairs; `obstacles` contains name and body of each obstacle."""
@@ -180,10 +177,8 @@ class ClearanceChecker:
                 support_height = (bin.position[2] if bin else 0.0) + BIN_THICKNESS + SUPPORT_TOLERANCE
             pairs.append(BodyPair((load_body, body), range(-1, 0), joints, body_name, name, support_height))
         lower_links = range(robot.first_collision_link, robot.wrist_link)
-        pairs.append(
-            BodyPair((world.arm, load_body), lower_links, joints[lower_links.start + 1 :], load_name=name)
-        )
-        return pairs
+        lower_joints = joints[lower_links.start + 1 :]
+        return [*pairs, BodyPair((world.arm, load_body), lower_links, lower_joints, load_name=name)]
 
     def _measure_distance(self, pair: BodyPair) -> tuple[float, list[ClosestApproach]]:
         """Return the distance of a pair [m], and a `ClosestApproach` for each pair of points in the margin.

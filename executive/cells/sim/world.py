@@ -330,18 +330,14 @@ def name_load(label: str) -> str:
 def add_bin(client: BulletClient, bin: BinConfig) -> int:
     """Create the static body of a bin, with floor and walls, and return the body."""
     length, width, height = bin.size
-    half_thickness = BIN_THICKNESS / 2
-    half_outer_width = width / 2 + BIN_THICKNESS
-    wall_x = (length + BIN_THICKNESS) / 2
-    wall_y = (width + BIN_THICKNESS) / 2
-    wall_z = height / 2
-    floor_size = [length / 2 + BIN_THICKNESS, half_outer_width, half_thickness]
-    end_size = [half_thickness, half_outer_width, wall_z]
-    side_size = [length / 2, half_thickness, wall_z]
-    half_sizes = [floor_size, end_size, end_size, side_size, side_size]
-    end_centres = [[wall_x, 0.0, wall_z], [-wall_x, 0.0, wall_z]]
-    side_centres = [[0.0, wall_y, wall_z], [0.0, -wall_y, wall_z]]
-    centres = [[0.0, 0.0, half_thickness], *end_centres, *side_centres]
+    x = (length + BIN_THICKNESS) / 2
+    y = (width + BIN_THICKNESS) / 2
+    z = height / 2
+    floor = [length / 2 + BIN_THICKNESS, width / 2 + BIN_THICKNESS, BIN_THICKNESS / 2]
+    end_wall = [BIN_THICKNESS / 2, width / 2 + BIN_THICKNESS, z]
+    side_wall = [length / 2, BIN_THICKNESS / 2, z]
+    half_sizes = [floor, end_wall, end_wall, side_wall, side_wall]
+    centres = [[0, 0, BIN_THICKNESS / 2], [x, 0, z], [-x, 0, z], [0, y, z], [0, -y, z]]
     shape = {"shapeTypes": [pybullet.GEOM_BOX] * len(half_sizes), "halfExtents": half_sizes}
     colours = [[*bin.colour, 1]] * len(half_sizes)
     collision = client.createCollisionShapeArray(**shape, collisionFramePositions=centres)
