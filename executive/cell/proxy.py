@@ -92,12 +92,11 @@ def intercept(cell: Cell, interceptor: Interceptor, roles: Collection[str]) -> C
     The interceptor also handles accesses to `Planning` and `Request` objects that these parts return.
     """
     parts: dict[str, Any] = {}
-    for role in roles:
-        if role == "detector":
-            detectors = cell.detectors.items()
-            parts["detectors"] = {name: _Proxy(role, name, part, interceptor) for name, part in detectors}
-        else:
-            parts[role] = _Proxy(role, "", getattr(cell, role), interceptor)
+    for role in set(roles) - {"detector"}:
+        parts[role] = _Proxy(role, "", getattr(cell, role), interceptor)
+    if "detector" in roles:
+        detectors = cell.detectors.items()
+        parts["detectors"] = {name: _Proxy("detector", name, part, interceptor) for name, part in detectors}
     return replace(cell, **parts)
 
 

@@ -16,7 +16,7 @@ from executive.cell.arm import Goal, Motion
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.frame import Box, Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
-from executive.cell.protocols import Clock, Routes
+from executive.cell.protocols import Clock, Ledger, Routes
 from executive.cell.workcell import CellOptions, KeyPath
 from executive.cells.table_views import find_view_errors
 from executive.cells.without_hardware import CellWithoutHardware, FinalObject, SilentOperator
@@ -34,14 +34,14 @@ from executive.perception.camera_model import MountedCamera, compute_hull_mask
 from executive.perception.detectors.requests import PendingSearch
 from executive.perception.localization import CellLocalizer
 
+SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
+"""Permitted bins of each class of the shipped cells."""
 DEFAULT_CONFIDENCE = 0.9
 """Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""
 MAX_SEAL_OFFSET = 0.012
 """Maximum horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
 TOUCH_DISTANCE = 0.002
 """Maximum vertical distance between the cup and the top of an object for contact [m]."""
-LOAD_NOISE = 1e-9
-"""Amplitude of the noise of the load of the fake tool [N], so that the load cell does not seem broken."""
 
 
 @dataclass(eq=False)
@@ -73,10 +73,7 @@ class FakeObject:
 
 @dataclass(eq=False)
 class FakeWorld:
-    """Objects and bins of a fake cell.
-
-    `is_commanded` is True if arm or tool has received a command since the last control step.
-    """
+    """Objects and bins; `is_commanded`: arm or tool had a command since the last control step."""
 
     classes: Mapping[str, ObjectClass]
     bins: Collection[Bin] = ()
@@ -93,14 +90,12 @@ class FakeWorld:
         return fake_object
 
     def remove(self, fake_object: FakeObject) -> None:
-        """Remove an object that is not held."""
         self.objects.remove(fake_object)
         self.removed_objects.append(fake_object)
 
     def release(self, *, is_dropped: bool = False) -> None:
         """Let the held object fall straight down; if it is dropped, it rolls to a free position."""
-        fake_object = self.held_object
-        if fake_object is None:
+        if (fake_object := self.held_object) is None:
             return
         self.held_object = None
         fake_object.position[2] = self.classes[fake_object.label].height / 2
@@ -125,7 +120,7 @@ class FakeWorld:
             fake_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
 
     def find_bin(self, fake_object: FakeObject) -> Bin | None:
-        """Return the bin that contains an object; if there is none, the bin on whose wall the object lies."""
+        """Return the bin that contains an object, or on whose wall the object lies, or None."""
         wall_margin = BIN_THICKNESS + self.classes[fake_object.label].radius / 2
         for margin in (0.0, wall_margin):
             for bin in self.bins:
@@ -148,10 +143,7 @@ class FakeWorld:
 
 @dataclass(eq=False)
 class FakeTool:
-    """A suction cup that seals on every touched object, unless `can_seal` returns False.
-
-    Tests set `can_seal`, the force that every seal withstands [N], and the error of `load` [N].
-    """
+    """A suction cup that seals on every touched object; tests set seal, breakaway force and error of load."""
 
     world: FakeWorld
     get_tip_position: Callable[[], Array]
@@ -159,11 +151,10 @@ class FakeTool:
     can_seal: Callable[[], bool] = field(default=lambda: True)
     breakaway_force: float = 7.9
     load_error: float = 0.0
-    _noise: float = LOAD_NOISE
+    _noise: float = 1e-9  # It alternates, so that the load cell does not seem broken.
 
     @property
     def touching(self) -> bool:
-        """True while the cup touches an object or the table."""
         tip_position = self.get_tip_position()
         return self.world.find_touched_object(tip_position) is not None or float(tip_position[2]) <= 0.0
 
@@ -177,7 +168,6 @@ class FakeTool:
 
     @property
     def load(self) -> float:
-        """Weight of the held object by the mass of its class, plus `load_error` and alternating noise [N]."""
         self._noise = -self._noise
         held = self.world.held_object
         force = self.world.classes[held.label].mass * GRAVITY if held else 0.0
@@ -202,17 +192,14 @@ class FakeTool:
 class FakeCamera(MountedCamera):
     """The camera of a cell file, with blank images and the `occluded_regions` [pixel] that a test sets."""
 
-    def __init__(
-        self, config: CellConfig, arm: FakeArm, clock: Clock, get_change_count: Callable[[], int]
-    ) -> None:
+    def __init__(self, config: CellConfig, arm: FakeArm, clock: Clock, ledger: Ledger) -> None:
         name, camera = next(iter(config.cameras.items()))
         X_TF = Pose.of((0.0, 0.0, -config.tool.length))  # pose of the flange F in the frame T of the tool
-        super().__init__(name, camera, lambda: arm.tool_pose @ X_TF, clock, get_change_count)
+        super().__init__(name, camera, lambda: arm.tool_pose @ X_TF, clock, lambda: ledger.change_count)
         self.occluded_regions: list[Box] = []
         self._corners = np.array([(x, y, 0.0) for x in config.table.x for y in config.table.y])
 
     def sees_table(self) -> bool:
-        """Return True if the whole workspace is in the image; occlusion does not count."""
         return compute_hull_mask(self._corners, self.matrix, self._compute_pose(), self._size) is not None
 
     def _capture_images(self) -> tuple[NDArray[np.uint8], None]:
@@ -230,8 +217,7 @@ class FakeCamera(MountedCamera):
 class FakeDetector:
     """A detector that finds every object in a view, unless a test replaces `make_answer`.
 
-    `make_answer` returns the detections, or a message if the detector is unavailable. Its arguments are the
-    number of the request (from 1) and the true detections.
+    `make_answer` gets the number of the request, from 1, and may return the message of a failed detector.
     """
 
     name: str
@@ -280,18 +266,13 @@ def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
 def list_grid_points(config: CellConfig) -> list[tuple[float, float]]:
     """Return the points on the table at which objects can lie beside each other [m]."""
     distance = 2 * max(object_class.radius for object_class in config.objects.values()) + config.table.gap
-    ranges = config.table.x, config.table.y
-    xs, ys = (np.linspace(low, high, 1 + int((high - low) / distance)) for low, high in ranges)
+    sides = config.table.x, config.table.y
+    xs, ys = (np.linspace(low, high, 1 + int((high - low) / distance)) for low, high in sides)
     return [(float(x), float(y)) for x in xs for y in ys]
 
 
 class FakeArm(PlanningArm[StraightMotion]):
-    """An arm that moves on straight joint paths, stops without braking, and never hits an obstacle by itself.
-
-    The tool velocity is zero: a released object falls straight down. For tests, `commands` contains the
-    executed commands, `start` or `stop`, and `next_obstacle` names an obstacle in the middle of the next
-    motion.
-    """
+    """An arm on straight joint paths, which stops at once; tests read `commands` and set `next_obstacle`."""
 
     q = np.zeros(0)
 
@@ -299,7 +280,7 @@ class FakeArm(PlanningArm[StraightMotion]):
         planner = build_planner(config)
         super().__init__(config, planner, StraightPlanner(config, planner.kinematics).plan, clock, emit)
         self.q = self.poses["home"]
-        self.tool_velocity = np.zeros(3)
+        self.tool_velocity = np.zeros(3)  # A released object falls straight down.
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
         self._world = world
@@ -335,13 +316,11 @@ class FakeArm(PlanningArm[StraightMotion]):
         self._path = []
 
     def stop_after_collision(self, message: str) -> None:
-        """Stop the running motion, if any, with a message as `collision`."""
         if self._path:
             self.collision = message
             self.stop()
 
     def advance(self) -> None:
-        """Move arm and held object by one control step."""
         if not self._path:
             return
         self.q = self._path.pop(0)
@@ -354,15 +333,8 @@ class FakeArm(PlanningArm[StraightMotion]):
             self.next_obstacle = None
 
 
-SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
-"""Permitted bins of each class of the shipped cells."""
-
-
 class FakeCell(CellWithoutHardware):
     """The cell of a cell file without physics; by default the shipped cell `overhead` without objects.
-
-    The arm moves on straight joint paths, the tool always seals, and every detector finds all objects. By
-    default, the operator requests nothing. `detector` is the first detector, `ledger` the same as `accounts`.
 
     Raises:
         InputError: `options` request a window, or the state of a resumed run cannot be read.
@@ -383,14 +355,12 @@ class FakeCell(CellWithoutHardware):
             raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
         super().__init__(config, seed=seed, routes=routes, emit=emit, options=options)
         clock = self.cell.clock
-        classes = self.cell.classes
-        bins = tuple(self.cell.bins.values())
         self.ledger = self.accounts
-        self.world = FakeWorld(classes, bins)
+        self.world = FakeWorld(self.cell.classes, self.cell.bins.values())
         put_random_objects(self.world, config, seed)
         self.arm = FakeArm(self.world, config, clock, emit)
         self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position, config.tool.load_std)
-        self.camera = FakeCamera(config, self.arm, clock, lambda: self.ledger.change_count)
+        self.camera = FakeCamera(config, self.arm, clock, self.ledger)
         self.detectors = {
             name: FakeDetector(name, detector, self.world, clock, self.camera.get_view_box)
             for name, detector in config.detectors.items()
@@ -401,7 +371,7 @@ class FakeCell(CellWithoutHardware):
         if options.resume is not None:
             self._restore_state(options.resume.log_path)
             self.log_to(options.resume.log_path)
-        localizer = CellLocalizer("plane", classes, bins)
+        localizer = CellLocalizer("plane", self.cell.classes, self.cell.bins.values())
         self._connect(options, self.arm, self.tool, self.camera, self.detectors, localizer)
 
     @staticmethod
@@ -423,7 +393,6 @@ class FakeCell(CellWithoutHardware):
         return dict.fromkeys(config.detectors)
 
     def log_to(self, path: Path) -> None:
-        """Write the state of the world to a log file, now and after every control step."""
         self._log = LogFile(path, "the state of the world")
         self.log_state()
 
@@ -432,9 +401,9 @@ class FakeCell(CellWithoutHardware):
             return
         held = self.world.held_object
         index = None if held is None else self.world.objects.index(held)
-        groups = self.world.objects, self.world.removed_objects
-        objects = [[each.list_values() for each in group] for group in groups]
-        state = [self.steps, self.last_command_step, self.arm.q, index, *objects]
+        objects = [each.list_values() for each in self.world.objects]
+        removed_objects = [each.list_values() for each in self.world.removed_objects]
+        state = [self.steps, self.last_command_step, self.arm.q, index, objects, removed_objects]
         text = json.dumps(state, default=np.ndarray.tolist).encode()
         # Blanks pad the text to the length of the longest state so far, to overwrite all old text.
         self._log_length = max(self._log_length, len(text))
