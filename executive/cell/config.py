@@ -167,8 +167,7 @@ class DetectorConfig(Section):
     @model_validator(mode="after")
     def _check_floor(self) -> DetectorConfig:
         if self.floor > self.threshold:
-            problem = f"needs a floor of at most its threshold, {self.threshold:g}, not {self.floor:g}"
-            raise ValueError(problem)
+            raise ValueError(f"needs a floor of at most its threshold {self.threshold:g}, not {self.floor:g}")
         return self
 
     @property

@@ -62,8 +62,10 @@ class WorldRebuilder:
                 self._execute(kind, np.array(arguments, dtype=float))
         except Exception as error:
             # A changed log may contain anything, for example a body that does not exist.
-            text = f'the log of the world is damaged: its command "{kind}" cannot be executed: {error}'
-            raise InputError(f"{text}; restore a copy of it, or run the mission again") from error
+            raise InputError(
+                f'the log of the world is damaged: its command "{kind}" cannot be executed: {error}; '
+                "restore a copy of it, or run the mission again"
+            ) from error
 
     def _start_motion(self, duration: float, samples: str) -> None:
         states = np.frombuffer(base64.b64decode(samples), "<f8").reshape(3, -1, self._world.robot.joint_count)
@@ -76,7 +78,8 @@ class WorldRebuilder:
         world = self._world
         tool = self._tool
         if kind in (world_log.RUN_STEP, world_log.IDLE_STEP):
-            self.step_count += kind == world_log.RUN_STEP
+            if kind == world_log.RUN_STEP:
+                self.step_count += 1
             if self._next_targets[0].size:
                 world.command_arm(*self._next_targets)
             self.braking_start = self._next_targets
