@@ -73,7 +73,16 @@ class FakeObject:
 
 @dataclass(eq=False)
 class FakeWorld:
-    """Objects and bins; `is_commanded`: arm or tool had a command since the last control step."""
+    """Objects and bins of a fake cell.
+
+    Attributes:
+        classes: Classes of the objects, by label.
+        bins: The bins of the cell.
+        objects: The objects, in the order in which they were added.
+        removed_objects: The objects that were removed from the world.
+        held_object: The object that the tool holds, or None.
+        is_commanded: True if arm or tool has received a command since the last control step.
+    """
 
     classes: Mapping[str, ObjectClass]
     bins: Collection[Bin] = ()
@@ -90,6 +99,7 @@ class FakeWorld:
         return fake_object
 
     def remove(self, fake_object: FakeObject) -> None:
+        """Remove an object that is not held."""
         self.objects.remove(fake_object)
         self.removed_objects.append(fake_object)
 
@@ -120,7 +130,7 @@ class FakeWorld:
             fake_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
 
     def find_bin(self, fake_object: FakeObject) -> Bin | None:
-        """Return the bin that contains an object, or on whose wall the object lies, or None."""
+        """Return the bin that contains an object; if there is none, the bin on whose wall the object lies."""
         wall_margin = BIN_THICKNESS + self.classes[fake_object.label].radius / 2
         for margin in (0.0, wall_margin):
             for bin in self.bins:
@@ -143,7 +153,13 @@ class FakeWorld:
 
 @dataclass(eq=False)
 class FakeTool:
-    """A suction cup that seals on every touched object; tests set seal, breakaway force and error of load."""
+    """A suction cup that seals on every touched object, unless `can_seal` returns False.
+
+    Attributes:
+        can_seal: Function that returns True if the cup can seal on the touched object; set by tests.
+        breakaway_force: Force that every seal withstands [N].
+        load_error: Error of `load` [N]; set by tests.
+    """
 
     world: FakeWorld
     get_tip_position: Callable[[], Array]
@@ -190,7 +206,11 @@ class FakeTool:
 
 
 class FakeCamera(MountedCamera):
-    """The camera of a cell file, with blank images and the `occluded_regions` [pixel] that a test sets."""
+    """The camera of a cell file, with blank images.
+
+    Attributes:
+        occluded_regions: Regions of the image that frames mark as occluded [pixel]; set by tests.
+    """
 
     def __init__(self, config: CellConfig, arm: FakeArm, clock: Clock, ledger: Ledger) -> None:
         name, camera = next(iter(config.cameras.items()))
@@ -217,14 +237,22 @@ class FakeCamera(MountedCamera):
 class FakeDetector:
     """A detector that finds every object in a view, unless a test replaces `make_answer`.
 
-    `make_answer` gets the number of the request, from 1, and may return the message of a failed detector.
+    Attributes:
+        name: Name of the detector in the cell file.
+        config: Section of the detector in the cell file.
+        world: The world with the true objects.
+        clock: Clock of the run.
+        get_view_region: Returns the image region [pixel] of a view, which is `table` or `full`.
+        make_answer: Returns the detections, or a message if the detector is unavailable. Its arguments are
+            the number of the request (from 1) and the true detections.
+        request_count: Number of requests so far.
     """
 
     name: str
     config: DetectorConfig
     world: FakeWorld
     clock: Clock
-    get_view_box: Callable[[str], Box]
+    get_view_region: Callable[[str], Box]
     make_answer: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = field(
         default=lambda _request_number, true_detections: true_detections
     )
@@ -232,7 +260,7 @@ class FakeDetector:
 
     def request(self, frame: Frame, view: str) -> PendingSearch:
         self.request_count += 1
-        left, top, right, bottom = self.get_view_box(view)
+        left, top, right, bottom = self.get_view_region(view)
         true_detections = []
         for fake_object in self.world.objects:
             x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
@@ -272,7 +300,17 @@ def list_grid_points(config: CellConfig) -> list[tuple[float, float]]:
 
 
 class FakeArm(PlanningArm[StraightMotion]):
-    """An arm on straight joint paths, which stops at once; tests read `commands` and set `next_obstacle`."""
+    """An arm that moves on straight joint paths, stops without braking, and never hits an obstacle by itself.
+
+    Attributes:
+        q: Joint positions `(n,)` [rad].
+        poses: Joint positions `(n,)` [rad] of each named pose; a run begins at `home`.
+        tool_velocity: Velocity zero `(3,)` [m/s]: a released object falls straight down.
+        collision: Description of the obstacle that stopped the last motion, or None.
+        contact_point: Position of the tool `(x, y, z)` [m] at the last `next_obstacle`, or None.
+        next_obstacle: Name of an obstacle in the middle of the next motion, or None; set by tests.
+        commands: Names of the executed commands, `start` or `stop`, in order, for tests.
+    """
 
     q = np.zeros(0)
 
@@ -280,7 +318,7 @@ class FakeArm(PlanningArm[StraightMotion]):
         planner = build_planner(config)
         super().__init__(config, planner, StraightPlanner(config, planner.kinematics).plan, clock, emit)
         self.q = self.poses["home"]
-        self.tool_velocity = np.zeros(3)  # A released object falls straight down.
+        self.tool_velocity = np.zeros(3)
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
         self._world = world
@@ -335,6 +373,17 @@ class FakeArm(PlanningArm[StraightMotion]):
 
 class FakeCell(CellWithoutHardware):
     """The cell of a cell file without physics; by default the shipped cell `overhead` without objects.
+
+    The arm moves on straight joint paths, the tool always seals, and every detector finds all objects.
+
+    Attributes:
+        world: Objects and bins.
+        arm: The fake arm.
+        tool: The fake tool.
+        camera: The fake camera.
+        detectors: The fake detectors by name.
+        detector: The first detector.
+        ledger: The ledger of the run, the same object as `accounts`.
 
     Raises:
         InputError: `options` request a window, or the state of a resumed run cannot be read.
