@@ -13,7 +13,7 @@ import yaml
 
 from executive.cell.config import CellConfig
 from executive.cell.device_config import Section
-from executive.cells.sim.scene_file import SceneConfig
+from executive.cells.sim.scene import SceneConfig
 from executive.cli.main import main as command_line
 from executive.cli.skills import Declaration, collect_declarations
 from executive.mission.findings import MEANING_BY_CODE

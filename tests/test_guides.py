@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from guide_blocks import GUIDES, ROOT, TUTORIAL, blocks, files, read, shown, transcripts
 
 from executive.cells.fake import FakeCell
-from executive.cells.sim.scene_file import (
+from executive.cells.sim.scene import (
     load_scene,
 )
 from executive.cli.main import main

@@ -10,9 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from executive.cell.config import CellConfig, DetectorConfig
-from executive.cell.layout import build_object_class
-from executive.cells.sim.scene_file import load_scene
-from executive.cells.sim.spawn import find_max_object_count
+from executive.cells.sim.scene import find_max_object_count, load_scene
 from executive.errors import InputError, explain_os_errors
 from executive.mission.cell_file import load_cell
 from executive.mission.findings import suggest_choice
@@ -177,7 +175,7 @@ def measure_detector(
     # The method `ray` needs a simulated world.
     if cell_of_images and cell_of_images.localization != "ray":
         objects = cell_of_images.objects
-        object_classes = {label: build_object_class(label, objects[label]) for label in objects}
+        object_classes = {label: objects[label].build_class(label) for label in objects}
         localizer = CellLocalizer(cell_of_images.localization, object_classes)
     name = detector.name
     if settings.dataset is not None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from executive.campaign.jobs import JobOptions, list_jobs, make_fault_record, run_job, run_jobs
 from executive.campaign.results import FILE_NAME, ResultsDatabase, RunRecord, SweepSettings
 from executive.campaign.sweep_summary import SweepResults, summarize_runs
-from executive.cells.sim.scene_file import load_scene
+from executive.cells.sim.scene import load_scene
 from executive.errors import InputError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.yaml_files import read_source

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import GeneratorType
 from typing import Protocol
 
 from executive.cell.objects import Load, Obstacle
-from executive.errors import Fault
 from executive.geometry import Array, Pose
 
 
@@ -127,16 +125,3 @@ class Arm(Protocol):
 
     def stop(self) -> None:
         """Start to brake along the path of the current motion, if any; return at once."""
-
-
-def reject_generator(motion: object) -> None:
-    """Raise an error if `motion` is a generator, because its caller omitted `yield from`.
-
-    Raises:
-        Fault: The motion is a generator.
-    """
-    if isinstance(motion, GeneratorType):
-        raise Fault(
-            f"the generator {motion.__name__}(...) was passed to the arm where a motion is expected: "
-            f'"yield from" is missing. Write "motion = yield from {motion.__name__}(...)"'
-        )

@@ -5,8 +5,10 @@ Each field is a key of `missions/cells/*.yaml`, in SI units. Values of keys that
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from executive.cell.device_config import (
@@ -29,6 +31,12 @@ from executive.cell.device_config import (
     check_ascending,
 )
 from executive.cell.frame import ErrorRates
+from executive.cell.objects import Bin, ObjectClass
+
+TOOL_RADIUS = 0.012
+"""Radius of the body of the tool [m]."""
+NECK_LENGTH = 0.015
+"""Length of the thin end of the tool [m]; the thin end has the radius of the cup."""
 
 
 class ObjectConfig(Section):
@@ -62,6 +70,13 @@ class ObjectConfig(Section):
     colours: tuple[Colour, ...] = ((1.0, 1.0, 1.0),)
     """Colours (red, green, blue, each 0 to 1) from which the colour of each spawned object is drawn."""
 
+    def build_class(self, label: str) -> ObjectClass:
+        """Return the declared object class; if the section declares no mass, with the default mass."""
+        object_class = ObjectClass(label, self.height, self.radius, self.ring, looks_like=self.looks_like)
+        if self.mass is None:
+            return object_class
+        return replace(object_class, mass=self.mass, mass_std=self.mass_std)
+
     @model_validator(mode="after")
     def _check_model(self) -> ObjectConfig:
         if bool(self.urdf) == bool(self.mesh):
@@ -84,6 +99,14 @@ class BinConfig(Section):
     """Numbers of drop positions along x and along y."""
     colour: Colour = (0.6, 0.6, 0.6)
     """Colour of the walls."""
+
+    def build_bin(self, name: str) -> Bin:
+        """Return the declared bin, with slots evenly distributed over the floor."""
+        position = np.array(self.position)
+        size = np.array(self.size)
+        slot_indices = np.array([*np.ndindex(self.slots)])
+        slots = position[:2] + size[:2] * ((slot_indices + 0.5) / self.slots - 0.5)
+        return Bin(name, position, size, slots)
 
 
 class TableConfig(Section):
@@ -144,8 +167,7 @@ class DetectorConfig(Section):
     @model_validator(mode="after")
     def _check_floor(self) -> DetectorConfig:
         if self.floor > self.threshold:
-            problem = f"needs a floor of at most its threshold, {self.threshold:g}, not {self.floor:g}"
-            raise ValueError(problem)
+            raise ValueError(f"needs a floor of at most its threshold {self.threshold:g}, not {self.floor:g}")
         return self
 
     @property
@@ -218,6 +240,21 @@ class CellConfig(Section):
     def max_object_height(self) -> float:
         """Height of the highest class of objects [m]."""
         return max(section.height for section in self.objects.values())
+
+    @property
+    def max_pile_height(self) -> float:
+        """Maximum height of a pile on the table [m]: two objects if `stacked` is above 0, else one."""
+        return (2 if self.table.stacked else 1) * self.max_object_height
+
+    @property
+    def travel_height(self) -> float:
+        """Tool height [m] at which a held object of any class clears all bin walls and piles."""
+        wall_top = max(bin.position[2] + bin.size[2] for bin in self.bins.values())
+        return max(wall_top, self.max_pile_height) + self.max_object_height + self.motion.clearance
+
+    def build_bins(self) -> dict[str, Bin]:
+        """Return the bins by name."""
+        return {name: section.build_bin(name) for name, section in self.bins.items()}
 
     @field_validator("detectors")
     @classmethod

@@ -1,7 +1,6 @@
 """Sections of a cell file about devices: arm, tool, motion, cameras with calibration, noise and depth.
 
 Each field is a key of `missions/cells/*.yaml`, in SI units. Values of keys that end in `_deg` are in degrees.
-
 The loader writes every matrix of a calibration as the list of its entries, row by row.
 """
 
@@ -29,11 +28,7 @@ Number = TypeVar("Number", int, float)
 
 
 def check_ascending(pair: tuple[Number, Number]) -> tuple[Number, Number]:
-    """Return the range unchanged if its limits are in ascending order.
-
-    Raises:
-        ValueError: The lower limit is greater than the upper limit.
-    """
+    """Return a range; a lower limit above the upper limit raises `ValueError`."""
     if pair[0] > pair[1]:
         raise ValueError(f"must be in ascending order: {pair[0]:g} is greater than {pair[1]:g}")
     return pair
@@ -44,19 +39,17 @@ NAME_PATTERN = re.compile(r"\w[\w -]{0,63}")
 
 
 def check_name(name: str) -> str:
-    """Return the name of a class, bin, camera or detector unchanged if it can be part of a file name.
-
-    Raises:
-        ValueError: The name does not match `NAME_PATTERN`.
-    """
+    """Return a name that can be part of a file name; any other name raises `ValueError`."""
     if not NAME_PATTERN.fullmatch(name):
         raise ValueError('must be a name of at most 64 letters, digits, blanks, "_" and "-"')
     return name
 
 
 Name = Annotated[str, AfterValidator(check_name)]
-MIN_LENGTH, MAX_LENGTH = 1e-4, 10.0
-"""Minimum and maximum length in a cell [m]: below the error of each sensor, above the reach of each arm."""
+MIN_LENGTH = 1e-4
+"""Minimum length in a cell [m], below the error of each sensor."""
+MAX_LENGTH = 10.0
+"""Maximum length in a cell [m], above the reach of each arm."""
 Length = Annotated[float, Field(ge=MIN_LENGTH, le=MAX_LENGTH)]
 """A positive length [m]."""
 Distance = Annotated[float, Field(ge=0, le=MAX_LENGTH)]

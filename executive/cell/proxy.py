@@ -91,9 +91,11 @@ def intercept(cell: Cell, interceptor: Interceptor, roles: Collection[str]) -> C
 
     The interceptor also handles accesses to `Planning` and `Request` objects that these parts return.
     """
-    part_roles, detectors = set(roles) - {"detector"}, cell.detectors.items()
-    parts: dict[str, Any] = {role: _Proxy(role, "", getattr(cell, role), interceptor) for role in part_roles}
+    parts: dict[str, Any] = {}
+    for role in set(roles) - {"detector"}:
+        parts[role] = _Proxy(role, "", getattr(cell, role), interceptor)
     if "detector" in roles:
+        detectors = cell.detectors.items()
         parts["detectors"] = {name: _Proxy("detector", name, part, interceptor) for name, part in detectors}
     return replace(cell, **parts)
 
@@ -105,7 +107,10 @@ class _Proxy:
     """
 
     def __init__(self, role: str, detector: str, part: Any, interceptor: Interceptor) -> None:
-        self._role, self._detector, self._part, self._intercept = role, detector, part, interceptor
+        self._role = role
+        self._detector = detector
+        self._part = part
+        self._intercept = interceptor
         self._attribute_accesses: dict[str, Access] = {}
         """Accesses by attribute name, stored because attributes are read in every control step."""
 

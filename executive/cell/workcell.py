@@ -12,9 +12,6 @@ from executive.cell.protocols import Cell, Operator, Routes
 from executive.events import Emit, ItemChanged
 from executive.geometry import Pose
 
-Colour = tuple[float, float, float]
-"""Red, green and blue, 0 to 1."""
-
 
 @dataclass(frozen=True)
 class Shape:
@@ -25,7 +22,7 @@ class Shape:
         kind: Kind of shape: `box`, `cylinder`, `sphere` or `mesh`.
         size: Size along x, y and z [m]; for a mesh, scale factors along x, y and z.
         X_BS: Pose of the shape in the frame of the body.
-        colour: Colour of the surface.
+        colour: Red, green and blue of the surface, 0 to 1.
         file: Path of the file of a mesh, with the suffix of its format; "" for other kinds.
     """
 
@@ -33,7 +30,7 @@ class Shape:
     kind: str
     size: tuple[float, float, float]
     X_BS: Pose
-    colour: Colour
+    colour: tuple[float, float, float]
     file: str = ""
 
 
@@ -194,7 +191,9 @@ class CellWrapper:
     """
 
     def __init__(self, inner: Workcell) -> None:
-        self.inner, self.cell, self.accounts = inner, inner.cell, inner.accounts
+        self.inner = inner
+        self.cell = inner.cell
+        self.accounts = inner.accounts
 
     @property
     def steps(self) -> int:

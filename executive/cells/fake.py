@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
@@ -17,11 +16,11 @@ from executive.cell.arm import Goal, Motion
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.frame import Box, Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
-from executive.cell.protocols import Clock, Routes
+from executive.cell.protocols import Clock, Ledger, Routes
 from executive.cell.workcell import CellOptions, KeyPath
-from executive.cells.log_file import LogFile
 from executive.cells.table_views import find_view_errors
 from executive.cells.without_hardware import CellWithoutHardware, FinalObject, SilentOperator
+from executive.cells.world_log import LogFile
 from executive.errors import InputError, Unavailable
 from executive.events import Emit, discard_event
 from executive.geometry import GRAVITY, Array, Pose
@@ -35,20 +34,14 @@ from executive.perception.camera_model import MountedCamera, compute_hull_mask
 from executive.perception.detectors.requests import PendingSearch
 from executive.perception.localization import CellLocalizer
 
+SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
+"""Permitted bins of each class of the shipped cells."""
 DEFAULT_CONFIDENCE = 0.9
 """Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""
-
 MAX_SEAL_OFFSET = 0.012
 """Maximum horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
-
 TOUCH_DISTANCE = 0.002
 """Maximum vertical distance between the cup and the top of an object for contact [m]."""
-
-DEFAULT_BREAKAWAY_FORCE = 7.9
-"""Breakaway force of the seals of the fake tool, unless a test changes it [N]."""
-
-LOAD_NOISE = 1e-9
-"""Amplitude of the noise of the load of the fake tool [N], so that the load cell does not seem broken."""
 
 
 @dataclass(eq=False)
@@ -99,13 +92,7 @@ class FakeWorld:
     is_commanded: bool = False
 
     def put(self, label: str, x: float, y: float) -> FakeObject:
-        """Put a new object on the table, and return it.
-
-        Args:
-            label: Class of the object.
-            x: Position of the centre along x [m].
-            y: Position of the centre along y [m].
-        """
+        """Put a new object of a class on the table, with its centre at `x` and `y` [m], and return it."""
         position = np.array([x, y, self.classes[label].height / 2])
         fake_object = FakeObject(label, position, [position.copy()])
         self.objects.append(fake_object)
@@ -145,9 +132,11 @@ class FakeWorld:
     def find_bin(self, fake_object: FakeObject) -> Bin | None:
         """Return the bin that contains an object; if there is none, the bin on whose wall the object lies."""
         wall_margin = BIN_THICKNESS + self.classes[fake_object.label].radius / 2
-        margins_and_bins = itertools.product((0.0, wall_margin), self.bins)
-        places = (bin for margin, bin in margins_and_bins if bin.contains(fake_object.position, margin))
-        return next(places, None)
+        for margin in (0.0, wall_margin):
+            for bin in self.bins:
+                if bin.contains(fake_object.position, margin):
+                    return bin
+        return None
 
     def find_touched_object(self, tip_position: Array) -> FakeObject | None:
         """Return the object that a cup at `tip_position` `(3,)` [m] touches from above, or None."""
@@ -162,13 +151,9 @@ class FakeWorld:
         return None
 
 
+@dataclass(eq=False)
 class FakeTool:
     """A suction cup that seals on every touched object, unless `can_seal` returns False.
-
-    Args:
-        world: The world with the objects.
-        get_tip_position: Returns the position of the tool tip `(3,)` [m].
-        load_std: Declared standard deviation of a reading of `load` [N].
 
     Attributes:
         can_seal: Function that returns True if the cup can seal on the touched object; set by tests.
@@ -176,55 +161,48 @@ class FakeTool:
         load_error: Error of `load` [N]; set by tests.
     """
 
-    def __init__(self, world: FakeWorld, get_tip_position: Callable[[], Array], load_std: float) -> None:
-        self._world = world
-        self._get_tip_position = get_tip_position
-        self.load_std = load_std
-        self.load_error = 0.0
-        self._noise = LOAD_NOISE
-        self.can_seal: Callable[[], bool] = lambda: True
-        self.breakaway_force = DEFAULT_BREAKAWAY_FORCE
+    world: FakeWorld
+    get_tip_position: Callable[[], Array]
+    load_std: float
+    can_seal: Callable[[], bool] = field(default=lambda: True)
+    breakaway_force: float = 7.9
+    load_error: float = 0.0
+    _noise: float = 1e-9  # It alternates, so that the load cell does not seem broken.
 
     @property
     def touching(self) -> bool:
-        """True while the cup touches an object or the table."""
-        tip_position = self._get_tip_position()
-        return self._world.find_touched_object(tip_position) is not None or float(tip_position[2]) <= 0.0
+        tip_position = self.get_tip_position()
+        return self.world.find_touched_object(tip_position) is not None or float(tip_position[2]) <= 0.0
 
     @property
     def holding(self) -> bool:
-        """True while the tool holds an object."""
-        return self._world.held_object is not None
+        return self.world.held_object is not None
 
     @property
     def holding_force(self) -> float:
-        """Breakaway force of the seal [N]; 0 while the tool holds nothing."""
         return self.breakaway_force if self.holding else 0.0
 
     @property
     def load(self) -> float:
-        """Weight of the held object by the mass of its class, plus `load_error` and alternating noise [N]."""
         self._noise = -self._noise
-        held = self._world.held_object
-        force = self._world.classes[held.label].mass * GRAVITY if held else 0.0
+        held = self.world.held_object
+        force = self.world.classes[held.label].mass * GRAVITY if held else 0.0
         return force + self.load_error + self._noise
 
     def close(self) -> None:
-        """Seal the cup on the touched object."""
-        self._world.is_commanded = True
-        touched = self._world.find_touched_object(self._get_tip_position())
+        self.world.is_commanded = True
+        touched = self.world.find_touched_object(self.get_tip_position())
         if touched is not None and self.can_seal():
             touched.is_dropped = False
-            self._world.held_object = touched
+            self.world.held_object = touched
 
     def open(self) -> None:
-        """Release the held object; it falls straight down."""
-        self._world.is_commanded = True
-        self._world.release()
+        self.world.is_commanded = True
+        self.world.release()
 
     def break_seal(self) -> None:
-        """Break the seal: the held object falls straight down, and rolls off other objects and bin walls."""
-        self._world.release(is_dropped=True)
+        """Drop the held object; it rolls off other objects and bin walls."""
+        self.world.release(is_dropped=True)
 
 
 class FakeCamera(MountedCamera):
@@ -234,17 +212,14 @@ class FakeCamera(MountedCamera):
         occluded_regions: Regions of the image that frames mark as occluded [pixel]; set by tests.
     """
 
-    def __init__(
-        self, config: CellConfig, arm: FakeArm, clock: Clock, get_change_count: Callable[[], int]
-    ) -> None:
+    def __init__(self, config: CellConfig, arm: FakeArm, clock: Clock, ledger: Ledger) -> None:
         name, camera = next(iter(config.cameras.items()))
         X_TF = Pose.of((0.0, 0.0, -config.tool.length))  # pose of the flange F in the frame T of the tool
-        super().__init__(name, camera, lambda: arm.tool_pose @ X_TF, clock, get_change_count)
+        super().__init__(name, camera, lambda: arm.tool_pose @ X_TF, clock, lambda: ledger.change_count)
         self.occluded_regions: list[Box] = []
         self._corners = np.array([(x, y, 0.0) for x in config.table.x for y in config.table.y])
 
     def sees_table(self) -> bool:
-        """Return True if the whole workspace is in the image, without regard to occlusion."""
         return compute_hull_mask(self._corners, self.matrix, self._compute_pose(), self._size) is not None
 
     def _capture_images(self) -> tuple[NDArray[np.uint8], None]:
@@ -284,13 +259,13 @@ class FakeDetector:
     request_count: int = 0
 
     def request(self, frame: Frame, view: str) -> PendingSearch:
-        """Return a request for the objects in a view of a frame, with the latency of the cell file."""
         self.request_count += 1
         left, top, right, bottom = self.get_view_region(view)
         true_detections = []
         for fake_object in self.world.objects:
             x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
-            column, row = x / depth, y / depth
+            column = x / depth
+            row = y / depth
             is_inside = depth > 0 and left <= column < right and top <= row < bottom
             if is_inside and fake_object is not self.world.held_object:
                 half_side = frame.matrix[0, 0] / depth * self.world.classes[fake_object.label].radius
@@ -303,15 +278,12 @@ class FakeDetector:
             future.set_exception(Unavailable(answer))
         else:
             future.set_result(list(answer))
-        due_time = self.clock.now + self.config.latency
-        return PendingSearch(future, due_time, self.clock, self.name, self.config.error_rates)
-
-    def close(self) -> None:
-        """Do nothing: the detector holds no resources."""
+        answer_time = self.clock.now + self.config.latency
+        return PendingSearch(future, answer_time, self.clock, self.name, self.config.error_rates)
 
 
 def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
-    """Put objects of random classes on random grid points; the cell file limits the number of objects."""
+    """Put objects of random classes on random grid points, as many as the cell file permits."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(*config.table.objects, endpoint=True))
     points = list_grid_points(config)
@@ -322,19 +294,13 @@ def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
 def list_grid_points(config: CellConfig) -> list[tuple[float, float]]:
     """Return the points on the table at which objects can lie beside each other [m]."""
     distance = 2 * max(object_class.radius for object_class in config.objects.values()) + config.table.gap
-    ranges = config.table.x, config.table.y
-    xs, ys = (np.linspace(low, high, 1 + int((high - low) / distance)) for low, high in ranges)
+    sides = config.table.x, config.table.y
+    xs, ys = (np.linspace(low, high, 1 + int((high - low) / distance)) for low, high in sides)
     return [(float(x), float(y)) for x in xs for y in ys]
 
 
 class FakeArm(PlanningArm[StraightMotion]):
     """An arm that moves on straight joint paths, stops without braking, and never hits an obstacle by itself.
-
-    Args:
-        world: The world that contains the held object.
-        config: The cell file.
-        clock: Clock of the run.
-        emit: Receives the events of the arm.
 
     Attributes:
         q: Joint positions `(n,)` [rad].
@@ -362,7 +328,6 @@ class FakeArm(PlanningArm[StraightMotion]):
 
     @property
     def at_rest(self) -> bool:
-        """True while no motion runs."""
         return not self._path
 
     @property
@@ -370,11 +335,6 @@ class FakeArm(PlanningArm[StraightMotion]):
         return self._path[-1] if self._path else self.q
 
     def start(self, motion: Motion) -> None:
-        """Begin to follow a motion.
-
-        Raises:
-            Fault: The arm is moving, or did not plan the motion.
-        """
         self._path = list(self._require_own_motion(motion, StraightMotion).qs)
         self._half_length = len(self._path) // 2
         self.commands.append("start")
@@ -389,19 +349,16 @@ class FakeArm(PlanningArm[StraightMotion]):
         self._path = []
 
     def stop(self) -> None:
-        """End the running motion without braking."""
         if self._path:
             self.commands.append("stop")
         self._path = []
 
     def stop_after_collision(self, message: str) -> None:
-        """Stop the running motion and set `collision` to a message; do nothing if the arm is at rest."""
         if self._path:
             self.collision = message
             self.stop()
 
     def advance(self) -> None:
-        """Move arm and held object by one control step."""
         if not self._path:
             return
         self.q = self._path.pop(0)
@@ -414,22 +371,10 @@ class FakeArm(PlanningArm[StraightMotion]):
             self.next_obstacle = None
 
 
-SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
-"""Permitted bins of each class of the shipped cells."""
-
-
 class FakeCell(CellWithoutHardware):
-    """The cell of a cell file without physics; implements `executive.cell.workcell.Workcell`.
+    """The cell of a cell file without physics; by default the shipped cell `overhead` without objects.
 
-    Bins, classes, table, poses, camera, detectors and ledger follow the cell file. The arm moves on straight
-    joint paths, the tool always seals, and every detector finds all objects.
-
-    Args:
-        config: The cell file; by default the result of `load_empty_cell`.
-        seed: Random seed for the classes and positions of the objects.
-        routes: Names of the permitted bins of each class.
-        emit: Receives the events of the cell.
-        options: Options of the run; by default, the operator requests nothing.
+    The arm moves on straight joint paths, the tool always seals, and every detector finds all objects.
 
     Attributes:
         world: Objects and bins.
@@ -458,13 +403,13 @@ class FakeCell(CellWithoutHardware):
         if options.gui:
             raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
         super().__init__(config, seed=seed, routes=routes, emit=emit, options=options)
-        classes, clock, bins = self.cell.classes, self.cell.clock, tuple(self.cell.bins.values())
+        clock = self.cell.clock
         self.ledger = self.accounts
-        self.world = FakeWorld(classes, bins)
+        self.world = FakeWorld(self.cell.classes, self.cell.bins.values())
         put_random_objects(self.world, config, seed)
         self.arm = FakeArm(self.world, config, clock, emit)
         self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position, config.tool.load_std)
-        self.camera = FakeCamera(config, self.arm, clock, lambda: self.ledger.change_count)
+        self.camera = FakeCamera(config, self.arm, clock, self.ledger)
         self.detectors = {
             name: FakeDetector(name, detector, self.world, clock, self.camera.get_view_box)
             for name, detector in config.detectors.items()
@@ -475,12 +420,11 @@ class FakeCell(CellWithoutHardware):
         if options.resume is not None:
             self._restore_state(options.resume.log_path)
             self.log_to(options.resume.log_path)
-        localizer = CellLocalizer("plane", classes, bins)
+        localizer = CellLocalizer("plane", self.cell.classes, self.cell.bins.values())
         self._connect(options, self.arm, self.tool, self.camera, self.detectors, localizer)
 
     @staticmethod
     def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Yield key and message for an unsupported arm, places out of reach, lack of room, and bad views."""
         del cell_folder
         if arm_errors := tuple(find_arm_errors(config)):
             yield from arm_errors
@@ -488,32 +432,27 @@ class FakeCell(CellWithoutHardware):
         yield from find_places_out_of_reach(config)
         place_count = len(list_grid_points(config))
         if config.table.objects[1] > place_count:
-            yield (
-                ("table", "objects"),
-                f"the table has room for {place_count} objects, not for {config.table.objects[1]}",
-            )
+            message = f"the table has room for {place_count} objects, not for {config.table.objects[1]}"
+            yield ("table", "objects"), message
         yield from find_view_errors(config)
 
     @staticmethod
     def labels(config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return None for every detector: a fake detector knows all classes."""
         del cell_folder
         return dict.fromkeys(config.detectors)
 
     def log_to(self, path: Path) -> None:
-        """Write the state of the world to a log file, now and after every control step."""
         self._log = LogFile(path, "the state of the world")
         self.log_state()
 
     def log_state(self) -> None:
-        """Write the current state of the world to the log."""
         if self._log is None:
             return
         held = self.world.held_object
         index = None if held is None else self.world.objects.index(held)
-        groups = self.world.objects, self.world.removed_objects
-        objects = [[each.list_values() for each in group] for group in groups]
-        state = [self.steps, self.last_command_step, self.arm.q, index, *objects]
+        objects = [each.list_values() for each in self.world.objects]
+        removed_objects = [each.list_values() for each in self.world.removed_objects]
+        state = [self.steps, self.last_command_step, self.arm.q, index, objects, removed_objects]
         text = json.dumps(state, default=np.ndarray.tolist).encode()
         # Blanks pad the text to the length of the longest state so far, to overwrite all old text.
         self._log_length = max(self._log_length, len(text))
@@ -532,7 +471,6 @@ class FakeCell(CellWithoutHardware):
             raise InputError(f'the world in "{path}" is damaged: {error}; run the mission again') from error
 
     def advance(self) -> None:
-        """Advance arm and ledger by one control step, and log the state."""
         if self.world.is_commanded:
             self.last_command_step = self.steps
             self.world.is_commanded = False
@@ -543,13 +481,12 @@ class FakeCell(CellWithoutHardware):
     def _list_final_objects(self) -> Iterator[FinalObject]:
         for each in (*self.world.objects, *self.world.removed_objects):
             bin = self.world.find_bin(each)
+            name = bin.name if bin else ""
             is_held = each is self.world.held_object
             is_removed = each in self.world.removed_objects
-            name = bin.name if bin else ""
             yield FinalObject(each.label, name, each.rest_positions, each.is_dropped, is_held, is_removed)
 
     def close(self) -> None:
-        """Close the arm and the log."""
         self.arm.close()
         if self._log is not None:
             self._log.close()

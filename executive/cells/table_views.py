@@ -60,7 +60,8 @@ def find_view_errors(
 
     border = round(BORDER_FRACTION * camera.height) if camera.partial_views else 0
     image = border, border, camera.width - border, camera.height - border
-    image_masks, view_masks = find_shown(image, X_MC), find_shown(camera.table_view, X_MC)
+    image_masks = find_shown(image, X_MC)
+    view_masks = find_shown(camera.table_view, X_MC)
     if camera.partial_views:
         hidden_masks = np.array([find_hidden(pose, points) for pose in poses])
         image_masks = (image_masks & ~hidden_masks).any(axis=0, keepdims=True)
@@ -86,7 +87,8 @@ def find_view_errors(
     for mask in view_masks:
         if not (mask.any() if camera.partial_views else mask.all()):
             pixels = np.array([project(matrix, X_WM @ X_MC, volume) for X_WM in mounts])
-            low, high = np.floor(pixels.min(axis=(0, 1, 2))), np.ceil(pixels.max(axis=(0, 1, 2)))
+            low = np.floor(pixels.min(axis=(0, 1, 2)))
+            high = np.ceil(pixels.max(axis=(0, 1, 2)))
             side = (high - low).max()
             corner = np.clip((low + high - side) // 2, 0, (camera.width - side, camera.height - side))
             if corner.min() >= 0 and "inverse" not in advice and not camera.partial_views:
@@ -113,6 +115,7 @@ def _find_shown(volume: Array, matrix: Array, X_WC: Pose, region: Box) -> Mask:
 
 def _describe_gap(points: Array, mask: Mask) -> str:
     """Return fraction and region of the workspace points `(N, 3)` [m] that are not in a mask `(N,)`."""
-    (x_min, y_min, _), (x_max, y_max, _) = points[~mask].min(axis=0), points[~mask].max(axis=0)
+    x_min, y_min, _ = points[~mask].min(axis=0)
+    x_max, y_max, _ = points[~mask].max(axis=0)
     region = f"x {x_min:.2f} to {x_max:.2f} m and y {y_min:.2f} to {y_max:.2f} m"
     return f"{1 - mask.mean():.0%} of the workspace, from {region}"

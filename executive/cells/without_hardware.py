@@ -12,8 +12,7 @@ import numpy as np
 
 from executive.cell.arm import Arm
 from executive.cell.config import CellConfig
-from executive.cell.layout import build_bins, build_object_classes
-from executive.cell.objects import UNKNOWN_LABEL, Bin, Target
+from executive.cell.objects import UNKNOWN_LABEL, Bin
 from executive.cell.protocols import STEP, Cell, Detector, Localizer, Routes, StepClock, Tool
 from executive.cell.workcell import AUDIT_KEYS, CellOptions, Visuals
 from executive.events import Emit, TargetSelected
@@ -117,7 +116,6 @@ class SilentOperator:
         self._requests = list(requests)
 
     def ask(self, choices: Sequence[str]) -> str | None:
-        """Return the next class of the list, or None at the end of the list."""
         del choices
         return self._requests.pop(0) if self._requests else None
 
@@ -148,17 +146,17 @@ class CellWithoutHardware:
         self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
     ) -> None:
         del seed
-        self.config, self.routes = config, dict(routes)
-        self.steps = self.last_command_step = 0
-        bins, classes = build_bins(config), build_object_classes(config)
+        self.config = config
+        self.routes = dict(routes)
+        self.steps = 0
+        self.last_command_step = 0
+        bins = config.build_bins()
+        classes = {label: section.build_class(label) for label, section in config.objects.items()}
         ignored = set(config.unknown.ignore).difference(classes)
         self.accounts = Tracker(
             config.ledger, config.table, bins, classes, self.routes, options.quotas, emit, ignored
         )
         no_device: Any = None
-
-        def emit_selection(target: Target, bin: str) -> None:
-            emit(TargetSelected(target.item, target.label, target.frame, bin))
 
         self.cell = Cell(
             clock=StepClock(lambda: self.steps * STEP),
@@ -176,7 +174,9 @@ class CellWithoutHardware:
             descent=config.motion.descent,
             slow_descent=config.motion.slow_descent,
             descent_speed=config.motion.descent_speed,
-            report_selection=emit_selection,
+            report_selection=lambda target, bin: emit(
+                TargetSelected(target.item, target.label, target.frame, bin)
+            ),
             quotas=options.quotas,
         )
 
@@ -201,15 +201,12 @@ class CellWithoutHardware:
         """Do nothing: without hardware or physics, there is no world to log."""
 
     def advance(self) -> None:
-        """Count one control step."""
         self.steps += 1
 
     def visuals(self) -> Visuals | None:
-        """Return None: the cell has no shapes to show."""
         return None
 
     def audit(self) -> Mapping[str, int] | None:
-        """Return the number of objects by `AUDIT_KEYS`; None if the true positions are unknown."""
         if (objects := self._list_final_objects()) is None:
             return None
         gate = self.config.ledger.gate

@@ -108,7 +108,7 @@ def run_command(
                 if scene is not None:
                     # The import loads the simulator. Only simulated cells read the scene file, but its errors
                     # are reported for every cell.
-                    from executive.cells.sim.scene_file import load_scene
+                    from executive.cells.sim.scene import load_scene
 
                     load_scene(scene, loaded_mission.cell_config)
                 if video is not None:

@@ -12,7 +12,6 @@ import numpy as np
 
 from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.objects import BIN_THICKNESS
-from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.mission.findings import Finding, MissionError, make_error, sort_findings
@@ -31,6 +30,8 @@ from executive.mission.yaml_files import (
     YamlScalar,
     find_file_below,
     flatten,
+    has_outside_link,
+    is_outside_path,
     parse_yaml,
     read_source,
 )

@@ -16,13 +16,23 @@ import yaml
 from pydantic import JsonValue
 
 import executive
-from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.mission.findings import Finding, describe_value, make_error, suggest_choice
 from executive.tree.specification import Source, Span
 
 _MAX_FILE_SIZE = 1_000_000
 """Maximum size of a mission or cell file [byte]."""
+
+
+def is_outside_path(path_text: str) -> bool:
+    """Return True if a path may lead out of its folder: it is absolute, or contains `..` or a backslash."""
+    path = PurePosixPath(path_text)
+    return path.is_absolute() or ".." in path.parts or "\\" in path_text
+
+
+def has_outside_link(folder: Path, path_text: str) -> bool:
+    """Return True if a relative path leads out of a folder through a symbolic link."""
+    return not (folder / path_text).resolve().is_relative_to(folder.resolve())
 
 
 def get_shipped_folder() -> Path:

@@ -8,7 +8,6 @@ import numpy as np
 
 from executive.cell.arm import Goal
 from executive.cell.config import CellConfig
-from executive.cell.layout import build_bin, compute_travel_height
 from executive.cell.workcell import KeyPath
 from executive.errors import Unreachable
 from executive.geometry import Array
@@ -71,14 +70,14 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
     kinematics = build_planning_kinematics(config)
     q_start = np.zeros(config.arm.joint_count)
     places: list[tuple[KeyPath, str, Array, float]] = [
-        (("bins", name, "position"), f'the bin "{name}"', build_bin(name, bin).slots, bin.position[2])
+        (("bins", name, "position"), f'the bin "{name}"', bin.build_bin(name).slots, bin.position[2])
         for name, bin in config.bins.items()
     ]
     safe_position = np.array([config.safe_place[:2]])
     places.append((("safe_place",), "the safe place", safe_position, config.safe_place[2]))
     for key_path, place_name, positions, surface_height in places:
         height = surface_height + config.max_object_height
-        approach_height = max(0.0, compute_travel_height(config) - height)
+        approach_height = max(0.0, config.travel_height - height)
         try:
             for x, y in positions.tolist():
                 find_configuration_pairs(kinematics, Goal((x, y, height)), approach_height, q_start)

@@ -16,8 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.config import CellConfig
-from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, compute_max_pile_height
+from executive.cell.config import NECK_LENGTH, TOOL_RADIUS, CellConfig
 from executive.cell.objects import BIN_THICKNESS, Load, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
@@ -271,7 +270,7 @@ def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:
     # Each row: smallest corner, largest corner, radius, top [m]; is undetected; is a support; name.
     rows: list[tuple[tuple[float, float], tuple[float, float], float, float, bool, bool, str]] = [
         ((config.table.x[0], config.table.y[0]), (config.table.x[1], config.table.y[1]), max_radius,
-         compute_max_pile_height(config), True, False, "the space for undetected objects"),
+         config.max_pile_height, True, False, "the space for undetected objects"),
         ((-2.0, -2.0), (2.0, 2.0), 0.0, 0.0, False, True, "the table"),
     ]  # fmt: skip
     for name, bin in config.bins.items():

@@ -13,12 +13,13 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from types import GeneratorType
 from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from executive.cell.arm import Goal, Motion, Task, reject_generator
+from executive.cell.arm import Goal, Motion, Task
 from executive.cell.config import CellConfig
 from executive.cell.protocols import STEP, Clock
 from executive.errors import Blocked, Fault, Unreachable
@@ -286,7 +287,11 @@ class PlanningArm(Generic[M]):
             Fault: The arm is moving, or did not plan the motion.
         """
         self._require_rest("start a motion")
-        reject_generator(motion)
+        if isinstance(motion, GeneratorType):
+            raise Fault(
+                f"the generator {motion.__name__}(...) was passed to the arm where a motion is expected: "
+                f'"yield from" is missing. Write "motion = yield from {motion.__name__}(...)"'
+            )
         if not isinstance(motion, kind):
             raise Fault(f"the arm follows its own planned motions, not a {type(motion).__name__}")
         return motion

@@ -13,7 +13,6 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.layout import Vector3, compute_travel_height
 from executive.cell.protocols import STEP
 from executive.errors import Unreachable
 from executive.geometry import Array, make_tool_down_pose
@@ -78,7 +77,7 @@ class MotionSearch:
     ) -> None:
         self._kinematics = kinematics
         self._limits = limits
-        self._travel_height = compute_travel_height(config)
+        self._travel_height = config.travel_height
         self._end = end
         self._straight_part_length = config.motion.straight
         discs = make_tool_discs(config, task.load)
@@ -262,7 +261,9 @@ class MotionSearch:
         tcps, axes = self._kinematics.compute_tcps_and_axes(q[None])
         return tcps[0], bool(-axes[0, 2] > MIN_RISE_COSINE)
 
-    def _solve_via_point(self, position: Vector3, branch: BranchKey, q_seed: Array) -> JointState:
+    def _solve_via_point(
+        self, position: tuple[float, float, float], branch: BranchKey, q_seed: Array
+    ) -> JointState:
         """Return the state of rest at a via point [m], with the last joint as in `q_seed` `(n,)` [rad]."""
         (q,) = self._kinematics.solve([make_tool_down_pose(position)], branch)
         q[-1] = q_seed[-1]

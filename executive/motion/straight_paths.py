@@ -9,7 +9,6 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.layout import compute_travel_height
 from executive.cell.protocols import STEP
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
@@ -50,7 +49,7 @@ def plan_straight_motion(
         Blocked, Unreachable: The error of the first attempt, if no attempt finds a motion.
     """
     errors: list[Exception] = []
-    travel_height = compute_travel_height(config)
+    travel_height = config.travel_height
     rise = max(0.0, travel_height - float(kinematics.compute_tool_pose(start).position[2]))
     attempts = [(rise + extra_height, travel_height + extra_height) for extra_height in EXTRA_HEIGHTS]
     for attempt in attempts if isinstance(goal, Goal) else [(0.0, 0.0), *attempts]:

@@ -39,8 +39,7 @@ from executive.cells.sim.models import (
     find_model_errors,
     load_mesh,
 )
-from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, build_world
-from executive.cells.sim.spawn import spawn_objects
+from executive.cells.sim.scene import DECLARED_SCENE, SceneConfig, build_world, spawn_objects
 from executive.cells.sim.world import WOOD_TEXTURE
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, intersect_plane, project
@@ -259,7 +258,7 @@ class SceneRenderer:
         if is_holding:
             objects.append(arrangements.draw_held_object(world.get_tool_pose(), self._config, rng))
         objects_by_body = {world.add_object(o.label, o.X_WO, o.colour, o.model): o for o in objects}
-        world.table_top.paint(colour, texture)
+        world.paint_table(colour, texture)
         rendered = render(world, matrix, X_WC, region, light)
         scale = IMAGE_SIZE / (region[2] - region[0])
         labelled = self._label_image(rendered, MIN_CONTRAST * noise.read, objects_by_body, region[:2], scale)

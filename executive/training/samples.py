@@ -14,9 +14,9 @@ import numpy as np
 from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
 from executive.cell.frame import Box
-from executive.cell.paths import has_outside_link
 from executive.errors import MAX_QUOTATION_LENGTH, InputError
 from executive.geometry import Array
+from executive.mission.yaml_files import has_outside_link
 from executive.training.dataset import (
     MAX_LABEL_FILE_SIZE,
     LabelledImage,

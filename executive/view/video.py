@@ -14,11 +14,10 @@ import PIL.Image
 
 from executive.cell.config import CellConfig
 from executive.cells.sim.camera import Image, Light, render
-from executive.cells.sim.command_log import RUN_STEP, read_commands
 from executive.cells.sim.rebuild import WorldRebuilder
-from executive.cells.sim.scene_file import load_scene
-from executive.cells.sim.spawn import build_initial_world
+from executive.cells.sim.scene import build_initial_world, load_scene
 from executive.cells.sim.tool import SuctionTool
+from executive.cells.world_log import RUN_STEP, read_commands
 from executive.errors import InputError, explain_os_errors
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import compute_camera_matrix, compute_look_at_pose

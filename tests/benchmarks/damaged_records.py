@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from executive.campaign.jobs import MissionUnderTest
-from executive.cells.sim.command_log import FILE_HEADER
+from executive.cells.world_log import FILE_HEADER
 from executive.cli.main import main
 from executive.errors import InputError
 from executive.events import NodeEnded, TimedEvent

@@ -24,7 +24,6 @@ from toppra.constraint import JointAccelerationConstraint, JointVelocityConstrai
 
 from executive.cell.arm import Goal
 from executive.cell.config import CellConfig
-from executive.cell.layout import compute_travel_height
 from executive.cell.protocols import STEP
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
@@ -145,7 +144,7 @@ def measure(cell: CellConfig, seed: int = 0, pairs: int = 200) -> Figures:
     figures: Figures = {"cell": cell.cell, "pairs": pairs, "seed": seed}
     rows: dict[str, list[PairMotion]] = defaultdict(list)
     problems = []
-    height = compute_travel_height(cell)
+    height = cell.travel_height
     home = np.radians(cell.arm.poses_deg["home"])
     with open_world(cell) as (world, planner):
         scenes = SceneGenerator(cell, planner, world, seed)

@@ -13,11 +13,10 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.layout import build_bin, compute_travel_height
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import build_simulated_class, load_mesh
-from executive.cells.sim.spawn import spawn_objects
+from executive.cells.sim.scene import spawn_objects
 from executive.cells.sim.tool import TOUCH_DISTANCE, compute_breakaway_force, measure_contact
 from executive.cells.sim.world import World
 from executive.errors import InputError, Unreachable
@@ -98,7 +97,7 @@ class SceneGenerator:
         self._planner = planner
         self._world = world
         self._random = np.random.default_rng(seed)
-        self._bins = [build_bin(name, bin) for name, bin in cell.bins.items()]
+        self._bins = list(cell.build_bins().values())
         self._tallest = max(kind.height for kind in cell.objects.values())
 
     def draw(self) -> Scene:
@@ -116,7 +115,7 @@ class SceneGenerator:
             try:
                 scene = self._make_scene(bodies)
                 for goal in (scene.approach, scene.drop):
-                    length = max(0.0, compute_travel_height(self._cell) - goal.position[2])
+                    length = max(0.0, self._cell.travel_height - goal.position[2])
                     find_configuration_pairs(self._planner.kinematics, goal, length, np.zeros(7))
             except Unreachable:
                 continue

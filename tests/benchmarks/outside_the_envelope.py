@@ -18,7 +18,7 @@ import yaml
 
 from executive.cell.config import CellConfig
 from executive.cell.frame import Answer, Frame
-from executive.cells.sim.scene_file import load_scene
+from executive.cells.sim.scene import load_scene
 from executive.mission.load import load_mission
 from executive.perception.detectors.requests import ChangedRequest, ClosableDetector
 from executive.perception.envelope import build_rated_detectors

@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 
 from executive.cell.config import CellConfig
+from executive.cell.workcell import CellKind
 from executive.cells.fake import FakeCell
-from executive.cells.sim.cell import SimCell
+from executive.cells.sim.kind import SIM_CELL_KIND
 from executive.cells.table_views import find_view_errors
 from executive.mission.cell_file import load_cell, read_cell
 from executive.mission.yaml_files import get_shipped_folder
@@ -50,7 +51,7 @@ def test_a_view_without_the_workspace_is_named_with_what_it_lacks(
     assert fragment in message
 
 
-@pytest.mark.parametrize("kind", [SimCell, FakeCell])
-def test_every_kind_of_cell_checks_the_views(kind: type[SimCell | FakeCell]) -> None:
+@pytest.mark.parametrize("kind", [SIM_CELL_KIND, FakeCell])
+def test_every_kind_of_cell_checks_the_views(kind: CellKind) -> None:
     config = changed("overhead", table_view=[0, 0, 64, 64])
     assert [key for key, _ in kind.check(config, CELLS)] == [("cameras", "overhead", "table_view")]

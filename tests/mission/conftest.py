@@ -11,7 +11,7 @@ import pytest
 
 import executive.mission.load
 from executive.cell.config import CellConfig
-from executive.cells.sim.kind import SimCellChecks
+from executive.cells.sim.kind import SIM_CELL_KIND
 from executive.mission import cell_file
 from executive.mission.load import LoadedMission, load_mission
 from executive.skill import In, Metres, Out, Skill, param, port
@@ -68,7 +68,7 @@ SMALL_CELL = Path(__file__).with_name("small_cell.yaml").read_text()
 @pytest.fixture(scope="module")
 def shared_cells() -> Iterator[None]:
     """Read each file once, check each cell once, and load the control nodes once, per module."""
-    check, found = SimCellChecks.check, {}
+    check, found = SIM_CELL_KIND.check, {}
 
     def check_once(config: CellConfig, cell_folder: Path) -> Any:
         key = config.model_dump_json(), cell_folder
@@ -80,7 +80,7 @@ def shared_cells() -> Iterator[None]:
         patch.setattr(cell_file, "read_source", functools.cache(cell_file.read_source))
         for module in (cell_file, executive.mission.load):
             patch.setattr(module, "parse_yaml", functools.cache(module.parse_yaml))
-        patch.setattr(SimCellChecks, "check", staticmethod(check_once))
+        patch.setattr(SIM_CELL_KIND, "check", check_once)
         patch.setattr(executive.mission.load, "load_control_nodes", functools.cache(load_control_nodes))
         yield
 

@@ -39,7 +39,7 @@ def complaint(text: str, overrides: dict[str, str] | None = None) -> str:
         ("table_view: [192, 100, 448, 356]", "table_view: [192, 100, 748, 656]", "needs a table_view that is a square inside its image of 640 x 480 pixels, not [192, 100, 748, 656]\n"),
         ("up: [1, 0, 0]", "up: [0, 0, 1]", "cameras.top needs a look_at other than position, and an up that is not along the axis\n"),
         ("fov_deg: 55", "calibration: {matrix: [[400, 0, 320], [0, 400, 240], [0, 0, 1]]}", "cameras.top.calibration needs exactly one of mount_to_camera and camera_to_mount, its inverse\n"),
-        ("kind: embedded", "kind: embedded, floor: 0.7", "needs a floor of at most its threshold, 0.5, not 0.7\n"),
+        ("kind: embedded", "kind: embedded, floor: 0.7", "needs a floor of at most its threshold 0.5, not 0.7\n"),
     ],
 )  # fmt: skip
 def test_findings_say_what_and_where(old: str, new: str, expected: str, small_cell: str) -> None:

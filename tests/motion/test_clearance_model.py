@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from executive.cell.config import CellConfig
-from executive.cell.layout import TOOL_RADIUS
+from executive.cell.config import TOOL_RADIUS, CellConfig
 from executive.cell.objects import BIN_THICKNESS, Load, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array

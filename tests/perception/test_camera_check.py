@@ -10,7 +10,6 @@ import pytest
 
 from executive.cell.config import BinConfig
 from executive.cell.frame import Frame
-from executive.cell.layout import build_bin
 from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.geometry import Array, Pose
 from executive.perception.camera_check import MAX_OUTLINE_DISTANCE, describe_displacement, estimate_offset
@@ -22,7 +21,7 @@ DECLARED = looking_down([0.5, 0.0, 1.2])
 COLOURS = {"red": (190, 40, 40), "blue": (40, 60, 190), "yellow": (215, 190, 40)}
 PLACES = {"red": (0.24, -0.48, 0.0), "blue": (0.24, 0.48, 0.0), "yellow": (0.49, 0.46, 0.0)}
 BINS = [
-    build_bin(name, BinConfig(position=place, size=(0.24, 0.30, 0.06), colour=(1.0, 1.0, 1.0), slots=(1, 1)))
+    BinConfig(position=place, size=(0.24, 0.30, 0.06), colour=(1.0, 1.0, 1.0), slots=(1, 1)).build_bin(name)
     for name, place in PLACES.items()
 ]
 

@@ -10,7 +10,7 @@ import numpy as np
 from executive.cell.arm import Goal, Motion, Task
 from executive.cell.config import CellConfig
 from executive.cell.protocols import STEP, Clock
-from executive.cells.sim import command_log
+from executive.cells import world_log
 from executive.cells.sim.rebuild import WorldRebuilder
 from executive.cells.sim.tool import LIP_LENGTH
 from executive.cells.sim.world import BODY_B, LINK_A, NORMAL_FORCE, POSITION_A, World, name_load
@@ -46,13 +46,10 @@ class ContactMonitor:
         self._last_contact_steps = {(part, body): step for part, body, _, _ in self._iterate_contacts()}
 
     def find_new_contact(self, lip_may_touch: bool) -> tuple[str, Sequence[float] | None]:
-        """Return description and point [m] of a new forbidden contact; without one, "" and None.
-
-        The lip is exempt if `lip_may_touch`.
-        """
-        now, last_steps = self._world.step_count, self._last_contact_steps
-        oldest_step = now - SEPARATION_STEP_COUNT
-        self._last_contact_steps = {pair: step for pair, step in last_steps.items() if step >= oldest_step}
+        """Return description and point [m] of a new forbidden contact; without one, "" and None."""
+        now = self._world.step_count
+        oldest = now - SEPARATION_STEP_COUNT
+        self._last_contact_steps = {k: step for k, step in self._last_contact_steps.items() if step >= oldest}
         for part, body, position, force in self._iterate_contacts():
             if (part, body) in self._last_contact_steps:
                 self._last_contact_steps[part, body] = now
@@ -70,7 +67,8 @@ class ContactMonitor:
 
     def _iterate_contacts(self) -> Iterator[tuple[str, int, Sequence[float], float]]:
         """Yield part of the robot, touched body, contact point [m] and normal force [N] of each contact."""
-        world, held_body = self._world, self._get_held_body()
+        world = self._world
+        held_body = self._get_held_body()
         robot = (world.arm,) if held_body is None else (world.arm, held_body)
         for body in robot:
             for point in world.client.getContactPoints(bodyA=body) or ():
@@ -134,12 +132,10 @@ class SimArm(PlanningArm[Trajectory]):
 
     @property
     def q(self) -> Array:
-        """Measured joint positions `(n,)` [rad]."""
         return self._world.get_joint_positions()
 
     @property
     def tool_velocity(self) -> Array:
-        """Velocity of the tool centre point in the world `(3,)` [m/s], from the measured joint velocities."""
         states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
         q, q_change = np.array([(state[0], state[1] * DIFFERENTIATION_STEP) for state in states]).T
         compute_pose = self.kinematics.compute_tool_pose
@@ -147,22 +143,15 @@ class SimArm(PlanningArm[Trajectory]):
 
     @property
     def at_rest(self) -> bool:
-        """True while the arm neither follows a motion nor brakes."""
         return self._motion is None
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
-        """Plan the next motion, from the end of the running motion, before `plan` requests it.
-
-        Raises:
-            Fault: The cell file has no such pose.
-        """
-        if self._braking_times is None:  # a braking arm does not reach the end of the motion
+        """Plan the next motion from the end of the running motion; while the arm brakes, do nothing."""
+        if self._braking_times is None:
             super().plan_ahead(goal, task)
 
     def start(self, motion: Motion) -> None:
-        """Begin to follow a motion. The arm must be at rest at the start of the motion.
-
-        If something has pushed the arm away from the start, the arm stays there, which counts as a collision.
+        """Begin to follow a motion; if something has pushed the arm off its start, report a collision.
 
         Raises:
             Fault: The arm is moving, was not sent to the start, or did not plan the motion.
@@ -182,7 +171,6 @@ class SimArm(PlanningArm[Trajectory]):
         self._world.log.append_motion(trajectory)
 
     def stop(self) -> None:
-        """Begin to brake along the path of the running motion, if any."""
         if self._motion is not None and self._braking_times is None:
             self._braking_times = list(plan_braking(self._motion, self._motion_time, self._limits))
 
@@ -216,25 +204,24 @@ class SimArm(PlanningArm[Trajectory]):
         self._commanded_q = self._motion.state_at(self._motion_time)[0]
         self.send_command()
         if has_ended:
-            self._motion, self._braking_times = None, None
-            self._world.log.append(command_log.MOTION_END)
+            self._motion = None
+            self._braking_times = None
+            self._world.log.append(world_log.MOTION_END)
 
     @property
     def _end_q(self) -> Array:
-        """Joint positions `(n,)` [rad] at the end of the running motion, or now if the arm is at rest."""
         return self._commanded_q if self._motion is None else self._motion.end
 
     def _describe_disturbance(self, tolerance: float) -> str:
-        """Return a sentence if a joint is over `tolerance` [rad] away from its command, else ""."""
         error = _describe_difference(self.q, self._commanded_q, tolerance)
         return f"something holds or pushes the arm off its path: {error}" if error else ""
 
 
 def _describe_difference(q: Array, expected_q: Array, tolerance: float) -> str:
     """Return a clause if a joint at `q` `(n,)` [rad] is over `tolerance` [rad] away from `expected_q`."""
-    errors = np.abs(q - expected_q).tolist()
-    joint = errors.index(max(errors))
-    degrees, allowed = math.degrees(errors[joint]), math.degrees(tolerance)
-    return (
-        f"joint {joint + 1} is {degrees:.2f}° away; {allowed:.1f}° are allowed" if degrees > allowed else ""
-    )
+    errors = np.degrees(np.abs(q - expected_q))
+    joint = int(errors.argmax())
+    allowed = math.degrees(tolerance)
+    if errors[joint] <= allowed:
+        return ""
+    return f"joint {joint + 1} is {errors[joint]:.2f}° away; {allowed:.1f}° are allowed"

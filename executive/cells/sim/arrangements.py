@@ -9,7 +9,6 @@ import colorsys
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
 import cv2
 import numpy as np
@@ -17,10 +16,18 @@ from numpy.random import Generator
 
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import CameraConfig, Colour, NoiseConfig, Range
-from executive.cell.layout import build_bins
 from executive.cell.objects import BIN_THICKNESS, UNKNOWN_LABEL, Bin
 from executive.cells.sim.camera import Light, Region
-from executive.cells.sim.models import add_body, build_drop_world, load_mesh, locate_object
+from executive.cells.sim.models import (
+    DAMAGED_MODEL_NUMBER,
+    SETTLING_STEP_COUNT,
+    add_body,
+    build_drop_world,
+    load_mesh,
+    load_unknown_model,
+    locate_object,
+    scale_model,
+)
 from executive.cells.sim.world import PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE, World, add_bin
 from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
 from executive.perception.camera_model import intersect_plane
@@ -42,8 +49,10 @@ def draw_light(rng: np.random.Generator) -> Light:
     shadow = bool(rng.random() < 0.35)
     if rng.random() < 0.2:
         return Light(shadow=shadow)
-    azimuth, elevation = rng.uniform(0, math.tau), rng.uniform(math.radians(18), math.pi / 2)
-    x, y = math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth)
+    azimuth = rng.uniform(0, math.tau)
+    elevation = rng.uniform(math.radians(18), math.pi / 2)
+    x = math.cos(elevation) * math.cos(azimuth)
+    y = math.cos(elevation) * math.sin(azimuth)
     red, green, blue = rng.uniform(0.72, 1.0, 3)
     random_number = rng.random()
     brightness = 1.0 if random_number < 0.5 else 1.5
@@ -126,7 +135,8 @@ def draw_camera(
     if camera.mount == "wrist":
         return matrix, X_WC
     target = intersect_plane(matrix, X_WC, (centre[0], centre[1]), 0.0)
-    angle, tilt = rng.uniform(0, math.tau), MAX_TILT * float(rng.choice([0.0, 0.1, 0.3, 1.0])) * rng.random()
+    angle = rng.uniform(0, math.tau)
+    tilt = MAX_TILT * float(rng.choice([0.0, 0.1, 0.3, 1.0])) * rng.random()
     rotation, _ = cv2.Rodrigues(tilt * np.array([math.cos(angle), math.sin(angle), 0.0]))
     rotation = np.asarray(rotation) @ rotate_about_z(rng.normal(0, math.radians(3)))
     offset = (X_WC.position - target) * (1 + rng.uniform(-1, 1) * MAX_DISTANCE_CHANGE)
@@ -141,24 +151,24 @@ def draw_noise(noise: NoiseConfig, rng: np.random.Generator) -> NoiseConfig:
     """
     if rng.random() < 0.6:
         return noise
-    gain, read = noise.gain + rng.exponential(0.06), noise.read * math.exp(rng.uniform(-1, 2.2))
-    return NoiseConfig(gain=gain, read=read)
+    gain = noise.gain + rng.exponential(0.06)
+    return NoiseConfig(gain=gain, read=noise.read * math.exp(rng.uniform(-1, 2.2)))
 
 
-MAX_SPARSE_OBJECT_COUNT, MAX_DENSE_OBJECT_COUNT = 7, 20
-"""Maximum number of objects in a sparse scene and in a dense scene."""
+MAX_SPARSE_OBJECT_COUNT = 7
+"""Maximum number of objects in a sparse scene."""
+MAX_DENSE_OBJECT_COUNT = 20
+"""Maximum number of objects in a dense scene."""
 SCALE_FACTORS = (0.75, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.3)
 """Scale factors of objects whose size differs from the size of their class."""
-UNKNOWN_MODEL_COUNT, DAMAGED_MODEL_NUMBER = 1000, 168
-"""Number of shapes in `random_urdfs` of pybullet_data, and index of the shape with a damaged mesh."""
 TRAINING_MODEL_NUMBERS = tuple(number for number in range(800) if number != DAMAGED_MODEL_NUMBER)
 """Indices of the shapes for unknown objects in training; all other shapes are reserved for tests."""
-TABLE_X_RANGE, TABLE_Y_RANGE = (-0.05, 0.86), (-0.71, 0.71)
-"""Ranges of the x and y coordinates of objects on the table top [m]."""
+TABLE_X_RANGE = (-0.05, 0.86)
+"""Range of the x coordinates of objects on the table top [m]."""
+TABLE_Y_RANGE = (-0.71, 0.71)
+"""Range of the y coordinates of objects on the table top [m]."""
 MIN_BASE_DISTANCE = 0.16
 """Minimum distance of an object from the axis of the base of the arm [m]."""
-SETTLING_STEP_COUNT = 360
-"""Number of physics steps in which dropped objects come to rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,26 +232,13 @@ def draw_objects(config: CellConfig, count: int, table_colour: Colour, rng: Gene
         model = config.objects[label]
         colour = draw_object_colour(model.colours, table_colour, rng)
         if rng.random() < unknown_fraction:
-            label, model = UNKNOWN_LABEL, load_unknown_model(int(rng.choice(TRAINING_MODEL_NUMBERS)))
+            label = UNKNOWN_LABEL
+            model = load_unknown_model(int(rng.choice(TRAINING_MODEL_NUMBERS)))
             model = scale_model(model, rng.uniform(0.4, 1.0))
         elif rng.random() < scaled_fraction:
             model = scale_model(model, float(rng.choice(SCALE_FACTORS)))
         objects.append(SceneObject(label, model, Pose.identity(), colour))
     return objects
-
-
-def scale_model(model: ObjectConfig, factor: float) -> ObjectConfig:
-    """Return the model of an object scaled by `factor`."""
-    names = ("scale", "height", "radius", "ring")
-    return model.model_copy(update={name: getattr(model, name) * factor for name in names})
-
-
-@cache
-def load_unknown_model(number: int) -> ObjectConfig:
-    """Return shape `number` (0 to 999) of `random_urdfs` in pybullet_data; most shapes are 12 cm long."""
-    name = f"random_urdfs/{number:03d}/{number:03d}.urdf"
-    mesh = load_mesh(ObjectConfig(urdf=name, height=1.0, radius=1.0))
-    return ObjectConfig(urdf=name, height=mesh.top - mesh.bottom, radius=mesh.radius)
 
 
 def draw_arrangement(
@@ -268,7 +265,7 @@ def draw_arrangement(
         margin = rng.uniform(0.0, 0.02 + 0.006 * count)
         low = np.maximum(low, np.array([config.table.x[0], config.table.y[0]]) - margin)
         high = np.minimum(high, np.array([config.table.x[1], config.table.y[1]]) + margin)
-    all_bins = list(build_bins(config).values())
+    all_bins = list(config.build_bins().values())
     bins = [bin for bin in all_bins if _overlaps_rectangle(bin, low, high)]
     random_number = rng.random()
     if random_number < 0.15:
@@ -323,13 +320,13 @@ def _move_tool(world: World, X_WT: Pose) -> None:
 
 
 def _draw_rotation(rng: Generator) -> Array:
-    """Return a random rotation matrix with uniform distribution."""
     return Pose.of(np.zeros(3), rng.normal(size=4)).rotation
 
 
 def _overlaps_rectangle(bin: Bin, low: Array, high: Array) -> bool:
     """Return True if a bin overlaps the rectangle from `low` to `high` `(2,)` [m] by over 4 cm."""
-    centre, half_size = bin.position[:2], bin.size[:2] / 2
+    centre = bin.position[:2]
+    half_size = bin.size[:2] / 2
     return bool((centre + half_size > low + 0.04).all() and (centre - half_size < high - 0.04).all())
 
 
@@ -374,7 +371,8 @@ def _place_side_by_side(
     for candidate in objects:
         radius = candidate.model.radius
         for _ in range(30):
-            point, floor_height = rng.uniform(low, high), 0.0
+            point = rng.uniform(low, high)
+            floor_height = 0.0
             if bins and rng.random() < 0.35:
                 bin = bins[int(rng.integers(len(bins)))]
                 max_offset = np.maximum(bin.size[:2] / 2 - radius, 0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated
@@ -17,12 +17,12 @@ from pydantic import Field
 from executive.cell.config import CellConfig
 from executive.cell.device_config import CameraConfig, Colour, DepthConfig, NoiseConfig, Section
 from executive.cell.frame import Frame
-from executive.cell.layout import compute_max_pile_height
 from executive.cell.objects import Bin
 from executive.cell.protocols import Clock
+from executive.cell.workcell import KeyPath
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
-from executive.motion.joints import Kinematics
+from executive.motion.arms import build_kinematics
 from executive.perception.camera_check import describe_displacement
 from executive.perception.camera_model import (
     FAR_PLANE,
@@ -96,7 +96,8 @@ class RenderedImage:
 def render(world: World, matrix: Array, X_WC: Pose, region: Region, light: Light) -> RenderedImage:
     """Render a region of a camera image at full resolution."""
     left, top, right, bottom = region
-    width, height = right - left, bottom - top
+    width = right - left
+    height = bottom - top
     # TinyRenderer samples the lower left corner of a pixel; a shift by half a pixel samples the centre.
     shifted_region = (left + 0.5, top - 0.5, right + 0.5, bottom - 0.5)
     _, _, rgba, depth_buffer, segmentation = world.client.getCameraImage(
@@ -135,7 +136,9 @@ class FixedViewRenderer:
     """
 
     def __init__(self, world: World, region: Region, light: Light) -> None:
-        self._world, self._region, self._light = world, region, light
+        self._world = world
+        self._region = region
+        self._light = light
         self._client = world.client
         static_bodies = (world.floor, world.table, *world.bin_bodies.values())
         self._static_shapes = [shape for body in static_bodies for shape in self._list_shapes(body)]
@@ -155,7 +158,8 @@ class FixedViewRenderer:
         if background is None or view != self._background_view:
             object_shapes = [shape for body in self._world.labels for shape in self._list_shapes(body)]
             background = self._render_without(self._arm_shapes + object_shapes, matrix, X_WC)
-            self._background, self._background_view = background, view
+            self._background = background
+            self._background_view = view
         foreground = self._render_without(self._static_shapes, matrix, X_WC)
         is_in_front = foreground.depth_buffer <= background.depth_buffer
         return replace(
@@ -185,99 +189,6 @@ class FixedViewRenderer:
         return shapes
 
 
-MAX_LOAD_OFFSET = 0.015
-"""Maximum distance of the centre of a held object from the axis of the suction cup [m]."""
-TOOL_SPHERE_RADIUS = 0.02
-"""Radius of the spheres that enclose the tool, including tube and fittings [m]."""
-SPHERES_PER_SEGMENT = 9
-"""Number of spheres that cover the segment between two points on the axis of a part of the arm."""
-
-ArmPart = tuple[Sequence[Array], float]
-"""Points `(3,)` [m] along a part of the arm, and the radius of the spheres that enclose the part [m]."""
-
-
-class ArmOcclusion:
-    """Occlusion of camera images by the arm, its tool and a held object.
-
-    Args:
-        world: The world with the arm.
-        kinematics: Kinematics of the arm.
-        config: The cell file.
-        is_loaded: Returns True if the tool holds an object; the object is assumed to be of the largest class.
-    """
-
-    def __init__(
-        self, world: World, kinematics: Kinematics, config: CellConfig, is_loaded: Callable[[], bool]
-    ) -> None:
-        self._world = world
-        self._kinematics = kinematics
-        self._is_loaded = is_loaded
-        # T is the frame of the tool, F the frame of the flange.
-        self._X_TF = Pose.of([0.0, 0.0, -config.tool.length])
-        self._load_radius = max(model.radius for model in config.objects.values()) + MAX_LOAD_OFFSET
-        self._load_height = config.max_object_height
-        heights = (0.0, compute_max_pile_height(config))
-        self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
-
-    def compute_visibility_mask(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:
-        """Return a mask `(H, W)` of the visible pixels.
-
-        `matrix` is the camera matrix `(3, 3)` [pixel], and `size` is width and height of the image [pixel].
-        """
-        q = self._world.get_joint_positions()
-        X_WT = self._kinematics.compute_tool_pose(q)
-        X_WF = X_WT @ self._X_TF
-        joint_frames = self._kinematics.compute_joint_frames(q)
-        joints = [np.zeros(3), *(frame.position for frame in joint_frames), X_WF.position]
-        tool_axis = [X_WF.position, X_WT.position]
-        parts: list[ArmPart] = [(joints, self._world.robot.link_radius), (tool_axis, TOOL_SPHERE_RADIUS)]
-        if self._is_loaded():
-            load_end = X_WT.apply(np.array([0.0, 0.0, self._load_height]))
-            parts.append(([X_WT.position, load_end], self._load_radius))
-        return ~_compute_occlusion_mask(parts, matrix, X_WC, size)
-
-    def is_table_visible(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> bool:
-        """Return True if the workspace, up to the height of a pile, is in the image and not occluded."""
-        mask = compute_hull_mask(self._workspace_corners, matrix, X_WC, size)
-        return mask is not None and bool(np.all(self.compute_visibility_mask(matrix, X_WC, size)[mask]))
-
-
-def _compute_occlusion_mask(
-    parts: Sequence[ArmPart], matrix: Array, X_WC: Pose, size: tuple[int, int]
-) -> NDArray[np.bool_]:
-    """Return the mask `(H, W)` of the pixels that the arm may occlude: projections of its enclosing spheres.
-
-    `parts` are the links, the tool and the held object. `matrix` is the camera matrix `(3, 3)` [pixel], and
-    `size` is the width and height of the image [pixel].
-    """
-    mask = np.zeros((size[1], size[0]), dtype=np.uint8)
-    for points, radius in parts:
-        for start, end in itertools.pairwise(points):
-            centres = X_WC.inverse().apply(np.linspace(start, end, SPHERES_PER_SEGMENT))
-            for x, y, z in (centres @ matrix.T).tolist():
-                # A sphere behind the camera is invisible. The link that carries a wrist camera has a sphere
-                # around the camera, which would occlude the whole image.
-                if z <= radius:
-                    continue
-                column, row = round(x / z), round(y / z)
-                # OpenCV cannot draw circles with very large coordinates.
-                if abs(column) <= 4 * size[0] and abs(row) <= 4 * size[1]:
-                    cv2.circle(mask, (column, row), max(1, round(matrix[0, 0] * radius / z)), 1, -1)
-    return mask.astype(bool)
-
-
-Mask = NDArray[np.bool_]
-"""Mask `(H, W)` of pixels."""
-DEPTH_SEED = 1
-"""Last number of the seed of the depth noise; the other numbers are the seed of the image noise."""
-
-
-def get_camera_pose(world: World, config: CameraConfig) -> Pose:
-    """Return the current pose `X_WC` of a camera; frame M is the mount, i.e. the world or the flange."""
-    _, X_MC = compute_calibration(config)
-    return X_MC if config.mount == "fixed" else world.get_flange_pose() @ X_MC
-
-
 def add_noise(image: Image, noise: NoiseConfig, rng: np.random.Generator) -> Image:
     """Return the image with a random brightness factor for all pixels and read noise at each pixel."""
     gain = rng.normal(1.0, noise.gain)
@@ -301,17 +212,36 @@ def add_depth_noise(depth: Array, config: DepthConfig, rng: np.random.Generator)
     measured_depth = true_depth + noise * (config.floor + config.growth * true_depth**2)
     if config.step:
         measured_depth = np.round(measured_depth / config.step) * config.step
-    dropout_probability = np.where(_compute_edge_mask(depth, config), config.edge_dropout, config.dropout)
+    distances = np.where(np.isfinite(depth), depth, FAR_PLANE).astype(np.float32)
+    gradient = cv2.morphologyEx(distances, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
+    width = 2 * config.edge_width + 1
+    edge_mask = cv2.dilate((gradient > config.edge).astype(np.uint8), np.ones((width, width), np.uint8))
+    dropout_probability = np.where(edge_mask.astype(bool), config.edge_dropout, config.dropout)
     return np.where(rng.random(depth.shape) < dropout_probability, np.nan, measured_depth)
 
 
-def _compute_edge_mask(depth: Array, config: DepthConfig) -> Mask:
-    """Return the mask `(H, W)` of the pixels near a discontinuity of the depth."""
-    distances = np.where(np.isfinite(depth), depth, FAR_PLANE).astype(np.float32)
-    kernel = np.ones((3, 3), np.uint8)
-    edge_mask = (cv2.morphologyEx(distances, cv2.MORPH_GRADIENT, kernel) > config.edge).astype(np.uint8)
-    width = 2 * config.edge_width + 1
-    return cv2.dilate(edge_mask, np.ones((width, width), np.uint8)).astype(bool)
+def find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for each camera without a depth sensor if the cell localizes by depth."""
+    for name, camera in config.cameras.items():
+        if config.localization == "depth" and camera.depth is None:
+            message = f'localization "depth" needs a camera with depth, and {name} has none; give it a '
+            yield ("localization",), message + 'section "depth: {}", or use "plane"'
+
+
+MAX_LOAD_OFFSET = 0.015
+"""Maximum distance of the centre of a held object from the axis of the suction cup [m]."""
+TOOL_SPHERE_RADIUS = 0.02
+"""Radius of the spheres that enclose the tool, including tube and fittings [m]."""
+SPHERES_PER_SEGMENT = 9
+"""Number of spheres that cover the segment between two points on the axis of a part of the arm."""
+DEPTH_SEED = 1
+"""Last number of the seed of the depth noise; the other numbers are the seed of the image noise."""
+
+
+def get_camera_pose(world: World, config: CameraConfig) -> Pose:
+    """Return the current pose `X_WC` of a camera; frame M is the mount, i.e. the world or the flange."""
+    _, X_MC = compute_calibration(config)
+    return X_MC if config.mount == "fixed" else world.get_flange_pose() @ X_MC
 
 
 class SimCamera(MountedCamera):
@@ -323,11 +253,10 @@ class SimCamera(MountedCamera):
 
     Args:
         world: The observed world.
-        name: Name of the camera in the cell file.
-        config: Section of the camera in the cell file.
+        config: The cell file.
         clock: Clock for the time stamps of the frames.
         seed: Seed of the noise.
-        occlusion: Occlusion by the arm.
+        is_loaded: Returns True if the tool holds an object, which is assumed to be of the largest class.
         get_change_count: Returns the number of changes of the objects on the table so far.
         light: Light of the scene.
         bins: Bins that serve as landmarks for the detection of a displaced camera.
@@ -336,43 +265,49 @@ class SimCamera(MountedCamera):
     def __init__(
         self,
         world: World,
-        name: str,
-        config: CameraConfig,
+        config: CellConfig,
         clock: Clock,
         seed: int,
         *,
-        occlusion: ArmOcclusion,
+        is_loaded: Callable[[], bool] = lambda: False,
         get_change_count: Callable[[], int] = lambda: 0,
         light: Light = CELL_LIGHT,
         bins: Sequence[Bin] = (),
     ) -> None:
-        super().__init__(name, config, world.get_flange_pose, clock, get_change_count)
+        name, camera = next(iter(config.cameras.items()))
+        super().__init__(name, camera, world.get_flange_pose, clock, get_change_count)
         self._true_config = world.config.cameras[name]
         self._world = world
         self._seed = seed
-        self._occlusion = occlusion
+        self._is_loaded = is_loaded
         self._bins = bins
+        self._kinematics = build_kinematics(config)
+        # T is the frame of the tool, F the frame of the flange.
+        self._X_TF = Pose.of([0.0, 0.0, -config.tool.length])
+        self._load_radius = max(model.radius for model in config.objects.values()) + MAX_LOAD_OFFSET
+        self._load_height = config.max_object_height
+        heights = (0.0, config.max_pile_height)
+        self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
         region = (0, 0, *self._size)
         self._render: Callable[[Array, Pose], RenderedImage]
-        if config.mount == "fixed" and not light.shadow:
+        if camera.mount == "fixed" and not light.shadow:
             self._render = FixedViewRenderer(world, region, light).render
         else:
             self._render = partial(render, world, region=region, light=light)
 
     def sees_table(self) -> bool:
-        """Return True if the whole workspace is in the image now and not occluded by the arm."""
-        return self._occlusion.is_table_visible(self.matrix, self._compute_pose(), self._size)
+        """Return True if the workspace, up to the height of a pile, is in the image and not occluded."""
+        X_WC = self._compute_pose()
+        mask = compute_hull_mask(self._workspace_corners, self.matrix, X_WC, self._size)
+        return mask is not None and bool(np.all(self._compute_visibility_mask(X_WC)[mask]))
 
     def describe_displacement(self, frame: Frame) -> str:
-        """Return a message if a frame shows a displacement of the camera from the declared pose, else ""."""
         return describe_displacement(frame, self._bins)
 
     def _get_true_view(self) -> tuple[Array, Pose]:
-        """Return the true camera matrix and the true pose `X_WC`."""
         return compute_calibration(self._true_config)[0], get_camera_pose(self._world, self._true_config)
 
     def _capture_images(self) -> tuple[Image, Array | None]:
-        """Return colour and depth image of the current frame; without a depth sensor, the latter is None."""
         rendered = self._render(*self._get_true_view())
         rng = np.random.default_rng([self._seed, self._frame_count])
         image = add_noise(rendered.image, self._true_config.noise, rng)
@@ -381,5 +316,34 @@ class SimCamera(MountedCamera):
         rng = np.random.default_rng([self._seed, self._frame_count, DEPTH_SEED])
         return image, add_depth_noise(rendered.depth, self.config.depth, rng)
 
-    def _compute_visibility_mask(self, X_WC: Pose) -> Mask:
-        return self._occlusion.compute_visibility_mask(self.matrix, X_WC, self._size)
+    def _compute_visibility_mask(self, X_WC: Pose) -> NDArray[np.bool_]:
+        """Return the mask `(H, W)` of the pixels that no sphere around arm, tool or held object occludes."""
+        q = self._world.get_joint_positions()
+        X_WT = self._kinematics.compute_tool_pose(q)
+        X_WF = X_WT @ self._X_TF
+        joint_frames = self._kinematics.compute_joint_frames(q)
+        joints = [np.zeros(3), *(frame.position for frame in joint_frames), X_WF.position]
+        parts = [
+            (joints, self._world.robot.link_radius),
+            ([X_WF.position, X_WT.position], TOOL_SPHERE_RADIUS),
+        ]
+        if self._is_loaded():
+            load_end = X_WT.apply(np.array([0.0, 0.0, self._load_height]))
+            parts.append(([X_WT.position, load_end], self._load_radius))
+        width, height = self._size
+        occluded = np.zeros((height, width), dtype=np.uint8)
+        for points, radius in parts:
+            for start, end in itertools.pairwise(points):
+                centres = X_WC.inverse().apply(np.linspace(start, end, SPHERES_PER_SEGMENT))
+                for x, y, z in (centres @ self.matrix.T).tolist():
+                    # A sphere behind the camera is invisible. The link that carries a wrist camera has a
+                    # sphere around the camera, which would occlude the whole image.
+                    if z <= radius:
+                        continue
+                    column = round(x / z)
+                    row = round(y / z)
+                    # OpenCV cannot draw circles with very large coordinates.
+                    if abs(column) <= 4 * width and abs(row) <= 4 * height:
+                        size = max(1, round(self.matrix[0, 0] * radius / z))
+                        cv2.circle(occluded, (column, row), size, 1, -1)
+        return occluded == 0

@@ -11,17 +11,15 @@ from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
 from executive.cells.sim.arm import SimArm
-from executive.cells.sim.camera import ArmOcclusion, SimCamera
+from executive.cells.sim.camera import SimCamera, find_missing_depth_sensors
 from executive.cells.sim.collision import ClearanceChecker
-from executive.cells.sim.command_log import CommandLog, read_commands
-from executive.cells.sim.kind import SimCellChecks, find_missing_depth_sensors
 from executive.cells.sim.models import build_simulated_class
 from executive.cells.sim.rebuild import WorldRebuilder
-from executive.cells.sim.scene_file import load_scene
-from executive.cells.sim.spawn import build_initial_world, derive_seeds
+from executive.cells.sim.scene import build_initial_world, derive_seeds, load_scene
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import SimVisuals, World
 from executive.cells.without_hardware import CellWithoutHardware, FinalObject
+from executive.cells.world_log import CommandLog, read_commands
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.yaml_files import get_shipped_folder
@@ -34,7 +32,7 @@ MIN_CENTRE_HEIGHT = -0.05
 """Minimum height of the centre of an object that is still on the table [m]."""
 
 
-class SimCell(SimCellChecks, CellWithoutHardware):
+class SimCell(CellWithoutHardware):
     """The simulated cell of a cell file; implements `executive.cell.workcell.Workcell`.
 
     Args:
@@ -64,7 +62,8 @@ class SimCell(SimCellChecks, CellWithoutHardware):
         for _, message in find_missing_depth_sensors(config):
             raise InputError(f"cell {config.cell}: {message}")
         super().__init__(config, seed=seed, routes=routes, emit=emit, options=options)
-        clock, bins = self.cell.clock, self.cell.bins.values()
+        clock = self.cell.clock
+        bins = tuple(self.cell.bins.values())
         _, camera_seed, detector_seed, load_seed = derive_seeds(seed)
         scene = load_scene(options.scene, config)
         world = self._world = build_initial_world(config, seed, gui=options.gui, scene=scene)
@@ -73,17 +72,15 @@ class SimCell(SimCellChecks, CellWithoutHardware):
         self._tool = SuctionTool(world, config.tool, load_seed)
         rebuilder = None if options.resume is None else self._rebuild_world(options.resume.log_path)
         self._arm = SimArm(world, planner, config, clock, lambda: self._tool.held_body, emit, rebuilder)
-        name, camera_config = next(iter(config.cameras.items()))
         self._camera = build_camera(
-            self._world,
-            name,
-            camera_config,
+            world,
+            config,
             clock,
             camera_seed,
-            occlusion=ArmOcclusion(world, planner.kinematics, config, lambda: self._tool.holding),
+            is_loaded=lambda: self._tool.holding,
             get_change_count=lambda: self.accounts.change_count,
             light=scene.light,
-            bins=tuple(bins),
+            bins=bins,
         )
         classes = {label: build_simulated_class(label, section) for label, section in config.objects.items()}
         localizer = CellLocalizer(config.localization, classes, bins, self._world.cast_ray)
@@ -96,26 +93,22 @@ class SimCell(SimCellChecks, CellWithoutHardware):
         self._connect(options, self._arm, self._tool, self._camera, self._detectors, localizer)
 
     def log_to(self, path: Path) -> None:
-        """Record all later commands for the simulated world in a log file."""
         self._world.log = CommandLog(path)
         self._arm.send_command()
 
     def advance(self) -> None:
-        """Execute one control step, which is one physics step."""
         self._arm.advance()
         self._world.step()
         super().advance()
         self._tool.advance()
 
     def visuals(self) -> SimVisuals:
-        """Return the shapes of the world for display."""
         return SimVisuals(self._world)
 
     def _list_final_objects(self) -> Iterator[FinalObject]:
         return list_final_objects(self._world, self._tool, self.cell.bins)
 
     def close(self) -> None:
-        """Close the detectors, the planner and the physics servers."""
         for detector in self._detectors.values():
             detector.close()
         self._arm.close()
@@ -127,7 +120,8 @@ class SimCell(SimCellChecks, CellWithoutHardware):
         rebuilder = WorldRebuilder(self._world, self._tool)
         for command in read_commands(log):
             rebuilder.execute(command)
-        self.steps, self.last_command_step = rebuilder.step_count, rebuilder.last_command_step
+        self.steps = rebuilder.step_count
+        self.last_command_step = rebuilder.last_command_step
         self._world.log = CommandLog(log, resume=True)
         return rebuilder
 
@@ -135,12 +129,14 @@ class SimCell(SimCellChecks, CellWithoutHardware):
 def list_final_objects(world: World, tool: SuctionTool, bins: Mapping[str, Bin]) -> Iterator[FinalObject]:
     """Yield the objects of a simulated world, including removed objects, at the end of a run."""
     for body, positions in world.rest_positions.items():
-        is_removed, is_dropped = body not in world.labels, body in tool.dropped_bodies
+        is_removed = body not in world.labels
         if is_removed:
             label, position = world.removed_objects[body]
         else:
-            label, position = world.labels[body], world.get_object_pose(body).position
+            label = world.labels[body]
+            position = world.get_object_pose(body).position
         # The centre of an object that leans on a bin wall may be above the wall.
         names = (name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS))
         bin_name = None if position[2] < MIN_CENTRE_HEIGHT else next(names, "")
+        is_dropped = body in tool.dropped_bodies
         yield FinalObject(label, bin_name, positions, is_dropped, body == tool.held_body, is_removed)

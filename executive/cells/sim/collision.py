@@ -17,7 +17,7 @@ import pybullet
 from executive.cell.arm import Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
-from executive.cells.sim.world import DISTANCE, JOINT_AXIS, LINK_A, POSITION_B, World, name_load
+from executive.cells.sim.world import DISTANCE, LINK_A, POSITION_B, World, name_load
 from executive.errors import Blocked
 from executive.geometry import Array
 
@@ -25,6 +25,8 @@ ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
 SEARCH_DISTANCE = 0.1
 """Distances that exceed the margin by more than this value are not computed [m]."""
+JOINT_AXIS = 13
+"""Index of the axis of the joint in the information about a joint of PyBullet."""
 SUPPORT_TOLERANCE = 0.001
 """Maximum height above the table or the floor of a bin at which a contact supports the load [m]."""
 
@@ -134,7 +136,11 @@ class ClearanceChecker:
             for key, approach in closest.items():
                 min_distance = min(approach.min_distance, start_distances.get(key, math.inf))
                 if approach.distance < min_distance - ROUNDING_ERROR:
-                    raise Blocked(self._describe_violation(approach))
+                    x, y, z = self.world.get_tool_pose().position
+                    raise Blocked(
+                        f"the motion would bring {approach}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m; "
+                        f"the minimum clearance is {self._margin:.3f} m"
+                    )
 
     def find_violation(self, q: Array) -> ClosestApproach | None:
         """Return the closest approach of the unloaded arm at `q` `(n,)` [rad], or None if it is allowed."""
@@ -147,27 +153,23 @@ class ClearanceChecker:
         """Close the world of the check."""
         self.world.close()
 
-    def _describe_violation(self, approach: ClosestApproach) -> str:
-        x, y, z = self.world.get_tool_pose().position
-        return (
-            f"the motion would bring {approach}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m; "
-            f"the minimum clearance is {self._margin:.3f} m"
-        )
-
     def _list_pairs(self, load: ObjectClass | None, obstacles: Sequence[tuple[str, int]]) -> list[BodyPair]:
         """Return all pairs; `obstacles` contains name and body of each obstacle."""
-        world, robot = self.world, self.world.robot
+        world = self.world
+        robot = world.robot
         bodies = [("the table", world.table), *world.bin_bodies.items(), *obstacles]
-        joints, links = range(robot.joint_count), range(robot.first_collision_link, world.tool_index + 1)
+        joints = range(robot.joint_count)
+        links = range(robot.first_collision_link, world.tool_index + 1)
         pairs = [BodyPair((world.arm, body), links, joints, body_name=name) for name, body in bodies]
         for link_a, link_b in robot.self_collision_pairs:
             moving_joints = joints[min(link_a, link_b) + 1 : max(link_a, link_b) + 1]
-            first_links, second_name = range(link_a, link_a + 1), world.name_link(link_b)
-            pair = BodyPair((world.arm, world.arm), first_links, moving_joints, second_name)
+            first_links = range(link_a, link_a + 1)
+            pair = BodyPair((world.arm, world.arm), first_links, moving_joints, world.name_link(link_b))
             pairs.append(pair._replace(link_pair=(link_a, link_b)))
         if load is None:
             return pairs
-        load_body, name = self._get_load_body(load), name_load(load.label)
+        load_body = self._get_load_body(load)
+        name = name_load(load.label)
         for body_name, body in bodies:
             support_height = -math.inf
             if body == world.table or body_name in world.bin_bodies:
@@ -175,10 +177,8 @@ class ClearanceChecker:
                 support_height = (bin.position[2] if bin else 0.0) + BIN_THICKNESS + SUPPORT_TOLERANCE
             pairs.append(BodyPair((load_body, body), range(-1, 0), joints, body_name, name, support_height))
         lower_links = range(robot.first_collision_link, robot.wrist_link)
-        pairs.append(
-            BodyPair((world.arm, load_body), lower_links, joints[lower_links.start + 1 :], load_name=name)
-        )
-        return pairs
+        lower_joints = joints[lower_links.start + 1 :]
+        return [*pairs, BodyPair((world.arm, load_body), lower_links, lower_joints, load_name=name)]
 
     def _measure_distance(self, pair: BodyPair) -> tuple[float, list[ClosestApproach]]:
         """Return the distance of a pair [m], and a `ClosestApproach` for each pair of points in the margin.
@@ -202,7 +202,8 @@ class ClearanceChecker:
 
     def _place_arm(self, q: Array, load: ObjectClass | None) -> None:
         """Move the arm to joint positions `(n,)` [rad], with the load under the tool."""
-        world, client = self.world, self.world.client
+        world = self.world
+        client = world.client
         client.resetJointStatesMultiDof(world.arm, range(len(q)), [[angle] for angle in q])
         if load is not None:
             flange = client.getLinkState(world.arm, world.flange_index, computeForwardKinematics=True)[4:6]
@@ -211,12 +212,13 @@ class ClearanceChecker:
             client.resetBasePositionAndOrientation(self._get_load_body(load), *load_pose)
 
     def _get_load_body(self, load: ObjectClass) -> int:
-        """Return the cylinder of a load."""
         return self._get_cylinder(load.radius + load.contact_radius, load.height, 0)
 
     def _compute_max_radii(self) -> Array:
         """Return the maximum distance of a point of the arm from the axis of each joint `(n,)` [m]."""
-        client, world, joints = self.world.client, self.world, range(self.world.robot.joint_count)
+        world = self.world
+        client = world.client
+        joints = range(world.robot.joint_count)
         states = client.getLinkStates(world.arm, joints, computeForwardKinematics=True)
         axes = [
             client.rotateVector(state[5], client.getJointInfo(world.arm, joint)[JOINT_AXIS])

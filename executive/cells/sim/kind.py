@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes, StepClock
 from executive.cell.workcell import CellOptions, KeyPath, Workcell
-from executive.cells.sim.camera import ArmOcclusion, SimCamera, get_camera_pose
+from executive.cells.sim.camera import SimCamera, find_missing_depth_sensors, get_camera_pose
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import compute_mass, find_model_errors
-from executive.cells.sim.spawn import find_object_count_errors
+from executive.cells.sim.scene import find_object_count_errors
 from executive.cells.sim.world import World
 from executive.cells.table_views import find_view_errors
 from executive.events import Emit
 from executive.geometry import Array
-from executive.motion.arms import build_kinematics, find_arm_errors, find_places_out_of_reach
+from executive.motion.arms import find_arm_errors, find_places_out_of_reach
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 
 POINTS_PER_SIDE = 9
@@ -44,10 +44,7 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each view, scan pose or bin without a view of the whole workspace."""
-    occlusion = ArmOcclusion(world, build_kinematics(config), config, lambda: False)
-    name, camera_config = next(iter(config.cameras.items()))
-    camera = SimCamera(world, name, camera_config, StepClock(lambda: 0.0), 0, occlusion=occlusion)
+    camera = SimCamera(world, config, StepClock(lambda: 0.0), seed=0)
 
     def find_hidden(pose: str, points: Array) -> NDArray[np.bool_]:
         """Return the mask `(N,)` of the points `(N, 3)` [m] at which arm or bins hide an object."""
@@ -60,8 +57,9 @@ def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator
 
     view_errors = list(find_view_errors(config, find_hidden))
     yield from view_errors
-    if view_errors or camera_config.partial_views:
+    if view_errors or camera.config.partial_views:
         return
+    name = camera.name
     for index, pose in enumerate(camera.scan_poses):
         if pose not in config.arm.poses_deg:
             continue
@@ -69,9 +67,12 @@ def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator
         if not camera.sees_table():
             message = f'in the pose "{pose}" the arm hides a part of the workspace from the camera {name}'
             yield ("cameras", name, "scan_poses", index), message
-        elif bin := _find_occluding_bin(config, world, get_camera_pose(world, camera_config).position):
-            message = f'the bin "{bin}" hides a part of the workspace from the camera {name} in the pose '
-            yield ("bins", bin, "position"), message + f'"{pose}"; move or lower the bin'
+        elif bin := _find_occluding_bin(config, world, get_camera_pose(world, camera.config).position):
+            yield (
+                ("bins", bin, "position"),
+                f'the bin "{bin}" hides a part of the workspace from the camera {name} in the pose "{pose}"; '
+                "move or lower the bin",
+            )
 
 
 def _find_occluding_bodies(world: World, points: Array, camera_position: Array) -> list[int]:
@@ -89,18 +90,20 @@ def _find_occluding_bin(config: CellConfig, world: World, camera_position: Array
     return next((name for name, body in world.bin_bodies.items() if body in hit_bodies), None)
 
 
-class SimCellChecks:
-    """Checks of a cell file; base class of the simulated cell and of its kind."""
+class SimCellKind:
+    """The kind of the simulated cells; implements `executive.cell.workcell.CellKind`."""
 
     compute_mass = staticmethod(compute_mass)
 
-    @staticmethod
-    def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return key and message of each requirement of a cell file that the simulated cell cannot fulfil.
+    def __call__(
+        self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
+    ) -> Workcell:
+        # A check of a mission needs neither the arm nor the ledger, whose import takes 0.3 s.
+        from executive.cells.sim.cell import SimCell
 
-        The requirements concern the arm and its reach, the models, the detectors, the room for the objects,
-        the clearance of the poses, and the view of the cameras.
-        """
+        return SimCell(config, seed=seed, routes=routes, emit=emit, options=options)
+
+    def check(self, config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
         if arm_errors := tuple(find_arm_errors(config)):
             return arm_errors
         model_errors = tuple(find_model_errors(config))
@@ -114,32 +117,9 @@ class SimCellChecks:
             *(() if model_errors else find_pose_errors(config)),
         )
 
-    @staticmethod
-    def labels(config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return the classes that each detector knows, or None if unknown; no detector model is loaded."""
+    def labels(self, config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
         return find_detectable_labels(config.detectors, cell_folder)
-
-
-class SimCellKind(SimCellChecks):
-    """The kind of the simulated cells; implements `executive.cell.workcell.CellKind`."""
-
-    def __call__(
-        self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
-    ) -> Workcell:
-        """Return a simulated cell."""
-        # A check of a mission needs neither the simulator's arm and camera nor the ledger.
-        from executive.cells.sim.cell import SimCell
-
-        return SimCell(config, seed=seed, routes=routes, emit=emit, options=options)
 
 
 SIM_CELL_KIND = SimCellKind()
 """Object of the entry point."""
-
-
-def find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each camera without a depth sensor if the cell localizes by depth."""
-    for name, camera in config.cameras.items():
-        if config.localization == "depth" and camera.depth is None:
-            message = f'localization "depth" needs a camera with depth, and {name} has none; give it a '
-            yield ("localization",), message + 'section "depth: {}", or use "plane"'

@@ -21,9 +21,9 @@ import pybullet
 import pybullet_data
 from numpy.typing import ArrayLike, NDArray
 
-from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
+from executive.mission.yaml_files import has_outside_link, is_outside_path
 
 MAX_MODEL_SIZE = 20_000_000
 """Maximum size of a model file [byte], to limit the duration of the check."""
@@ -223,7 +223,8 @@ def read_mesh(path: Path) -> Triangles:
         raise InputError(f"the model {path.name} is no mesh; convert it to one of: {', '.join(MESH_KINDS)}")
     try:
         vertices, triangles = _read_wavefront(path) if suffix == ".obj" else _read_with_trimesh(path, suffix)
-        points, faces = np.array(vertices, dtype=float), np.array(triangles, dtype=np.intp).reshape(-1, 3)
+        points = np.array(vertices, dtype=float)
+        faces = np.array(triangles, dtype=np.intp).reshape(-1, 3)
         if not len(faces):
             raise ValueError("it has no faces" + (" (lines beginning with f)" if suffix == ".obj" else ""))
         if points.shape != (len(points), 3) or not np.isfinite(points).all():
@@ -276,7 +277,8 @@ def _read_with_trimesh(path: Path, suffix: str) -> tuple[ArrayLike, ArrayLike]:
 
 def make_rotation(roll: float, pitch: float, yaw: float) -> Array:
     """Return the rotation matrix for the angles in a URDF [rad]: about the fixed axes x, then y, then z."""
-    (cr, cp), (sr, sp) = np.cos([roll, pitch]), np.sin([roll, pitch])
+    cr, cp = np.cos([roll, pitch])
+    sr, sp = np.sin([roll, pitch])
     about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
     about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
     return np.asarray(rotate_about_z(yaw) @ about_y @ about_x)

@@ -9,7 +9,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 
 import cv2
@@ -21,7 +21,6 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.frame import Box
-from executive.cell.layout import build_object_class
 from executive.cell.objects import ObjectClass
 from executive.cell.protocols import STEP
 from executive.cell.workcell import KeyPath
@@ -47,11 +46,15 @@ ROLLING_FRICTION = 0.0005
 TRIAL_TIMEOUT = 30
 """Maximum duration of the trial of a model, with the start of the process [s]."""
 DROP_HEIGHT = 0.002
-"""Height above the table at which the model is released [m]."""
-STEP_COUNT = 360
-"""Number of physics steps of a trial."""
+"""Height above its support at which an object is released [m]."""
+SETTLING_STEP_COUNT = 360
+"""Number of physics steps in which released objects come to rest."""
 MAX_REST_ERROR = 0.005
 """Maximum distance of visual, collision shape and declared heights from each other at rest [m]."""
+UNKNOWN_MODEL_COUNT = 1000
+"""Number of shapes in `random_urdfs` of pybullet_data."""
+DAMAGED_MODEL_NUMBER = 168
+"""Index of the shape in `random_urdfs` with a damaged mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,47 +103,42 @@ class Mesh:
         normals = np.cross(b - a, c - a)
         lengths = np.linalg.norm(normals, axis=1)
         has_area = lengths > 0  # triangles without an area have no normal
-        normals, a = normals[has_area] / lengths[has_area, None].clip(1e-12), a[has_area]
+        normals = normals[has_area] / lengths[has_area, None].clip(1e-12)
         # A matrix of all distances would take 2 GB for 20,000 triangles.
-        planes = zip(a, normals, strict=True)
+        planes = zip(a[has_area], normals, strict=True)
         return all(((self.vertices - point) @ normal).max() < 1e-4 for point, normal in planes)
 
 
 def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
     """Add an object to the world, with its upright frame O at the pose `X_WO`, and return the body.
 
+    A mesh has uniform density.
+
     Raises:
         InputError: The model is missing or invalid.
     """
     X_WL = X_WO @ compute_upright_pose(config)
-    body = _add_mesh(client, config, X_WL) if config.mesh else _add_urdf(client, config, X_WL)
-    if config.urdf and config.mass is not None:
-        client.changeDynamics(body, -1, mass=config.mass)
+    path = model_files.convert_model(find_model(config.mesh or config.urdf))
+    if config.mesh:
+        # PyBullet replaces each group (`g`) of a Wavefront file by its convex hull, enlarged by 1 mm.
+        shape = {"fileName": path, "meshScale": [config.scale] * 3}
+        centroid = compute_upright_pose(config).inverse().apply(load_mesh(config).centroid)
+        collision = client.createCollisionShape(pybullet.GEOM_MESH, **shape)
+        visual = client.createVisualShape(pybullet.GEOM_MESH, **shape)
+        mass = compute_mass(config)
+        body = client.createMultiBody(mass, collision, visual, X_WL.position, X_WL.quaternion, centroid)
+    else:
+        try:
+            body = client.loadURDF(path, X_WL.position, X_WL.quaternion, globalScaling=config.scale)
+        except pybullet.error as error:
+            raise InputError(
+                f"PyBullet cannot load the model {Path(config.urdf).name}: {error} Name <robot> and <link>, "
+                "and give <inertial> an <inertia>."
+            ) from error
+        if config.mass is not None:
+            client.changeDynamics(body, -1, mass=config.mass)
     client.changeDynamics(body, -1, rollingFriction=ROLLING_FRICTION, spinningFriction=ROLLING_FRICTION)
-    return body
-
-
-def _add_urdf(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
-    """Add the object of a URDF, with the frame L of the file at the pose `X_WL`, and return the body."""
-    try:
-        path = model_files.convert_model(find_model(config.urdf))
-        return int(client.loadURDF(path, X_WL.position, X_WL.quaternion, globalScaling=config.scale))
-    except pybullet.error as error:
-        problem = f"PyBullet cannot load the model {Path(config.urdf).name}: {error}"
-        raise InputError(f"{problem} Name <robot> and <link>, and give <inertial> an <inertia>.") from error
-
-
-def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
-    """Add an object of uniform density with a mesh, and return the body.
-
-    PyBullet replaces each group (`g`) of a Wavefront file by its convex hull, enlarged by 1 mm.
-    """
-    shape = {"fileName": model_files.convert_model(find_model(config.mesh)), "meshScale": [config.scale] * 3}
-    centroid = compute_upright_pose(config).inverse().apply(load_mesh(config).centroid)
-    collision = client.createCollisionShape(pybullet.GEOM_MESH, **shape)
-    visual = client.createVisualShape(pybullet.GEOM_MESH, **shape)
-    mass = compute_mass(config)
-    return int(client.createMultiBody(mass, collision, visual, X_WL.position, X_WL.quaternion, centroid))
+    return int(body)
 
 
 def compute_mass(config: ObjectConfig) -> float:
@@ -162,7 +160,7 @@ def compute_mass(config: ObjectConfig) -> float:
 
 def build_simulated_class(label: str, config: ObjectConfig) -> ObjectClass:
     """Return the object class of a section of a cell file, with the mass of the simulated objects."""
-    return replace(build_object_class(label, config), mass=compute_mass(config))
+    return replace(config.build_class(label), mass=compute_mass(config))
 
 
 def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
@@ -236,7 +234,7 @@ def try_model(config: ObjectConfig) -> None:
     mesh = load_mesh(config)
     _place_mesh(config, Pose.identity(), "collision")  # refuses shapes that PyBullet would ignore
     body = add_body(client, config, Pose.of([0, 0, DROP_HEIGHT - mesh.bottom]))
-    for _ in range(STEP_COUNT):
+    for _ in range(SETTLING_STEP_COUNT):
         client.stepSimulation()
     vertices = locate_object(client, body, config).apply(mesh.vertices)
     visual = np.array([vertices.min(axis=0), vertices.max(axis=0)])
@@ -309,13 +307,28 @@ def _place_mesh(config: ObjectConfig, X_OL: Pose, tag: str = "visual") -> Mesh:
     return Mesh(X_OL.apply(points * config.scale), faces)
 
 
+def scale_model(model: ObjectConfig, factor: float) -> ObjectConfig:
+    """Return the model of an object scaled by `factor`."""
+    names = ("scale", "height", "radius", "ring")
+    return model.model_copy(update={name: getattr(model, name) * factor for name in names})
+
+
+@cache
+def load_unknown_model(number: int) -> ObjectConfig:
+    """Return shape `number` (0 to 999) of `random_urdfs` in pybullet_data; most shapes are 12 cm long."""
+    name = f"random_urdfs/{number:03d}/{number:03d}.urdf"
+    mesh = load_mesh(ObjectConfig(urdf=name, height=1.0, radius=1.0))
+    return ObjectConfig(urdf=name, height=mesh.top - mesh.bottom, radius=mesh.radius)
+
+
 SUBPIXEL_COUNT = 4
 """Number of subpixels of a pixel along each axis in the rasterization of a silhouette."""
 
 
 def compute_bounding_box(pixels: Array) -> Box:
     """Return the box around projected vertices `(N, 2)` [pixel]."""
-    (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
+    left, top = pixels.min(axis=0)
+    right, bottom = pixels.max(axis=0)
     return float(left), float(top), float(right), float(bottom)
 
 
@@ -327,7 +340,8 @@ def compute_silhouette_area(mesh: Mesh, pixels: Array) -> float:
     size = np.ceil((pixels.max(axis=0) - corner + 1) * SUBPIXEL_COUNT).astype(int)
     mask = np.zeros((size[1], size[0]), np.uint8)
     triangles = ((pixels - corner) * SUBPIXEL_COUNT)[mesh.triangles]
-    (ax, ay), (bx, by) = (triangles[:, 1] - triangles[:, 0]).T, (triangles[:, 2] - triangles[:, 0]).T
+    ax, ay = (triangles[:, 1] - triangles[:, 0]).T
+    bx, by = (triangles[:, 2] - triangles[:, 0]).T
     # The triangles on the side of the camera, whose corners are clockwise, cover the whole silhouette.
     for triangle in triangles[ax * by - ay * bx > 0].round().astype(np.int32):
         cv2.fillConvexPoly(mask, triangle, 1)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from executive.cell.protocols import STEP
-from executive.cells.sim import command_log
-from executive.cells.sim.command_log import Command
+from executive.cells import world_log
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
+from executive.cells.world_log import Command
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.motion.joints import JointState
@@ -53,17 +53,19 @@ class WorldRebuilder:
             InputError: The command is invalid.
         """
         kind, arguments = command
-        if kind in (command_log.MOTION, command_log.VACUUM_ON, command_log.VACUUM_OFF):
+        if kind in (world_log.MOTION, world_log.VACUUM_ON, world_log.VACUUM_OFF):
             self.last_command_step = self.step_count
         try:
-            if kind == command_log.MOTION:
+            if kind == world_log.MOTION:
                 self._start_motion(*arguments)
             else:
                 self._execute(kind, np.array(arguments, dtype=float))
         except Exception as error:
             # A changed log may contain anything, for example a body that does not exist.
-            text = f'the log of the world is damaged: its command "{kind}" cannot be executed: {error}'
-            raise InputError(f"{text}; restore a copy of it, or run the mission again") from error
+            raise InputError(
+                f'the log of the world is damaged: its command "{kind}" cannot be executed: {error}; '
+                "restore a copy of it, or run the mission again"
+            ) from error
 
     def _start_motion(self, duration: float, samples: str) -> None:
         states = np.frombuffer(base64.b64decode(samples), "<f8").reshape(3, -1, self._world.robot.joint_count)
@@ -75,26 +77,27 @@ class WorldRebuilder:
             raise ValueError("a number is infinite")
         world = self._world
         tool = self._tool
-        if kind in (command_log.RUN_STEP, command_log.IDLE_STEP):
-            self.step_count += kind == command_log.RUN_STEP
+        if kind in (world_log.RUN_STEP, world_log.IDLE_STEP):
+            if kind == world_log.RUN_STEP:
+                self.step_count += 1
             if self._next_targets[0].size:
                 world.command_arm(*self._next_targets)
             self.braking_start = self._next_targets
             world.step()
             tool.advance()
-        elif kind == command_log.JOINT_TARGETS:
+        elif kind == world_log.JOINT_TARGETS:
             self._next_targets = (numbers[1:], float(numbers[0]))
-        elif kind == command_log.MOTION_END:
+        elif kind == world_log.MOTION_END:
             self.motion = None
-        elif kind == command_log.SET_POSE:
+        elif kind == world_log.SET_POSE:
             world.place_object(int(numbers[0]), Pose.of(numbers[1:4], numbers[4:]))
-        elif kind == command_log.REMOVE:
+        elif kind == world_log.REMOVE:
             world.remove_object(int(numbers[0]))
         else:
             actions = {
-                command_log.VACUUM_ON: tool.close,
-                command_log.VACUUM_OFF: tool.open,
-                command_log.SEAL_BREAK: tool.break_seal,
+                world_log.VACUUM_ON: tool.close,
+                world_log.VACUUM_OFF: tool.open,
+                world_log.SEAL_BREAK: tool.break_seal,
             }
             actions[kind]()
 

@@ -12,7 +12,7 @@ import numpy as np
 import pybullet
 
 from executive.cell.device_config import ToolConfig
-from executive.cells.sim import command_log
+from executive.cells import world_log
 from executive.cells.sim.world import POSITION_A, World
 from executive.geometry import Array, Pose
 
@@ -97,8 +97,8 @@ def _sample_face(cup_radius: float) -> Array:
         angles = 2 * np.pi * np.arange(count) / count
         return radius * np.column_stack([np.cos(angles), np.sin(angles)])
 
-    inner_ring, rim = make_ring(cup_radius / 2, RIM_RAY_COUNT // 2), make_ring(cup_radius, RIM_RAY_COUNT)
-    return np.vstack([np.zeros((1, 2)), inner_ring, rim])
+    inner_ring = make_ring(cup_radius / 2, RIM_RAY_COUNT // 2)
+    return np.vstack([np.zeros((1, 2)), inner_ring, make_ring(cup_radius, RIM_RAY_COUNT)])
 
 
 def _cast_rays(
@@ -110,7 +110,8 @@ def _cast_rays(
     at the distance `start` behind the face and end at the distance `end` in front of the face [m].
     """
     count = len(face_points)
-    hit_bodies, distances = np.full(count, -1), np.full(count, np.inf)
+    hit_bodies = np.full(count, -1)
+    distances = np.full(count, np.inf)
     starts = X_WT.apply(np.column_stack([face_points, np.full(count, -start)]))
     ends = X_WT.apply(np.column_stack([face_points, np.full(count, end)]))
     pending = np.arange(count)
@@ -118,12 +119,14 @@ def _cast_rays(
     while pending.size:
         # The first hits are on the tool. The next hits of the rays are read by number, because a new ray from
         # behind a surface would hit the surface again within a millimetre.
-        segments = starts[pending].tolist(), ends[pending].tolist()
-        hits = client.rayTestBatch(*segments, reportHitNumber=hit_number)
+        hits = client.rayTestBatch(
+            starts[pending].tolist(), ends[pending].tolist(), reportHitNumber=hit_number
+        )
         for ray, (body, _, fraction, *_) in zip(pending, hits, strict=True):
             distance = fraction * (start + end) - start
             if body in bodies and distance < distances[ray]:
-                hit_bodies[ray], distances[ray] = body, distance
+                hit_bodies[ray] = body
+                distances[ray] = distance
         pending = pending[[hit[0] >= 0 for hit in hits]]
         hit_number += 1
     return hit_bodies, distances
@@ -195,12 +198,10 @@ class SuctionTool:
 
     @property
     def holding(self) -> bool:
-        """True while the tool holds an object."""
         return self._grip is not None
 
     @property
     def holding_force(self) -> float:
-        """Breakaway force of the seal [N]; 0 while the tool holds nothing."""
         return 0.0 if self._grip is None else self._grip.breakaway_force
 
     @property
@@ -222,15 +223,13 @@ class SuctionTool:
         return 0.0 if self._grip is None else math.hypot(*self._grip.pull)
 
     def close(self) -> None:
-        """Switch the vacuum on, and hold a body within reach if the seal is strong enough."""
-        self._world.log.append(command_log.VACUUM_ON)
+        self._world.log.append(world_log.VACUUM_ON)
         self._is_vacuum_on = True
         if self._grip is None:
             self._try_to_seal()
 
     def open(self) -> None:
-        """Release the held body and switch the vacuum off."""
-        self._world.log.append(command_log.VACUUM_OFF)
+        self._world.log.append(world_log.VACUUM_OFF)
         self._is_vacuum_on = False
         self._separating_body = None
         if self._grip is not None:
@@ -240,7 +239,7 @@ class SuctionTool:
 
     def break_seal(self) -> None:
         """Break the seal, so that the held body falls."""
-        self._world.log.append(command_log.SEAL_BREAK)
+        self._world.log.append(world_log.SEAL_BREAK)
         if self._grip is not None:
             self._separating_body = self._grip.body
             self.dropped_bodies.add(self._grip.body)
@@ -257,16 +256,16 @@ class SuctionTool:
             self._try_to_seal()
 
     def _try_to_seal(self) -> None:
-        """Hold a body within reach if the seal is strong enough."""
         near_bodies = set(self._find_bodies_near(self._config.reach))
         if self._separating_body not in near_bodies:
             self._separating_body = None
         sealable_bodies = near_bodies & self._world.labels.keys() - {self._separating_body}
         if not sealable_bodies:
             return
-        world, config = self._world, self._config
-        X_WT = world.get_tool_pose()
-        contact = measure_contact(world.client, X_WT, sealable_bodies, config.cup_radius, config.reach)
+        config = self._config
+        X_WT = self._world.get_tool_pose()
+        client = self._world.client
+        contact = measure_contact(client, X_WT, sealable_bodies, config.cup_radius, config.reach)
         force = compute_breakaway_force(contact, config)
         if contact is not None and force >= config.min_force:
             self.dropped_bodies.discard(contact.body)
@@ -275,7 +274,6 @@ class SuctionTool:
             self._set_collision(contact.body, False)
 
     def _attach(self, body: int) -> int:
-        """Fix a body to the tool at its current pose, and return the constraint."""
         world = self._world
         # The constraint connects the centres of mass of tool (frame I) and body (frame B).
         tool_state = world.client.getLinkState(world.arm, world.tool_index, computeForwardKinematics=True)
@@ -303,8 +301,8 @@ class SuctionTool:
         """
         world = self._world
         low, high = world.client.getAABB(world.arm, world.tool_index)
-        low, high = [value - distance for value in low], [value + distance for value in high]
-        overlaps = world.client.getOverlappingObjects(low, high) or ()
+        enlarged_box = [value - distance for value in low], [value + distance for value in high]
+        overlaps = world.client.getOverlappingObjects(*enlarged_box) or ()
         bodies = sorted({body for body, _ in overlaps} - {world.arm})
         if not bodies:
             return

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from string import Template
+from typing import Any
 
 import cv2
 import numpy as np
@@ -18,67 +19,28 @@ import pybullet
 from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.cell.config import BinConfig, CellConfig, ObjectConfig
+from executive.cell.config import NECK_LENGTH, TOOL_RADIUS, BinConfig, CellConfig, ObjectConfig
 from executive.cell.device_config import Colour
-from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, list_bin_boxes
+from executive.cell.objects import BIN_THICKNESS
 from executive.cell.protocols import STEP
 from executive.cell.workcell import Shape
-from executive.cells.sim import command_log
-from executive.cells.sim.command_log import CommandLog
+from executive.cells import world_log
 from executive.cells.sim.model_files import find_model
 from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, locate_object
+from executive.cells.world_log import CommandLog
 from executive.geometry import Array, Pose
 from executive.motion.iiwa14_kinematics import FLANGE_OFFSET
 
-WOOD_TEXTURE, PLAIN_TEXTURE = "wood", "plain"
-"""Names of the texture in the URDF of the table, and of a white surface."""
+WOOD_TEXTURE = "wood"
+"""Name of the texture in the URDF of the table."""
+PLAIN_TEXTURE = "plain"
+"""Name of the texture of a white surface."""
 PATTERN_COUNT = 24
 """Number of generated textures, whose names are `pattern 0` to `pattern 23`."""
 TEXTURES = (WOOD_TEXTURE, PLAIN_TEXTURE, *(f"pattern {number}" for number in range(PATTERN_COUNT)))
 """Names of all textures."""
 TEXTURE_SIZE = 256
 """Side of a generated texture [pixel]."""
-
-
-class TableTop:
-    """The surface of the simulated table; `paint` changes only its appearance in camera images.
-
-    Args:
-        client: The connection to the physics server.
-        table: Body of the table.
-    """
-
-    def __init__(self, client: BulletClient, table: int) -> None:
-        self._client = client
-        self._table = table
-        shapes = client.getVisualShapeData(table, pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS)
-        # A world without visual shapes needs no textures.
-        self._textures = {PLAIN_TEXTURE: -1, WOOD_TEXTURE: shapes[0][8] if shapes else -1}
-
-    def paint(self, colour: Colour, texture: str = WOOD_TEXTURE) -> None:
-        """Give the table a texture of `TEXTURES`, with RGB values multiplied by `colour`."""
-        if texture not in self._textures:
-            seed = TEXTURES.index(texture)
-            # PyBullet caches textures by path, so that each texture needs its own path.
-            with tempfile.TemporaryDirectory() as folder:
-                path = str(Path(folder) / f"{seed}.png")
-                cv2.imwrite(path, generate_pattern(seed))
-                self._textures[texture] = int(self._client.loadTexture(path))
-        texture_id = self._textures[texture]
-        self._client.changeVisualShape(self._table, -1, textureUniqueId=texture_id, rgbaColor=[*colour, 1])
-
-
-def generate_pattern(seed: int) -> NDArray[np.uint8]:
-    """Return a bright random texture of `TEXTURE_SIZE`, RGB: clouds, stripes, tiles or speckles."""
-    rng = np.random.default_rng(seed)
-    contrast = rng.uniform(15, 90)
-    count = int(rng.choice([4, 8, 16, 32]))
-    pattern_kind = seed % 4  # clouds, stripes, tiles or speckles
-    size = (TEXTURE_SIZE, TEXTURE_SIZE)
-    shape = ((count, count, 3), (1, count * 2, 3), (count, count, 1), (*size, 1))[pattern_kind]
-    interpolation = cv2.INTER_CUBIC if pattern_kind in (0, 3) else cv2.INTER_NEAREST
-    values = (255 - rng.uniform(0, contrast, shape) * np.ones(3)).astype(np.float32)
-    return np.asarray(cv2.resize(values, size, interpolation=interpolation).clip(0, 255), np.uint8)
 
 
 @dataclass(frozen=True)
@@ -140,12 +102,17 @@ CYLINDER_MARGIN = 0.001
 """Collision margin that Bullet adds on all sides to a cylinder of a URDF [m]."""
 TOOL_MASS = 0.1
 """Mass of the tool [kg]."""
-MAX_RAY_LENGTH, RAY_RESTART_DISTANCE = 5.0, 1e-4
-"""Maximum length of a ray, and distance behind a hit of the arm at which the ray is cast again [m]."""
-BODY_B, LINK_A, POSITION_A, POSITION_B, DISTANCE, NORMAL_FORCE = 2, 3, 5, 6, 8, 9
-"""Indices of values in a contact point or closest point of PyBullet, for a query with the bodies A and B."""
-JOINT_AXIS = 13
-"""Index of the axis of the joint in the information about a joint of PyBullet."""
+MAX_RAY_LENGTH = 5.0
+"""Maximum length of a ray [m]."""
+RAY_RESTART_DISTANCE = 1e-4
+"""Distance behind a hit of the arm at which a ray is cast again [m]."""
+# Indices of values in a contact point or closest point of PyBullet, for a query with the bodies A and B.
+BODY_B = 2
+LINK_A = 3
+POSITION_A = 5
+POSITION_B = 6
+DISTANCE = 8
+NORMAL_FORCE = 9
 
 
 class World:
@@ -164,7 +131,6 @@ class World:
         flange_index: Index of the link with the flange.
         tool_index: Index of the link of the tool, whose frame is the frame of the flange.
         table, floor: Bodies of the table and of the floor under the table.
-        table_top: The surface of the table.
         bin_bodies: Body of each bin, by name.
         labels: Class of each loose object, by body.
         models: Model of each loose object, by body.
@@ -179,17 +145,21 @@ class World:
     def __init__(self, config: CellConfig, *, gui: bool = False, visuals: bool = True) -> None:
         self.config = config
         self.robot = ROBOT_MODELS[config.arm.urdf]
-        self.flange_index, self.tool_index = self.robot.joint_count - 1, self.robot.joint_count
+        self.flange_index = self.robot.joint_count - 1
+        self.tool_index = self.robot.joint_count
         self.client = BulletClient(pybullet.GUI if gui else pybullet.DIRECT)
         self.client.setGravity(0, 0, -9.81)
         self.client.setTimeStep(STEP)
         self.client.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
         flags = 0 if visuals else pybullet.URDF_IGNORE_VISUAL_SHAPES
         self.floor = self.client.loadURDF(str(find_model("plane.urdf")), [0, 0, -TABLE_HEIGHT], flags=flags)
-        urdf, position = str(find_model("table/table.urdf")), [*TABLE_CENTRE, -TABLE_HEIGHT]
+        urdf = str(find_model("table/table.urdf"))
+        position = [*TABLE_CENTRE, -TABLE_HEIGHT]
         quaternion = self.client.getQuaternionFromEuler([0, 0, np.pi / 2])
         self.table = self.client.loadURDF(urdf, position, quaternion, useFixedBase=True, flags=flags)
-        self.table_top = TableTop(self.client, self.table)
+        shapes = self.client.getVisualShapeData(self.table, pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS)
+        # A world without visual shapes needs no textures.
+        self._textures = {PLAIN_TEXTURE: -1, WOOD_TEXTURE: shapes[0][8] if shapes else -1}
         self.arm = self._load_arm(flags)
         self.bin_bodies = {name: add_bin(self.client, bin) for name, bin in config.bins.items()}
         self.labels: dict[int, str] = {}
@@ -200,6 +170,18 @@ class World:
         self.rest_positions: dict[int, list[Array]] = {}
         self.removed_objects: dict[int, tuple[str, Array]] = {}
         self.set_joint_positions(np.radians(config.arm.poses_deg["home"]))
+
+    def paint_table(self, colour: Colour, texture: str) -> None:
+        """Give the table a texture of `TEXTURES`, with RGB values multiplied by `colour`."""
+        if texture not in self._textures:
+            seed = TEXTURES.index(texture)
+            # PyBullet caches textures by path, so that each texture needs its own path.
+            with tempfile.TemporaryDirectory() as folder:
+                path = str(Path(folder) / f"{seed}.png")
+                cv2.imwrite(path, generate_pattern(seed))
+                self._textures[texture] = int(self.client.loadTexture(path))
+        texture_id = self._textures[texture]
+        self.client.changeVisualShape(self.table, -1, textureUniqueId=texture_id, rgbaColor=[*colour, 1])
 
     def add_object(
         self, label: str, X_WO: Pose, colour: Sequence[float], model: ObjectConfig | None = None
@@ -215,12 +197,13 @@ class World:
         model = model or self.config.objects[label]
         body = add_body(self.client, model, X_WO)
         self.client.changeVisualShape(body, -1, rgbaColor=[*colour, 1])
-        self.labels[body], self.models[body] = label, model
+        self.labels[body] = label
+        self.models[body] = model
         return body
 
     def remove_object(self, body: int) -> None:
         """Remove a loose object from the world."""
-        self.log.append(command_log.REMOVE, body)
+        self.log.append(world_log.REMOVE, body)
         self.removed_objects[body] = self.labels[body], self.get_object_pose(body).position
         del self.labels[body], self.models[body]
         self.client.removeBody(body)
@@ -242,7 +225,7 @@ class World:
     def place_object(self, body: int, X_WO: Pose) -> None:
         """Move a loose object to `X_WO`, at rest."""
         self.rest_positions.setdefault(body, []).append(X_WO.position)
-        self.log.append(command_log.SET_POSE, body, *X_WO.position, *X_WO.quaternion)
+        self.log.append(world_log.SET_POSE, body, *X_WO.position, *X_WO.quaternion)
         X_WI = X_WO @ compute_upright_pose(self.models[body]) @ get_inertial_pose(self.client, body)
         self.client.resetBasePositionAndOrientation(body, X_WI.position, X_WI.quaternion)
 
@@ -261,7 +244,7 @@ class World:
 
         If a command precedes every physics step, the full position gain leaves a tracking error of 0.0005°.
         """
-        self.log.append(command_log.JOINT_TARGETS, time, *q)
+        self.log.append(world_log.JOINT_TARGETS, time, *q)
         joint_count = self.robot.joint_count
         self.client.setJointMotorControlArray(
             self.arm, range(joint_count), pybullet.POSITION_CONTROL, targetPositions=q.tolist(),
@@ -279,7 +262,8 @@ class World:
 
     def cast_ray(self, origin: Array, direction: Array) -> Array | None:
         """Return the first point `(3,)` [m] of a ray on a body other than arm and tool, or None."""
-        start, end = origin, origin + MAX_RAY_LENGTH * direction / np.linalg.norm(direction)
+        start = origin
+        end = origin + MAX_RAY_LENGTH * direction / np.linalg.norm(direction)
         while True:
             body, _, fraction, point, _ = self.client.rayTest(start, end)[0]
             if body != self.arm:
@@ -289,7 +273,7 @@ class World:
 
     def step(self) -> None:
         """Advance the physics by 1/240 s."""
-        self.log.append(command_log.IDLE_STEP if self.is_idle else command_log.RUN_STEP)
+        self.log.append(world_log.IDLE_STEP if self.is_idle else world_log.RUN_STEP)
         self.client.stepSimulation()
         self.step_count += 1
 
@@ -307,11 +291,35 @@ class World:
         path = find_model(self.config.arm.urdf)
         text = path.read_text().replace('filename="meshes/', f'filename="{path.parent}/meshes/')
         tool = self.config.tool
-        text = text.replace("</robot>", _make_tool_urdf(tool.length, tool.cup_radius, self.robot))
+        values: dict[str, Any] = {"centre": tool.length / 2, "mass": TOOL_MASS}
+        shaft_length = tool.length - NECK_LENGTH
+        for part, length, radius, centre in (
+            ("shaft", shaft_length, TOOL_RADIUS, shaft_length / 2),
+            ("neck", NECK_LENGTH, tool.cup_radius, tool.length - NECK_LENGTH / 2),
+        ):
+            values |= {f"{part}_length": length, f"{part}_radius": radius, f"{part}_centre": centre}
+            values[f"{part}_collision_length"] = length - 2 * CYLINDER_MARGIN
+            values[f"{part}_collision_radius"] = radius - CYLINDER_MARGIN
+        values |= {"flange_link": self.robot.flange_link, "flange_offset": self.robot.flange_offset}
+        template = Template(Path(__file__).with_name("tool.urdf").read_text())
+        text = text.replace("</robot>", template.substitute(values))
         with tempfile.TemporaryDirectory() as folder:
             urdf_path = Path(folder) / "arm_with_tool.urdf"
             urdf_path.write_text(text)
             return int(self.client.loadURDF(str(urdf_path), useFixedBase=True, flags=flags))
+
+
+def generate_pattern(seed: int) -> NDArray[np.uint8]:
+    """Return a bright random texture of `TEXTURE_SIZE`, RGB: clouds, stripes, tiles or speckles."""
+    rng = np.random.default_rng(seed)
+    contrast = rng.uniform(15, 90)
+    count = int(rng.choice([4, 8, 16, 32]))
+    pattern_kind = seed % 4  # clouds, stripes, tiles or speckles
+    size = (TEXTURE_SIZE, TEXTURE_SIZE)
+    shape = ((count, count, 3), (1, count * 2, 3), (count, count, 1), (*size, 1))[pattern_kind]
+    interpolation = cv2.INTER_CUBIC if pattern_kind in (0, 3) else cv2.INTER_NEAREST
+    values = (255 - rng.uniform(0, contrast, shape) * np.ones(3)).astype(np.float32)
+    return np.asarray(cv2.resize(values, size, interpolation=interpolation).clip(0, 255), np.uint8)
 
 
 def name_load(label: str) -> str:
@@ -321,33 +329,20 @@ def name_load(label: str) -> str:
 
 def add_bin(client: BulletClient, bin: BinConfig) -> int:
     """Create the static body of a bin, with floor and walls, and return the body."""
-    half_sizes, centres = map(list, zip(*list_bin_boxes(bin.size), strict=True))
+    length, width, height = bin.size
+    x = (length + BIN_THICKNESS) / 2
+    y = (width + BIN_THICKNESS) / 2
+    z = height / 2
+    floor = [length / 2 + BIN_THICKNESS, width / 2 + BIN_THICKNESS, BIN_THICKNESS / 2]
+    end_wall = [BIN_THICKNESS / 2, width / 2 + BIN_THICKNESS, z]
+    side_wall = [length / 2, BIN_THICKNESS / 2, z]
+    half_sizes = [floor, end_wall, end_wall, side_wall, side_wall]
+    centres = [[0, 0, BIN_THICKNESS / 2], [x, 0, z], [-x, 0, z], [0, y, z], [0, -y, z]]
     shape = {"shapeTypes": [pybullet.GEOM_BOX] * len(half_sizes), "halfExtents": half_sizes}
     colours = [[*bin.colour, 1]] * len(half_sizes)
     collision = client.createCollisionShapeArray(**shape, collisionFramePositions=centres)
     visual = client.createVisualShapeArray(**shape, visualFramePositions=centres, rgbaColors=colours)
     return int(client.createMultiBody(0, collision, visual, bin.position))
-
-
-def _make_tool_urdf(length: float, cup_radius: float, robot: RobotModel) -> str:
-    """Return the URDF text of the tool, from the flange to the lip, with the closing tag of the robot.
-
-    The template of the text is `tool.urdf`.
-
-    Args:
-        length: Distance from the flange to the lip [m].
-        cup_radius: Radius of the cup and of the neck behind the cup [m].
-        robot: Model of the arm.
-    """
-    shaft_length, values = length - NECK_LENGTH, {"centre": length / 2, "mass": TOOL_MASS}
-    shaft = "shaft", shaft_length, TOOL_RADIUS, shaft_length / 2
-    neck = "neck", NECK_LENGTH, cup_radius, length - NECK_LENGTH / 2
-    for name, cylinder_length, radius, centre in (shaft, neck):
-        values |= {f"{name}_length": cylinder_length, f"{name}_radius": radius, f"{name}_centre": centre}
-        values[f"{name}_collision_length"] = cylinder_length - 2 * CYLINDER_MARGIN
-        values[f"{name}_collision_radius"] = radius - CYLINDER_MARGIN
-    template = Template(Path(__file__).with_name("tool.urdf").read_text())
-    return template.substitute(values, flange_link=robot.flange_link, flange_offset=robot.flange_offset)
 
 
 TABLE_COLOUR = (0.86, 0.78, 0.66)
@@ -382,7 +377,6 @@ class SimVisuals:
         self.shapes: Sequence[Shape] = tuple(_make_shapes(world))
 
     def poses(self) -> Mapping[str, Pose]:
-        """Return the poses of the links of the arm and of the loose objects, by name."""
         client = self._world.client
         states = client.getLinkStates(self._world.arm, self._link_indices, computeForwardKinematics=True)
         poses_by_name = {f"link {number}": Pose.of(*state[4:6]) for number, state in enumerate(states, 1)}

@@ -11,8 +11,7 @@ import pytest
 
 from executive.cell.config import CellConfig
 from executive.cells.fake import FakeCell
-from executive.cells.sim.cell import SimCell
-from executive.cells.sim.kind import find_pose_errors
+from executive.cells.sim.kind import SIM_CELL_KIND, find_pose_errors
 from executive.motion.arms import build_kinematics
 from tests.motion.joint_states import reach
 
@@ -41,7 +40,7 @@ def test_all_that_is_wrong_is_said_at_once(overhead: CellConfig, tmp_path: Path)
     config = posed(overhead, down=(0, 118, 0, 0, 0, 0, 0), turned=(0, 0, 0, 0, 0, 0, 180))
     far = moved(config, "red_bin", 1.5, 0.0, 0.0).bins["red_bin"]
     changes = {"bins": {"red_bin": far}, "detectors": {"yolo": yolo}, "localization": "depth"}
-    found = dict(SimCell.check(config.model_copy(update=changes), tmp_path))
+    found = dict(SIM_CELL_KIND.check(config.model_copy(update=changes), tmp_path))
     assert list(found) == [
         ("localization",),
         ("detectors", "yolo", "kind"),
@@ -78,7 +77,7 @@ def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wri
     ]
 
 
-@pytest.mark.parametrize("kind", [SimCell, FakeCell])
+@pytest.mark.parametrize("kind", [SIM_CELL_KIND, FakeCell])
 def test_an_arm_without_kinematics_is_a_finding_with_the_supported_arms(overhead: CellConfig, kind) -> None:
     config = overhead.model_copy(update={"arm": overhead.arm.model_copy(update={"urdf": "r2d2.urdf"})})
     ((keys, message),) = kind.check(config, Path())

@@ -13,8 +13,8 @@ import pytest
 from executive.cell.protocols import STEP
 from executive.cell.workcell import CellOptions, ResumePoint
 from executive.cells.sim.cell import SimCell
-from executive.cells.sim.command_log import JOINT_TARGETS, CommandLog
 from executive.cells.without_hardware import SilentOperator
+from executive.cells.world_log import JOINT_TARGETS, CommandLog
 from executive.errors import InputError
 from executive.events import discard_event
 from executive.mission.load import load_mission

@@ -10,7 +10,6 @@ from executive.cell.config import CellConfig
 from executive.cell.device_config import DepthConfig
 from executive.cells.sim.camera import (
     CELL_LIGHT,
-    ArmOcclusion,
     SimCamera,
     add_depth_noise,
     get_camera_pose,
@@ -19,7 +18,6 @@ from executive.cells.sim.camera import (
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.world import World
 from executive.geometry import Pose, rotate_about_z
-from executive.motion.arms import build_kinematics
 from executive.perception.camera_model import compute_calibration, project
 
 Build = Callable[[CellConfig], World]
@@ -70,12 +68,11 @@ def test_a_seed_repeats_the_noise_of_images_and_depth_and_a_depth_sensor_changes
 ) -> None:
     world, name = at_scan_pose(build, overhead)
     cube = world.add_object("cube", Pose.of([0.5, 0.0, 0.025]), (1, 0, 0))
-    plain = overhead.cameras[name]
-    deep = plain.model_copy(update={"depth": DepthConfig()})
-    occlusion = ArmOcclusion(world, build_kinematics(overhead), overhead, lambda: False)
+    camera = overhead.cameras[name].model_copy(update={"depth": DepthConfig()})
+    deep = overhead.model_copy(update={"cameras": {name: camera}})
     without, one, same, other = (
-        SimCamera(world, name, config, StoppedClock(), seed, occlusion=occlusion)
-        for config, seed in ((plain, 7), (deep, 7), (deep, 7), (deep, 8))
+        SimCamera(world, config, StoppedClock(), seed)
+        for config, seed in ((overhead, 7), (deep, 7), (deep, 7), (deep, 8))
     )
     frame = one.capture()
     assert frame.depth is not None

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.sim.spawn import derive_seeds, spawn_objects
+from executive.cells.sim.scene import derive_seeds, spawn_objects
 from executive.cells.sim.world import World
 from executive.errors import InputError
 

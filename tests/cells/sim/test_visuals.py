@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.sim.spawn import spawn_objects
+from executive.cells.sim.scene import spawn_objects
 from executive.cells.sim.world import SimVisuals, World
 
 

@@ -1,26 +1,81 @@
-"""Log of the commands to a simulated world, from which the world can be rebuilt.
+"""Log files from which the world of an interrupted run can be rebuilt.
 
 Snapshots of PyBullet lose constraints and motor targets. Commands are deterministic: from the same initial
-world, the same commands produce a bitwise identical world. After a header, the file contains one JSON list
-per command: its kind and its arguments.
+world, the same commands produce a bitwise identical world. A log of commands contains, after a header, one
+JSON list per command: its kind and its arguments.
 """
 
 from __future__ import annotations
 
 import base64
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from executive.cells.log_file import LogFile
-from executive.errors import InputError, explain_os_errors
+from executive.errors import Fault, InputError, describe_os_error, explain_os_errors
 from executive.motion.trajectory import Trajectory
 
+
+class LogFile:
+    """A file without a write buffer, so that a killed process loses no written data.
+
+    Args:
+        path: Path of the file; None: all data are discarded.
+        content_name: Name of the content, for the message of a fault.
+        length: Length to which an existing file is truncated [byte], or None to keep its content.
+
+    Raises:
+        InputError: The file cannot be opened.
+    """
+
+    def __init__(self, path: Path | None, content_name: str, length: int | None = None) -> None:
+        self._path = path
+        self._content_name = content_name
+        self._has_content = bool(length)
+        self._file: int | None = None
+        if path is None:
+            return
+        with explain_os_errors(InputError, f'cannot write "{path}"'):
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+            if length is not None:
+                os.ftruncate(self._file, length)
+
+    def write(self, data: bytes, offset: int) -> None:
+        """Write all data at an offset in the file [byte]; do nothing if the file is closed.
+
+        Raises:
+            InputError: The disk does not accept the first data.
+            Fault: The disk does not accept later data. Later calls do nothing, so that the run can still
+                bring the arm to rest.
+        """
+        try:
+            while data and self._file is not None:
+                byte_count = os.pwrite(self._file, data, offset)
+                data = data[byte_count:]
+                offset += byte_count
+        except OSError as error:
+            self.close()
+            error_class = Fault if self._has_content else InputError
+            raise error_class(
+                f'{self._content_name} "{self._path}" cannot be written: {describe_os_error(error)}; '
+                "the run stops, because without this file it could not be resumed after an interruption"
+            ) from error
+        self._has_content = True
+
+    def close(self) -> None:
+        """Close the file; do nothing if it is closed."""
+        file = self._file
+        self._file = None
+        if file is not None:
+            os.close(file)
+
+
 FILE_HEADER = b"executive world 3\n"
-"""First line of every log, with the version of the format."""
+"""First line of every log of commands, with the version of the format."""
 
 RUN_STEP = "step"
 """Kind of a physics step inside of a control step of the run."""
@@ -41,7 +96,7 @@ REMOVE = "remove"
 
 
 class Command(NamedTuple):
-    """One command in a log: its kind, for example `RUN_STEP`, and its arguments."""
+    """One command to a simulated world: its kind, for example `RUN_STEP`, and its arguments."""
 
     kind: str
     arguments: list[Any]
@@ -88,14 +143,14 @@ def read_commands(path: Path) -> Iterator[Command]:
         try:
             kind, *arguments = json.loads(line)
         except (ValueError, TypeError, RecursionError) as error:
-            problem = f'the log of the world "{path}" is damaged in line {number}: {error}'
-            cause = "somebody changed it after the run, or the disk lost a part of it"
-            raise InputError(f"{problem}; {cause}; restore a copy") from error
+            raise InputError(
+                f'the log of the world "{path}" is damaged in line {number}: {error}; somebody changed it '
+                "after the run, or the disk lost a part of it; restore a copy"
+            ) from error
         yield Command(kind, arguments)
 
 
 def _read_complete_lines(path: Path) -> bytes:
-    """Return the content of a log up to its last line feed."""
     consequence = "without it a simulated run can neither be resumed nor shown in a video"
     with explain_os_errors(InputError, f'cannot read the log of the world "{path}"', consequence):
         content = path.read_bytes()

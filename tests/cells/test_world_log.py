@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from executive.cell.arm import Goal
-from executive.cell.config import CellConfig
-from executive.cells.sim import command_log as log
-from executive.cells.sim.command_log import CommandLog, read_commands
+from executive.cells import world_log as log
+from executive.cells.fake import load_empty_cell
+from executive.cells.world_log import CommandLog, read_commands
 from executive.errors import InputError
 from executive.motion.planner import build_planner
 
@@ -21,10 +21,11 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "world.log"
 
 
-def test_it_reads_what_was_written_bit_by_bit(path: Path, overhead: CellConfig) -> None:
+def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
+    cell = load_empty_cell()
     written = CommandLog(path)
     joints = [1 / 3, *np.random.default_rng(1).normal(size=7)]
-    motion = build_planner(overhead).plan(np.radians(overhead.arm.poses_deg["home"]), Goal((0.5, 0.0, 0.1)))
+    motion = build_planner(cell).plan(np.radians(cell.arm.poses_deg["home"]), Goal((0.5, 0.0, 0.1)))
     written.append(log.JOINT_TARGETS, *joints)
     written.append_motion(motion)
     written.close()

@@ -21,8 +21,13 @@ from executive.cells.fake import SHIPPED_ROUTES
 from executive.cells.sim.camera import CELL_LIGHT
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, apply_scene, load_scene
-from executive.cells.sim.spawn import build_initial_world
+from executive.cells.sim.scene import (
+    DECLARED_SCENE,
+    SceneConfig,
+    apply_scene,
+    build_initial_world,
+    load_scene,
+)
 from executive.cells.sim.world import World
 from executive.cells.without_hardware import SilentOperator
 from executive.errors import InputError
