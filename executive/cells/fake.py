@@ -7,7 +7,7 @@ import itertools
 import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,7 @@ from executive.cell.protocols import Clock, Routes
 from executive.cell.workcell import CellOptions, KeyPath
 from executive.cells.log_file import LogFile
 from executive.cells.table_views import find_view_errors
-from executive.cells.without_hardware import CellWithoutHardware, FinalObject, SilentOperator
+from executive.cells.without_hardware import CellWithoutHardware, SilentOperator, TrueObject
 from executive.errors import InputError, Unavailable
 from executive.events import Emit, discard_event
 from executive.geometry import GRAVITY, Array, Pose
@@ -52,33 +52,6 @@ LOAD_NOISE = 1e-9
 
 
 @dataclass(eq=False)
-class FakeObject:
-    """One object of a fake world.
-
-    Attributes:
-        label: Class of the object.
-        position: Centre of the object `(3,)` [m].
-        rest_positions: Positions `(3,)` [m] at the start, and after each fall and each placement.
-        is_dropped: True if the object fell from the tool and has not been picked up since.
-    """
-
-    label: str
-    position: Array
-    rest_positions: list[Array]
-    is_dropped: bool = False
-
-    def list_values(self) -> list[object]:
-        """Return the arguments of `restore`."""
-        return [self.label, self.is_dropped, self.position, *self.rest_positions]
-
-    @staticmethod
-    def restore(label: object, is_dropped: object, *positions: object) -> FakeObject:
-        """Return an object from a log: `positions` are the current position and the rest positions."""
-        position, *rest_positions = np.array(positions, dtype=float).reshape(-1, 3)
-        return FakeObject(str(label), position, rest_positions, bool(is_dropped))
-
-
-@dataclass(eq=False)
 class FakeWorld:
     """Objects and bins of a fake cell.
 
@@ -93,12 +66,12 @@ class FakeWorld:
 
     classes: Mapping[str, ObjectClass]
     bins: Collection[Bin] = ()
-    objects: list[FakeObject] = field(default_factory=list)
-    removed_objects: list[FakeObject] = field(default_factory=list)
-    held_object: FakeObject | None = None
+    objects: list[TrueObject] = field(default_factory=list)
+    removed_objects: list[TrueObject] = field(default_factory=list)
+    held_object: TrueObject | None = None
     is_commanded: bool = False
 
-    def put(self, label: str, x: float, y: float) -> FakeObject:
+    def put(self, label: str, x: float, y: float) -> TrueObject:
         """Put a new object on the table, and return it.
 
         Args:
@@ -107,58 +80,59 @@ class FakeWorld:
             y: Position of the centre along y [m].
         """
         position = np.array([x, y, self.classes[label].height / 2])
-        fake_object = FakeObject(label, position, [position.copy()])
-        self.objects.append(fake_object)
-        return fake_object
+        body = len(self.objects) + len(self.removed_objects)
+        true_object = TrueObject(label, Pose.of(position), body, [position.copy()])
+        self.objects.append(true_object)
+        return true_object
 
-    def remove(self, fake_object: FakeObject) -> None:
+    def remove(self, true_object: TrueObject) -> None:
         """Remove an object that is not held."""
-        self.objects.remove(fake_object)
-        self.removed_objects.append(fake_object)
+        self.objects.remove(true_object)
+        self.removed_objects.append(true_object)
 
     def release(self, *, is_dropped: bool = False) -> None:
         """Let the held object fall straight down; if it is dropped, it rolls to a free position."""
-        if (fake_object := self.held_object) is None:
+        if (true_object := self.held_object) is None:
             return
         self.held_object = None
-        fake_object.position[2] = self.classes[fake_object.label].height / 2
-        fake_object.is_dropped = is_dropped
+        true_object.position[2] = self.classes[true_object.label].height / 2
+        true_object.is_dropped = is_dropped
         if is_dropped:
-            self._roll_to_free_position(fake_object)
-        fake_object.rest_positions.append(fake_object.position.copy())
+            self._roll_to_free_position(true_object)
+        true_object.rest_positions.append(true_object.position.copy())
 
-    def _roll_to_free_position(self, fake_object: FakeObject) -> None:
+    def _roll_to_free_position(self, true_object: TrueObject) -> None:
         """Move an object off each overlapping object in turn, or from the wall of a bin into the bin."""
-        radius = self.classes[fake_object.label].radius
-        for obstacle in self.objects if self.find_bin(fake_object) is None else ():
+        radius = self.classes[true_object.label].radius
+        for obstacle in self.objects if self.find_bin(true_object) is None else ():
             min_distance = radius + self.classes[obstacle.label].radius
-            direction = fake_object.position[:2] - obstacle.position[:2]
+            direction = true_object.position[:2] - obstacle.position[:2]
             distance = float(np.linalg.norm(direction))
-            if obstacle is not fake_object and distance < min_distance:
+            if obstacle is not true_object and distance < min_distance:
                 direction = direction / distance if distance else np.array((1.0, 0.0))
-                fake_object.position[:2] = obstacle.position[:2] + min_distance * direction
-        if (bin := self.find_bin(fake_object)) is not None:
+                true_object.position[:2] = obstacle.position[:2] + min_distance * direction
+        if (bin := self.find_bin(true_object)) is not None:
             max_offset = np.maximum(bin.size[:2] / 2 - radius, 0.0)
-            offset = fake_object.position[:2] - bin.position[:2]
-            fake_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
+            offset = true_object.position[:2] - bin.position[:2]
+            true_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
 
-    def find_bin(self, fake_object: FakeObject) -> Bin | None:
+    def find_bin(self, true_object: TrueObject) -> Bin | None:
         """Return the bin that contains an object; if there is none, the bin on whose wall the object lies."""
-        wall_margin = BIN_THICKNESS + self.classes[fake_object.label].radius / 2
+        wall_margin = BIN_THICKNESS + self.classes[true_object.label].radius / 2
         margins_and_bins = itertools.product((0.0, wall_margin), self.bins)
-        places = (bin for margin, bin in margins_and_bins if bin.contains(fake_object.position, margin))
+        places = (bin for margin, bin in margins_and_bins if bin.contains(true_object.position, margin))
         return next(places, None)
 
-    def find_touched_object(self, tip_position: Array) -> FakeObject | None:
+    def find_touched_object(self, tip_position: Array) -> TrueObject | None:
         """Return the object that a cup at `tip_position` `(3,)` [m] touches from above, or None."""
-        for fake_object in self.objects:
-            object_class = self.classes[fake_object.label]
-            distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))
+        for true_object in self.objects:
+            object_class = self.classes[true_object.label]
+            distance = float(np.linalg.norm(true_object.position[:2] - tip_position[:2]))
             seal_offset = abs(distance - object_class.contact_radius)
-            gap = abs(float(fake_object.position[2]) + object_class.height / 2 - tip_position[2])
+            gap = abs(float(true_object.position[2]) + object_class.height / 2 - tip_position[2])
             is_touched = seal_offset <= MAX_SEAL_OFFSET and gap <= TOUCH_DISTANCE
-            if is_touched and fake_object is not self.held_object:
-                return fake_object
+            if is_touched and true_object is not self.held_object:
+                return true_object
         return None
 
 
@@ -288,15 +262,15 @@ class FakeDetector:
         self.request_count += 1
         left, top, right, bottom = self.get_view_region(view)
         true_detections = []
-        for fake_object in self.world.objects:
-            x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
+        for true_object in self.world.objects:
+            x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(true_object.position)
             column, row = x / depth, y / depth
             is_inside = depth > 0 and left <= column < right and top <= row < bottom
-            if is_inside and fake_object is not self.world.held_object:
-                half_side = frame.matrix[0, 0] / depth * self.world.classes[fake_object.label].radius
+            if is_inside and true_object is not self.world.held_object:
+                half_side = frame.matrix[0, 0] / depth * self.world.classes[true_object.label].radius
                 box = (column - half_side, row - half_side, column + half_side, row + half_side)
                 confidence = max(DEFAULT_CONFIDENCE, self.config.threshold)
-                true_detections.append(Detection(fake_object.label, confidence, box))
+                true_detections.append(Detection(true_object.label, confidence, box))
         answer = self.make_answer(self.request_count, true_detections)
         future: Future[list[Detection]] = Future()
         if isinstance(answer, str):
@@ -410,7 +384,7 @@ class FakeArm(PlanningArm[StraightMotion]):
         self.q = self._path.pop(0)
         if (held := self._world.held_object) is not None:
             height = self._world.classes[held.label].height
-            held.position = self.tool_pose.position - np.array([0.0, 0.0, height / 2])
+            held.position[:] = self.tool_pose.position - np.array([0.0, 0.0, height / 2])
         if self.next_obstacle is not None and len(self._path) <= self._half_length:
             self.contact_point = self.tool_pose.position.tolist()
             self.stop_after_collision(self.next_obstacle)
@@ -515,7 +489,7 @@ class FakeCell(CellWithoutHardware):
         held = self.world.held_object
         index = None if held is None else self.world.objects.index(held)
         groups = self.world.objects, self.world.removed_objects
-        objects = [[each.list_values() for each in group] for group in groups]
+        objects = [list(map(_encode_object, group)) for group in groups]
         state = [self.steps, self.last_command_step, self.arm.q, index, *objects]
         text = json.dumps(state, default=np.ndarray.tolist).encode()
         # Blanks pad the text to the length of the longest state so far, to overwrite all old text.
@@ -528,8 +502,9 @@ class FakeCell(CellWithoutHardware):
             self.steps = int(steps)
             self.last_command_step = int(last_command_step)
             self.arm.q = np.array(q, dtype=float).reshape(self.arm.q.shape)
-            self.world.objects = [FakeObject.restore(*fields) for fields in objects]
-            self.world.removed_objects = [FakeObject.restore(*fields) for fields in removed_objects]
+            restored = [_decode_object(body, *each) for body, each in enumerate(objects + removed_objects)]
+            self.world.objects = restored[: len(objects)]
+            self.world.removed_objects = restored[len(objects) :]
             self.world.held_object = None if held is None else self.world.objects[held]
         except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
             raise InputError(f'the world in "{path}" is damaged: {error}; run the mission again') from error
@@ -543,19 +518,29 @@ class FakeCell(CellWithoutHardware):
         super().advance()
         self.log_state()
 
-    def _list_final_objects(self) -> Iterator[FinalObject]:
+    def _list_final_objects(self) -> Iterator[TrueObject]:
         for each in (*self.world.objects, *self.world.removed_objects):
             bin = self.world.find_bin(each)
             is_held = each is self.world.held_object
             is_removed = each in self.world.removed_objects
-            name = bin.name if bin else ""
-            yield FinalObject(each.label, name, each.rest_positions, each.is_dropped, is_held, is_removed)
+            yield replace(each, bin=bin.name if bin else "", is_held=is_held, is_removed=is_removed)
 
     def close(self) -> None:
         """Close the arm and the log."""
         self.arm.close()
         if self._log is not None:
             self._log.close()
+
+
+def _encode_object(true_object: TrueObject) -> list[object]:
+    """Return the arguments of `_decode_object` after the number, for the log."""
+    return [true_object.label, true_object.is_dropped, true_object.position, *true_object.rest_positions]
+
+
+def _decode_object(body: int, label: object, is_dropped: object, *positions: object) -> TrueObject:
+    """Return an object from the log: `positions` are the current position and the rest positions."""
+    position, *rest_positions = np.array(positions, dtype=float).reshape(-1, 3)
+    return TrueObject(str(label), Pose.of(position), body, rest_positions, bool(is_dropped))
 
 
 @functools.cache

@@ -28,10 +28,11 @@ from executive.cell.json_values import round_values
 from executive.cell.protocols import Request
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import CellWrapper, Workcell
+from executive.cells.without_hardware import TrueObject
 from executive.errors import Fault, InputError, NoDepth, Unavailable, Unreachable
 from executive.events import Emit, FaultInjected, NodeEnded, NodeStarted, TimedEvent, discard_event
 from executive.geometry import Array
-from executive.testing.oracle import TrueObject, WorldAccess
+from executive.testing.oracle import WorldAccess
 
 MAX_ITEM_POSITION_ERROR = 0.05
 """Maximum horizontal distance between the position of an item in the ledger and its true object [m]."""

@@ -11,7 +11,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -27,24 +27,11 @@ from executive.cells.sim.camera import Image, SimCamera
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import compute_bounding_box, load_mesh
 from executive.cells.sim.world import World
+from executive.cells.without_hardware import TrueObject
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import NEAR_PLANE, project
 from executive.perception.detectors.requests import PendingSearch
-
-
-class TrueObject(NamedTuple):
-    """True state of an object.
-
-    Attributes:
-        body: Identity of the object: a body id in a simulated world, a `FakeObject` in a fake world.
-        label: Class of the object.
-        position: Centre of the object `(3,)` [m].
-    """
-
-    body: Any
-    label: str
-    position: Array
 
 
 class WorldAccess:
@@ -69,41 +56,50 @@ class WorldAccess:
     @property
     def objects(self) -> Sequence[TrueObject]:
         """All loose objects, in the order of their creation."""
-        bodies = self.world.objects if self._is_fake else self.world.labels
-        return [self._describe_object(body) for body in bodies]
+        if self._is_fake:
+            return [self._copy(fake_object) for fake_object in self.world.objects]
+        return [self._locate(body) for body in self.world.labels]
 
     @property
     def held_object(self) -> TrueObject | None:
         """The object at the tool, or None."""
-        body = self.world.held_object if self._is_fake else self.cell.tool.held_body
-        return None if body is None else self._describe_object(body)
+        if self._is_fake:
+            return self.world.held_object and self._copy(self.world.held_object)
+        body = self.cell.tool.held_body
+        return None if body is None else self._locate(body)
 
     def remove(self, true_object: TrueObject) -> None:
         """Remove an object from the world; a held object is released first."""
         self._release_if_held(true_object)
-        remove = self.world.remove if self._is_fake else self.world.remove_object
-        remove(true_object.body)
+        if self._is_fake:
+            self.world.remove(self._find_fake_object(true_object))
+        else:
+            self.world.remove_object(true_object.body)
 
     def move(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
         """Displace an object by `(x, y)` [m]; a held object is released first."""
         self._release_if_held(true_object)
-        body = true_object.body
         if self._is_fake:
-            body.position[:2] += displacement
-            body.rest_positions.append(body.position.copy())
+            fake_object = self._find_fake_object(true_object)
+            fake_object.position[:2] += displacement
+            fake_object.rest_positions.append(fake_object.position.copy())
         else:
-            X_WO = self.world.get_object_pose(body)
+            X_WO = self.world.get_object_pose(true_object.body)
             position = X_WO.position + np.array([*displacement, 0.0])
-            self.world.place_object(body, Pose(X_WO.rotation, position))
+            self.world.place_object(true_object.body, Pose(X_WO.rotation, position))
 
     def _release_if_held(self, true_object: TrueObject) -> None:
         if self.held_object is not None and self.held_object.body == true_object.body:
             self.cell.tool.break_seal()
 
-    def _describe_object(self, body: Any) -> TrueObject:
-        if self._is_fake:
-            return TrueObject(body, body.label, body.position.copy())
-        return TrueObject(body, self.world.labels[body], self.world.get_object_pose(body).position)
+    def _copy(self, fake_object: TrueObject) -> TrueObject:
+        return replace(fake_object, X_WO=Pose.of(fake_object.position.copy()))
+
+    def _find_fake_object(self, true_object: TrueObject) -> TrueObject:
+        return next(each for each in self.world.objects if each.body == true_object.body)
+
+    def _locate(self, body: int) -> TrueObject:
+        return TrueObject(self.world.labels[body], self.world.get_object_pose(body), body)
 
 
 ORACLE_CONFIDENCE = 0.9

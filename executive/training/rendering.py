@@ -23,7 +23,6 @@ from executive.cell.config import CellConfig
 from executive.cell.frame import Box
 from executive.cell.objects import UNKNOWN_LABEL
 from executive.cells.sim import arrangements
-from executive.cells.sim.arrangements import SceneObject
 from executive.cells.sim.camera import (
     CELL_LIGHT,
     Image,
@@ -42,6 +41,7 @@ from executive.cells.sim.models import (
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, build_world
 from executive.cells.sim.spawn import spawn_objects
 from executive.cells.sim.world import WOOD_TEXTURE
+from executive.cells.without_hardware import TrueObject
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, intersect_plane, project
 from executive.processes import WorkerPool
@@ -280,7 +280,7 @@ class SceneRenderer:
         declared_matrix, _ = compute_calibration(self._nominal_camera)
         declared_calibration = {"part": whole_image, "matrix": declared_matrix, "X_WC": declared_X_WC}
         objects = {
-            body: SceneObject(label, world.models[body], world.get_object_pose(body))
+            body: TrueObject(label, world.get_object_pose(body), body, model=world.models[body])
             for body, label in world.labels.items()
         }
         rendered = render(world, self._camera_matrix, X_WC, whole_image, scene.light)
@@ -302,7 +302,7 @@ class SceneRenderer:
         self,
         rendered: RenderedImage,
         min_contrast: float,
-        objects: Mapping[int, SceneObject],
+        objects: Mapping[int, TrueObject],
         origin: Sequence[int] = (0, 0),
         scale: float = 1.0,
     ) -> LabelledImage | None:
@@ -321,7 +321,7 @@ class SceneRenderer:
             mask = rendered.segmentation == body
             if scene_object.label == UNKNOWN_LABEL or not mask.any():
                 continue
-            mesh = load_mesh(scene_object.model)
+            mesh = load_mesh(arrangements.get_model(scene_object))
             vertices = scene_object.X_WO.apply(mesh.vertices)
             pixels = project(rendered.matrix, rendered.X_WC, vertices)
             fraction = min(1.0, float(mask.sum()) / max(compute_silhouette_area(mesh, pixels), 1.0))

@@ -21,7 +21,7 @@ from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import build_initial_world, derive_seeds
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import SimVisuals, World
-from executive.cells.without_hardware import CellWithoutHardware, FinalObject
+from executive.cells.without_hardware import CellWithoutHardware, TrueObject
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.text.file_search import get_shipped_folder
@@ -111,7 +111,7 @@ class SimCell(SimCellChecks, CellWithoutHardware):
         """Return the shapes of the world for display."""
         return SimVisuals(self._world)
 
-    def _list_final_objects(self) -> Iterator[FinalObject]:
+    def _list_final_objects(self) -> Iterator[TrueObject]:
         return list_final_objects(self._world, self._tool, self.cell.bins)
 
     def close(self) -> None:
@@ -132,15 +132,19 @@ class SimCell(SimCellChecks, CellWithoutHardware):
         return rebuilder
 
 
-def list_final_objects(world: World, tool: SuctionTool, bins: Mapping[str, Bin]) -> Iterator[FinalObject]:
+def list_final_objects(world: World, tool: SuctionTool, bins: Mapping[str, Bin]) -> Iterator[TrueObject]:
     """Yield the objects of a simulated world, including removed objects, at the end of a run."""
     for body, positions in world.rest_positions.items():
-        is_removed, is_dropped = body not in world.labels, body in tool.dropped_bodies
+        is_removed = body not in world.labels
         if is_removed:
-            label, position = world.removed_objects[body]
+            label, X_WO = world.removed_objects[body]
         else:
-            label, position = world.labels[body], world.get_object_pose(body).position
+            label = world.labels[body]
+            X_WO = world.get_object_pose(body)
         # The centre of an object that leans on a bin wall may be above the wall.
-        names = (name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS))
-        bin_name = None if position[2] < MIN_CENTRE_HEIGHT else next(names, "")
-        yield FinalObject(label, bin_name, positions, is_dropped, body == tool.held_body, is_removed)
+        names = (name for name, bin in bins.items() if bin.contains(X_WO.position, BIN_THICKNESS))
+        bin_name = None if X_WO.position[2] < MIN_CENTRE_HEIGHT else next(names, "")
+        yield TrueObject(
+            label, X_WO, body, positions, body in tool.dropped_bodies, bin_name, body == tool.held_body,
+            is_removed,
+        )  # fmt: skip

@@ -173,7 +173,7 @@ class World:
         is_idle: True during physics steps that belong to no control step of the run.
         rest_positions: Positions `(3,)` [m] of each object by body: initial position of the run, and position
             after each move by a test and after each release by the tool.
-        removed_objects: Class and last position `(3,)` [m] of each removed object, by body.
+        removed_objects: Class and last pose of each removed object, by body.
     """
 
     def __init__(self, config: CellConfig, *, gui: bool = False, visuals: bool = True) -> None:
@@ -198,7 +198,7 @@ class World:
         self.log = CommandLog()
         self.is_idle = False
         self.rest_positions: dict[int, list[Array]] = {}
-        self.removed_objects: dict[int, tuple[str, Array]] = {}
+        self.removed_objects: dict[int, tuple[str, Pose]] = {}
         self.set_joint_positions(np.radians(config.arm.poses_deg["home"]))
 
     def add_object(
@@ -221,8 +221,9 @@ class World:
     def remove_object(self, body: int) -> None:
         """Remove a loose object from the world."""
         self.log.append(command_log.REMOVE, body)
-        self.removed_objects[body] = self.labels[body], self.get_object_pose(body).position
-        del self.labels[body], self.models[body]
+        self.removed_objects[body] = (self.labels[body], self.get_object_pose(body))
+        del self.labels[body]
+        del self.models[body]
         self.client.removeBody(body)
 
     def name_body(self, body: int) -> str:

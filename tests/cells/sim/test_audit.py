@@ -25,7 +25,7 @@ class OneBody:
 
     def __init__(self, label: str = "cube", place: Sequence[float] = IN_BIN) -> None:
         self.labels = {7: label}
-        self.removed_objects: dict[int, tuple[str, np.ndarray]] = {}
+        self.removed_objects: dict[int, tuple[str, Pose]] = {}
         self.rest_positions = {7: [np.array([0.5, 0.0, 0.025])]}
         self._place = place
 
@@ -72,7 +72,7 @@ def test_a_body_counts_by_its_class_and_by_who_put_it_there(bins, place, more, e
 )
 def test_a_removed_body_counts_as_if_it_still_lay_there_if_it_was_seen(bins, place, more, end: str) -> None:
     world = OneBody()
-    world.removed_objects[7] = (world.labels.pop(7), np.array(place))
+    world.removed_objects[7] = (world.labels.pop(7), Pose.of(place))
     assert counted(bins, world, records=[ITEM], **more) == {**NONE, end: 1}
     assert counted(bins, world, **more) == NONE
 
