@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator
 import numpy as np
 
 from executive.cell.arm import Arm, Goal, Motion, Task
-from executive.cell.objects import Item, Load
+from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Unreachable
 from executive.geometry import GRAVITY, Array
@@ -148,7 +148,7 @@ def make_task(cell: Cell) -> Task:
 def make_transport_task(cell: Cell, item: Item) -> Task:
     """Return the task of a motion with `item` as the load, and with all other objects as obstacles."""
     object_class = cell.classes[cell.ledger.get_label(item)]
-    return Task(Load(object_class, cell.tool.holding_force), list_obstacles(cell, item))
+    return Task(object_class, cell.tool.holding_force, list_obstacles(cell, item))
 
 
 def detect_and_record_drop(cell: Cell, item: Item) -> bool:

@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from executive.cell.objects import Load
+from executive.cell.objects import ObjectClass
 from executive.cell.protocols import STEP
 from executive.geometry import GRAVITY, Array
 from executive.motion.clearance_model import ClearanceModel, NearestPairs
@@ -52,10 +52,10 @@ class PayloadLimit:
     and `g` = 9.81 m/s² upwards.
     """
 
-    def __init__(self, load: Load, kinematics: Kinematics) -> None:
+    def __init__(self, load: ObjectClass, holding_force: float, kinematics: Kinematics) -> None:
         # Maximum of |a + g| [m/s²].
-        self._max_specific_force = load.holding_force / SAFETY_FACTOR / load.object_class.mass
-        self._centre_offset = load.object_class.height / 2
+        self._max_specific_force = holding_force / SAFETY_FACTOR / load.mass
+        self._centre_offset = load.height / 2
         self._kinematics = kinematics
 
     @property

@@ -67,7 +67,9 @@ class Planner:
         start = np.asarray(q_start, dtype=float)
         end = goal if isinstance(goal, Goal) else np.asarray(goal, dtype=float)
         motion = self._find_motion(start, end, task)
-        return PayloadLimit(task.load, self.kinematics).make_safe_motion(motion) if task.load else motion
+        if task.load is None:
+            return motion
+        return PayloadLimit(task.load, task.holding_force, self.kinematics).make_safe_motion(motion)
 
     def require_reachable(self, goal: Goal) -> None:
         """Check that the arm reaches both a goal and the travel height above the goal in the same branch.

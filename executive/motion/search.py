@@ -83,7 +83,7 @@ class MotionSearch:
         if not isinstance(end, Goal) and task.load is None:
             # A motion to joint positions, i.e. to a named pose, must be possible from any configuration.
             discs = discs._replace(min_cosine=-1.0)
-        self._payload = PayloadLimit(task.load, kinematics) if task.load else None
+        self._payload = PayloadLimit(task.load, task.holding_force, kinematics) if task.load else None
         start_tcp_and_axis = kinematics.compute_tcps_and_axes(start[None])
         tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, self._locate_free_part_end(), strict=True))
         self._clearance = ClearanceModel(config, task.obstacles, tcps[:, :2], discs)
