@@ -16,7 +16,7 @@ from executive.record.diagnosis import Diagnosis, FailureNode
 from executive.record.picture_recorder import find_picture
 from executive.record.result import is_resumable
 from executive.record.run_directory import RunDirectory
-from executive.record.timeline import ItemHistory, Look, Timeline, get_skill_name
+from executive.record.timeline import Look, Timeline, get_skill_name
 from executive.tree.failure import Reason
 from executive.tree.inspection import Advice, PropagatedFailure
 from executive.tree.node_registry import load_control_nodes
@@ -64,7 +64,7 @@ def diagnose(
             if entry.explanation or entry is run.failure_path[-1]
         ],
         last_look=run.find_last_look(),
-        lost_items=[run.add_failure(timeline.items.histories[name]) for name in run.lost_items],
+        lost_items=[timeline.items.histories[name] for name in run.lost_items],
         halted_skills=[run.format_skill_name(path) for path in run.halted_skills],
         unsorted_items=[
             name for name, last in items.items() if name not in run.lost_items and last.label in loaded.routes
@@ -168,14 +168,6 @@ class _FailedRun:
         if history is None or history.look is None:
             return items.look
         return replace(history.look, attempts=items.changes[self.item].attempts)
-
-    def add_failure(self, history: ItemHistory) -> ItemHistory:
-        """Return the history of an item with the text of its last failure."""
-        failed = self.timeline.failures.get(history.item)
-        if failed is None:
-            return history
-        failure = f"{get_skill_name(failed.node)}.{failed.reason} at {failed.end:.2f} s: {failed.message}"
-        return replace(history, last_failure=failure)
 
     def find_picture_file(self, run_folder: Path) -> str:
         """Return the path of the picture of the failure, else of the last selection of the item, else ""."""

@@ -335,6 +335,9 @@ class Timeline:
             self.halted_skills += (event.node,)
         if event.skill and event.status == "FAILURE":
             self.failures[event.item] = activation
+            if history := self.items.histories.get(event.item):
+                skill = get_skill_name(event.node)
+                history.last_failure = f"{skill}.{event.reason} at {self.clock:.2f} s: {event.message}"
 
     def _end_activation(self, activation: Activation, status: str) -> None:
         activation.status = status

@@ -57,22 +57,20 @@ class WorldAccess:
     def objects(self) -> Sequence[TrueObject]:
         """All loose objects, in the order of their creation."""
         if self._is_fake:
-            return [self._copy(fake_object) for fake_object in self.world.objects]
-        return [self._locate(body) for body in self.world.labels]
+            return list(self.world.objects)
+        return list(map(self._locate, self.world.labels))
 
     @property
     def held_object(self) -> TrueObject | None:
         """The object at the tool, or None."""
-        if self._is_fake:
-            return self.world.held_object and self._copy(self.world.held_object)
-        body = self.cell.tool.held_body
-        return None if body is None else self._locate(body)
+        held = self.world.held_object if self._is_fake else self.cell.tool.held_body
+        return held if self._is_fake or held is None else self._locate(held)
 
     def remove(self, true_object: TrueObject) -> None:
         """Remove an object from the world; a held object is released first."""
         self._release_if_held(true_object)
         if self._is_fake:
-            self.world.remove(self._find_fake_object(true_object))
+            self.world.remove(true_object)
         else:
             self.world.remove_object(true_object.body)
 
@@ -80,9 +78,8 @@ class WorldAccess:
         """Displace an object by `(x, y)` [m]; a held object is released first."""
         self._release_if_held(true_object)
         if self._is_fake:
-            fake_object = self._find_fake_object(true_object)
-            fake_object.position[:2] += displacement
-            fake_object.rest_positions.append(fake_object.position.copy())
+            true_object.position[:2] += displacement
+            true_object.rest_positions.append(true_object.position.copy())
         else:
             X_WO = self.world.get_object_pose(true_object.body)
             position = X_WO.position + np.array([*displacement, 0.0])
@@ -91,12 +88,6 @@ class WorldAccess:
     def _release_if_held(self, true_object: TrueObject) -> None:
         if self.held_object is not None and self.held_object.body == true_object.body:
             self.cell.tool.break_seal()
-
-    def _copy(self, fake_object: TrueObject) -> TrueObject:
-        return replace(fake_object, X_WO=Pose.of(fake_object.position.copy()))
-
-    def _find_fake_object(self, true_object: TrueObject) -> TrueObject:
-        return next(each for each in self.world.objects if each.body == true_object.body)
 
     def _locate(self, body: int) -> TrueObject:
         return TrueObject(self.world.labels[body], self.world.get_object_pose(body), body)
