@@ -81,58 +81,58 @@ class FakeWorld:
         """
         position = np.array([x, y, self.classes[label].height / 2])
         body = len(self.objects) + len(self.removed_objects)
-        true_object = TrueObject(label, Pose.of(position), body, [position.copy()])
-        self.objects.append(true_object)
-        return true_object
+        fake_object = TrueObject(label, Pose.of(position), body, [position.copy()])
+        self.objects.append(fake_object)
+        return fake_object
 
-    def remove(self, true_object: TrueObject) -> None:
+    def remove(self, fake_object: TrueObject) -> None:
         """Remove an object that is not held."""
-        self.objects.remove(true_object)
-        self.removed_objects.append(true_object)
+        self.objects.remove(fake_object)
+        self.removed_objects.append(fake_object)
 
     def release(self, *, is_dropped: bool = False) -> None:
         """Let the held object fall straight down; if it is dropped, it rolls to a free position."""
-        if (true_object := self.held_object) is None:
+        if (fake_object := self.held_object) is None:
             return
         self.held_object = None
-        true_object.position[2] = self.classes[true_object.label].height / 2
-        true_object.is_dropped = is_dropped
+        fake_object.position[2] = self.classes[fake_object.label].height / 2
+        fake_object.is_dropped = is_dropped
         if is_dropped:
-            self._roll_to_free_position(true_object)
-        true_object.rest_positions.append(true_object.position.copy())
+            self._roll_to_free_position(fake_object)
+        fake_object.rest_positions.append(fake_object.position.copy())
 
-    def _roll_to_free_position(self, true_object: TrueObject) -> None:
+    def _roll_to_free_position(self, fake_object: TrueObject) -> None:
         """Move an object off each overlapping object in turn, or from the wall of a bin into the bin."""
-        radius = self.classes[true_object.label].radius
-        for obstacle in self.objects if self.find_bin(true_object) is None else ():
+        radius = self.classes[fake_object.label].radius
+        for obstacle in self.objects if self.find_bin(fake_object) is None else ():
             min_distance = radius + self.classes[obstacle.label].radius
-            direction = true_object.position[:2] - obstacle.position[:2]
+            direction = fake_object.position[:2] - obstacle.position[:2]
             distance = float(np.linalg.norm(direction))
-            if obstacle is not true_object and distance < min_distance:
+            if obstacle is not fake_object and distance < min_distance:
                 direction = direction / distance if distance else np.array((1.0, 0.0))
-                true_object.position[:2] = obstacle.position[:2] + min_distance * direction
-        if (bin := self.find_bin(true_object)) is not None:
+                fake_object.position[:2] = obstacle.position[:2] + min_distance * direction
+        if (bin := self.find_bin(fake_object)) is not None:
             max_offset = np.maximum(bin.size[:2] / 2 - radius, 0.0)
-            offset = true_object.position[:2] - bin.position[:2]
-            true_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
+            offset = fake_object.position[:2] - bin.position[:2]
+            fake_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
 
-    def find_bin(self, true_object: TrueObject) -> Bin | None:
+    def find_bin(self, fake_object: TrueObject) -> Bin | None:
         """Return the bin that contains an object; if there is none, the bin on whose wall the object lies."""
-        wall_margin = BIN_THICKNESS + self.classes[true_object.label].radius / 2
+        wall_margin = BIN_THICKNESS + self.classes[fake_object.label].radius / 2
         margins_and_bins = itertools.product((0.0, wall_margin), self.bins)
-        places = (bin for margin, bin in margins_and_bins if bin.contains(true_object.position, margin))
+        places = (bin for margin, bin in margins_and_bins if bin.contains(fake_object.position, margin))
         return next(places, None)
 
     def find_touched_object(self, tip_position: Array) -> TrueObject | None:
         """Return the object that a cup at `tip_position` `(3,)` [m] touches from above, or None."""
-        for true_object in self.objects:
-            object_class = self.classes[true_object.label]
-            distance = float(np.linalg.norm(true_object.position[:2] - tip_position[:2]))
+        for fake_object in self.objects:
+            object_class = self.classes[fake_object.label]
+            distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))
             seal_offset = abs(distance - object_class.contact_radius)
-            gap = abs(float(true_object.position[2]) + object_class.height / 2 - tip_position[2])
+            gap = abs(float(fake_object.position[2]) + object_class.height / 2 - tip_position[2])
             is_touched = seal_offset <= MAX_SEAL_OFFSET and gap <= TOUCH_DISTANCE
-            if is_touched and true_object is not self.held_object:
-                return true_object
+            if is_touched and fake_object is not self.held_object:
+                return fake_object
         return None
 
 
@@ -262,15 +262,15 @@ class FakeDetector:
         self.request_count += 1
         left, top, right, bottom = self.get_view_region(view)
         true_detections = []
-        for true_object in self.world.objects:
-            x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(true_object.position)
+        for fake_object in self.world.objects:
+            x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
             column, row = x / depth, y / depth
             is_inside = depth > 0 and left <= column < right and top <= row < bottom
-            if is_inside and true_object is not self.world.held_object:
-                half_side = frame.matrix[0, 0] / depth * self.world.classes[true_object.label].radius
+            if is_inside and fake_object is not self.world.held_object:
+                half_side = frame.matrix[0, 0] / depth * self.world.classes[fake_object.label].radius
                 box = (column - half_side, row - half_side, column + half_side, row + half_side)
                 confidence = max(DEFAULT_CONFIDENCE, self.config.threshold)
-                true_detections.append(Detection(true_object.label, confidence, box))
+                true_detections.append(Detection(fake_object.label, confidence, box))
         answer = self.make_answer(self.request_count, true_detections)
         future: Future[list[Detection]] = Future()
         if isinstance(answer, str):
@@ -532,9 +532,9 @@ class FakeCell(CellWithoutHardware):
             self._log.close()
 
 
-def _encode_object(true_object: TrueObject) -> list[object]:
+def _encode_object(fake_object: TrueObject) -> list[object]:
     """Return the arguments of `_decode_object` after the number, for the log."""
-    return [true_object.label, true_object.is_dropped, true_object.position, *true_object.rest_positions]
+    return [fake_object.label, fake_object.is_dropped, fake_object.position, *fake_object.rest_positions]
 
 
 def _decode_object(body: int, label: object, is_dropped: object, *positions: object) -> TrueObject:

@@ -227,10 +227,8 @@ class Belief:
         """
         if not self.label_map:
             old = self.log_likelihoods
-            self.log_likelihoods = defaultdict(float)
-            for label, detected_label in label_map.items():
-                if detected_label in old:
-                    self.log_likelihoods[label] = old[detected_label]
+            new = {label: old[detected] for label, detected in label_map.items() if detected in old}
+            self.log_likelihoods = defaultdict(float, new)
             self.label_map = label_map
         for label in self.log_likelihoods:
             self.log_likelihoods[label] += log_ratios[label] - self.weight_log_ratios.get(label, 0.0)

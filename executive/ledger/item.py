@@ -291,16 +291,24 @@ class ItemRecords:
         return [record for record in self if record.state in states]
 
     def add(
-        self, belief: Belief, position: Array, change_count: int, stamp: float, *, was_place_empty: bool
+        self,
+        belief: Belief,
+        position: Array,
+        frame: Frame,
+        *,
+        was_place_empty: bool,
+        was_place_searched: bool,
     ) -> ItemRecord:
         """Add an item with the name `<class>-<number>` and return its record.
 
-        `position` `(3,)` [m], `change_count` and `stamp` [s] are values of the first detection.
+        `position` `(3,)` [m] and `frame` are values of the first detection.
         """
         label = belief.first_label
         self._name_counts[label] += 1
         name = f"{label}-{self._name_counts[label]}"
-        self._records[name] = ItemRecord(name, belief, position, change_count, stamp, was_place_empty)
+        self._records[name] = ItemRecord(
+            name, belief, position, frame.change_count, frame.stamp, was_place_empty, was_place_searched
+        )
         return self._records[name]
 
     def remove(self, record: ItemRecord) -> None:

@@ -325,14 +325,12 @@ class LookUpdate:
     def _add_item(self, observation: Observation, prior_odds: float) -> ItemRecord:
         """Add a new item; `prior_odds` are the prior odds that the item exists."""
         belief = Belief(observation.detection.label, math.log(prior_odds))
-        frame = self.look.frame
         position = observation.position
         was_place_empty = self.coverage.find_miss_probability(position) <= self.config.max_miss_probability
-        record = self.records.add(
-            belief, position, frame.change_count, frame.stamp, was_place_empty=was_place_empty
-        )
-        record.was_place_searched = self.coverage.was_searched(position)
-        return record
+        return self.records.add(
+            belief, position, self.look.frame, was_place_empty=was_place_empty,
+            was_place_searched=self.coverage.was_searched(position),
+        )  # fmt: skip
 
     def _compute_expected_count(self, observation: Observation) -> float:
         """Return the expected number of objects at an observed position that earlier looks have missed."""

@@ -58,13 +58,13 @@ class WorldAccess:
         """All loose objects, in the order of their creation."""
         if self._is_fake:
             return list(self.world.objects)
-        return list(map(self._locate, self.world.labels))
+        return list(map(self.world.describe_object, self.world.labels))
 
     @property
     def held_object(self) -> TrueObject | None:
         """The object at the tool, or None."""
         held = self.world.held_object if self._is_fake else self.cell.tool.held_body
-        return held if self._is_fake or held is None else self._locate(held)
+        return held if self._is_fake or held is None else self.world.describe_object(held)
 
     def remove(self, true_object: TrueObject) -> None:
         """Remove an object from the world; a held object is released first."""
@@ -88,9 +88,6 @@ class WorldAccess:
     def _release_if_held(self, true_object: TrueObject) -> None:
         if self.held_object is not None and self.held_object.body == true_object.body:
             self.cell.tool.break_seal()
-
-    def _locate(self, body: int) -> TrueObject:
-        return TrueObject(self.world.labels[body], self.world.get_object_pose(body), body)
 
 
 ORACLE_CONFIDENCE = 0.9

@@ -279,10 +279,7 @@ class SceneRenderer:
         declared_X_WC = get_camera_pose(world, self._nominal_camera).to_rounded_list(9)
         declared_matrix, _ = compute_calibration(self._nominal_camera)
         declared_calibration = {"part": whole_image, "matrix": declared_matrix, "X_WC": declared_X_WC}
-        objects = {
-            body: TrueObject(label, world.get_object_pose(body), body, model=world.models[body])
-            for body, label in world.labels.items()
-        }
+        objects = {body: world.describe_object(body) for body in world.labels}
         rendered = render(world, self._camera_matrix, X_WC, whole_image, scene.light)
         image = add_noise(rendered.image, camera.noise, rng)
         depth = None if camera.depth is None else add_depth_noise(rendered.depth, camera.depth, rng)

@@ -135,16 +135,12 @@ class SimCell(SimCellChecks, CellWithoutHardware):
 def list_final_objects(world: World, tool: SuctionTool, bins: Mapping[str, Bin]) -> Iterator[TrueObject]:
     """Yield the objects of a simulated world, including removed objects, at the end of a run."""
     for body, positions in world.rest_positions.items():
-        is_removed = body not in world.labels
-        if is_removed:
-            label, X_WO = world.removed_objects[body]
-        else:
-            label = world.labels[body]
-            X_WO = world.get_object_pose(body)
+        final_object = world.removed_objects.get(body) or world.describe_object(body)
         # The centre of an object that leans on a bin wall may be above the wall.
-        names = (name for name, bin in bins.items() if bin.contains(X_WO.position, BIN_THICKNESS))
-        bin_name = None if X_WO.position[2] < MIN_CENTRE_HEIGHT else next(names, "")
-        yield TrueObject(
-            label, X_WO, body, positions, body in tool.dropped_bodies, bin_name, body == tool.held_body,
-            is_removed,
-        )  # fmt: skip
+        position = final_object.position
+        names = (name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS))
+        final_object.bin = None if position[2] < MIN_CENTRE_HEIGHT else next(names, "")
+        final_object.rest_positions = positions
+        final_object.is_dropped = body in tool.dropped_bodies
+        final_object.is_held = body == tool.held_body
+        yield final_object
