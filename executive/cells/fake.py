@@ -18,10 +18,10 @@ from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.frame import Box, Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
 from executive.cell.protocols import Clock, Routes
-from executive.cell.workcell import CellOptions, KeyPath
+from executive.cell.workcell import CellOptions, KeyPath, TrueObject
 from executive.cells.log_file import LogFile
 from executive.cells.table_views import find_view_errors
-from executive.cells.without_hardware import CellWithoutHardware, SilentOperator, TrueObject
+from executive.cells.without_hardware import CellWithoutHardware, SilentOperator
 from executive.errors import InputError, Unavailable
 from executive.events import Emit, discard_event
 from executive.geometry import GRAVITY, Array, Pose

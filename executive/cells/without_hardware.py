@@ -4,60 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from executive.cell.arm import Arm
-from executive.cell.config import CellConfig, ObjectConfig
-from executive.cell.device_config import Colour
+from executive.cell.config import CellConfig
 from executive.cell.layout import build_bins, build_object_classes
 from executive.cell.objects import UNKNOWN_LABEL, Bin, Target
 from executive.cell.protocols import STEP, Cell, Detector, Localizer, Routes, StepClock, Tool
-from executive.cell.workcell import AUDIT_KEYS, CellOptions, Visuals
+from executive.cell.workcell import AUDIT_KEYS, CellOptions, TrueObject, Visuals
 from executive.events import Emit, TargetSelected
-from executive.geometry import Array, Pose
+from executive.geometry import Array
 from executive.ledger.item import ItemRecord, State
 from executive.ledger.tracker import Tracker
 from executive.perception.camera_model import MountedCamera
 from executive.perception.detectors.requests import screen_detectors
-
-
-@dataclass(eq=False)
-class TrueObject:
-    """Ground truth about an object of a simulated, fake or rendered scene.
-
-    Attributes:
-        label: Class of the object, or `UNKNOWN_LABEL`.
-        X_WO: Pose of the object in the world; its position is the centre of the object.
-        body: Number of the object in its world.
-        rest_positions: Positions of the object `(3,)` [m] at the start, and after each move and each fall.
-        is_dropped: True if the object fell from the tool and has not been picked up since.
-        bin: At the end of a run, name of the bin that contains the object; "" outside of all bins, None below
-            the table.
-        is_held: At the end of a run, True if the tool holds the object.
-        is_removed: True if the object was removed from the world; `bin` is then the bin before the removal.
-        model: Model of the object, already scaled, in a scene that is rendered.
-        colour: Red, green and blue of the object, each 0 to 1; black if unknown.
-    """
-
-    label: str
-    X_WO: Pose
-    body: int = 0
-    rest_positions: list[Array] = field(default_factory=list)
-    is_dropped: bool = False
-    bin: str | None = ""
-    is_held: bool = False
-    is_removed: bool = False
-    model: ObjectConfig | None = None
-    colour: Colour = (0.0, 0.0, 0.0)
-
-    @property
-    def position(self) -> Array:
-        """Centre of the object `(3,)` [m]."""
-        return self.X_WO.position
 
 
 def count_outcomes(

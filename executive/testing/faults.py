@@ -27,8 +27,7 @@ from executive.cell.frame import Answer
 from executive.cell.json_values import round_values
 from executive.cell.protocols import Request
 from executive.cell.proxy import Access, intercept
-from executive.cell.workcell import CellWrapper, Workcell
-from executive.cells.without_hardware import TrueObject
+from executive.cell.workcell import CellWrapper, TrueObject, Workcell
 from executive.errors import Fault, InputError, NoDepth, Unavailable, Unreachable
 from executive.events import Emit, FaultInjected, NodeEnded, NodeStarted, TimedEvent, discard_event
 from executive.geometry import Array

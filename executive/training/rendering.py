@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig
 from executive.cell.frame import Box
 from executive.cell.objects import UNKNOWN_LABEL
+from executive.cell.workcell import TrueObject
 from executive.cells.sim import arrangements
 from executive.cells.sim.camera import (
     CELL_LIGHT,
@@ -41,7 +42,6 @@ from executive.cells.sim.models import (
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, build_world
 from executive.cells.sim.spawn import spawn_objects
 from executive.cells.sim.world import WOOD_TEXTURE
-from executive.cells.without_hardware import TrueObject
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, intersect_plane, project
 from executive.processes import WorkerPool

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from executive.cell.objects import UNKNOWN_LABEL
+from executive.cell.workcell import TrueObject
 from executive.cells.sim.cell import SimCell, list_final_objects
-from executive.cells.without_hardware import TrueObject, count_outcomes
+from executive.cells.without_hardware import count_outcomes
 from executive.events import ItemChanged
 from executive.ledger.item import State
 from executive.mission.load import load_mission

@@ -19,10 +19,10 @@ from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import CameraConfig, Colour, NoiseConfig, Range
 from executive.cell.layout import build_bins
 from executive.cell.objects import BIN_THICKNESS, UNKNOWN_LABEL, Bin
+from executive.cell.workcell import TrueObject
 from executive.cells.sim.camera import Light, Region
 from executive.cells.sim.models import add_body, build_drop_world, load_mesh, locate_object
 from executive.cells.sim.world import PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE, World, add_bin
-from executive.cells.without_hardware import TrueObject
 from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
 from executive.perception.camera_model import intersect_plane
 

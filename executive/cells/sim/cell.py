@@ -9,7 +9,7 @@ from pathlib import Path
 from executive.cell.config import CellConfig
 from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.cell.protocols import Routes
-from executive.cell.workcell import CellOptions
+from executive.cell.workcell import CellOptions, TrueObject
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.camera import ArmOcclusion, SimCamera
 from executive.cells.sim.collision import ClearanceChecker
@@ -21,7 +21,7 @@ from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import build_initial_world, derive_seeds
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import SimVisuals, World
-from executive.cells.without_hardware import CellWithoutHardware, TrueObject
+from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.text.file_search import get_shipped_folder

@@ -22,12 +22,11 @@ from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.device_config import Colour
 from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, list_bin_boxes
 from executive.cell.protocols import STEP
-from executive.cell.workcell import Shape
+from executive.cell.workcell import Shape, TrueObject
 from executive.cells.sim import command_log
 from executive.cells.sim.command_log import CommandLog
 from executive.cells.sim.model_files import find_model
 from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, locate_object
-from executive.cells.without_hardware import TrueObject
 from executive.geometry import Array, Pose
 from executive.motion.iiwa14_kinematics import FLANGE_OFFSET
 

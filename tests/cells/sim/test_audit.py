@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from executive.cell.objects import UNKNOWN_LABEL, Bin
-from executive.cell.workcell import AUDIT_KEYS
+from executive.cell.workcell import AUDIT_KEYS, TrueObject
 from executive.cells.sim.cell import list_final_objects
-from executive.cells.without_hardware import TrueObject, count_outcomes
+from executive.cells.without_hardware import count_outcomes
 from executive.geometry import Pose
 
 IN_BIN, ON_TABLE, ON_FLOOR = (0.2, -0.44, 0.12), (0.5, 0.0, 0.025), (1.4, 0.0, -0.6)
