@@ -37,7 +37,6 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("motion = planning.result()", "cell/arm.py", "Motion"),
         ("goal = Goal(...)", "cell/arm.py", "Goal"),
         ("task = Task(...)", "cell/arm.py", "Task"),
-        ("load = Load(...)", "cell/objects.py", "Load"),
         ("obstacle = Obstacle(...)", "cell/objects.py", "Obstacle"),
         ("tool_pose = cell.arm.tool_pose", "geometry.py", "Pose"),
     ],

@@ -20,6 +20,7 @@ from pydantic import TypeAdapter
 
 from executive.cell.json_values import DECIMAL_PLACES
 from executive.errors import InputError
+from executive.events import ItemChanged
 from executive.record.result import Audit, ItemCounts, Result, describe_disagreement
 from executive.record.timeline import PlanningTotals, Timeline
 from executive.view.terminal import format_repeat_command
@@ -105,19 +106,6 @@ class RunRow:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ItemRow:
-    """An item of the ledger."""
-
-    run_index: int
-    item: str
-    label: str
-    state: str
-    bin: str
-    failed_attempts: int
-    robot_time_s: float
-
-
-@dataclass(frozen=True, kw_only=True)
 class SkillRow:
     """All activations of one skill in a run."""
 
@@ -139,12 +127,13 @@ class RunRecord:
 
     Attributes:
         run: Row of the run.
-        items: Rows of the items, in the order of their detection.
+        items: Last change of each item, and the time during which the item was the selected target and had no
+            final state [s], in the order of their detection.
         skills: Rows of the skills, in the order of their first activation.
     """
 
     run: RunRow
-    items: tuple[ItemRow, ...] = ()
+    items: tuple[tuple[ItemChanged, float], ...] = ()
     skills: tuple[SkillRow, ...] = ()
 
 
@@ -167,21 +156,12 @@ def make_record(run_index: int, variant: Mapping[str, str], result: Result, time
         wall_time_s=round(result.wall_time_s, DECIMAL_PLACES),
         decision_hash=result.trace, run_directory=result.run,
     )  # fmt: skip
-    return RunRecord(run, tuple(_list_items(run_index, timeline)), tuple(_list_skills(run_index, timeline)))
-
-
-def _list_items(run_index: int, timeline: Timeline) -> Iterator[ItemRow]:
-    for name, history in timeline.items.by_name.items():
-        last = history.last_change
-        yield ItemRow(
-            run_index=run_index, item=name, label=last.label, state=last.state, bin=last.bin,
-            failed_attempts=last.attempts, robot_time_s=_measure_item_time(name, timeline),
-        )  # fmt: skip
+    items = tuple((item, _measure_item_time(item.item, timeline)) for item in timeline.items.changes.values())
+    return RunRecord(run, items, tuple(_list_skills(run_index, timeline)))
 
 
 def _measure_item_time(name: str, timeline: Timeline) -> float:
-    """Return the time during which the item was the selected target and had no final state [s]."""
-    end_time = timeline.items.by_name[name].state_change_time
+    end_time = timeline.items.change_times[name]
     durations = (
         max(0.0, min(next_time, end_time) - time)
         for (time, item), (next_time, _) in pairwise([*timeline.selection_times, (timeline.clock, "")])
@@ -267,7 +247,7 @@ class ResultsDatabase:
         """
         with self._convert_sqlite_errors(), self._connection:
             self._insert("runs", [encode_run(record.run)])
-            self._insert("items", map(vars, record.items))
+            self._insert("items", (_encode_item(record.run.run_index, *entry) for entry in record.items))
             self._insert("skills", map(vars, record.skills))
 
     def read_runs(self) -> list[RunRow]:
@@ -319,6 +299,13 @@ def encode_run(run: RunRow) -> dict[str, Any]:
 
 _RUN_ADAPTER = TypeAdapter(RunRow)
 """Converts the numbers of SQLite, which has no Boolean type, to a run."""
+
+
+def _encode_item(run_index: int, item: ItemChanged, time: float) -> dict[str, Any]:
+    return {
+        "run_index": run_index, "item": item.item, "label": item.label, "state": item.state, "bin": item.bin,
+        "failed_attempts": item.attempts, "robot_time_s": time,
+    }  # fmt: skip
 
 
 def _decode_run(columns: dict[str, Any]) -> RunRow:

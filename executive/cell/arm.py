@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from executive.cell.objects import Load, Obstacle
+from executive.cell.objects import ObjectClass, Obstacle
 from executive.geometry import Array, Pose
 
 
@@ -50,12 +50,14 @@ class Task:
     """Load and obstacles with which a motion is planned.
 
     Attributes:
-        load: Object in the tool, or None.
+        load: Class of the object in the tool, or None.
+        holding_force: Maximum force that the seal of the suction cup withstands [N].
         obstacles: Obstacles that are not in the cell file: objects on the table and in the bins.
         target: Obstacle that the tool may touch during the guarded descent, or None.
     """
 
-    load: Load | None = None
+    load: ObjectClass | None = None
+    holding_force: float = math.inf
     obstacles: tuple[Obstacle, ...] = ()
     target: Obstacle | None = None
 

@@ -76,7 +76,8 @@ class Frame:
         height, width = self.visible.shape
         for offset in TYPICAL_OBJECT_POINTS:
             x, y, is_in_front = self._project(points + offset)
-            columns, rows = x.astype(int).clip(0, width - 1), y.astype(int).clip(0, height - 1)
+            columns = x.astype(int).clip(0, width - 1)
+            rows = y.astype(int).clip(0, height - 1)
             mask &= is_in_front & self.visible[rows, columns]
         return mask
 
@@ -200,12 +201,13 @@ class Answer:
 
     def describe_doubt(self, detection: Detection) -> str:
         """Return the message that no detection is confident; `detection` is the best doubtful detection."""
-        confidence, threshold = detection.confidence, self.error_rates.threshold
-        is_low = confidence < threshold
-        second = f"and {detection.second_confidence:.2f} for another class"
-        doubt = f"below the threshold {threshold:.2f}" if is_low else second
-        best_object = f"a {detection.label} with confidence {confidence:.2f}, {doubt}"
-        return f"detector {self.detector} found nothing certain: at best {best_object}"
+        doubt = f"below the threshold {self.error_rates.threshold:.2f}"
+        if detection.confidence >= self.error_rates.threshold:
+            doubt = f"and {detection.second_confidence:.2f} for another class"
+        return (
+            f"detector {self.detector} found nothing certain: at best a {detection.label} "
+            f"with confidence {detection.confidence:.2f}, {doubt}"
+        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -26,7 +26,8 @@ def to_json(value: Any) -> Any:
     """Return `value` converted to types that `json.dumps` accepts and every JSON parser can read.
 
     Floats are rounded to `DECIMAL_PLACES`. A frame is converted without its image. Infinities, NaN and
-    integers beyond `MAX_INTEGER_BITS` become text. Lone surrogates are escaped, as UTF-8 cannot encode them.
+    integers beyond `MAX_INTEGER_BITS` become text. A dataclass with `omits_none` is converted without the
+    fields that are None. Lone surrogates are escaped, as UTF-8 cannot encode them.
     """
     return _find_converter(value.__class__)(value)
 
@@ -87,6 +88,10 @@ def _find_converter(value_type: type) -> Callable[[Any], Any]:
             return converter
     if dataclasses.is_dataclass(value_type):
         names = [field.name for field in dataclasses.fields(value_type)]
+        if getattr(value_type, "omits_none", False):
+            return lambda value: {
+                name: to_json(item) for name in names if (item := getattr(value, name)) is not None
+            }
         return lambda value: {name: to_json(getattr(value, name)) for name in names}
     # The default `repr` contains a memory address, which differs between equal runs.
     return lambda _: value_type.__name__

@@ -121,19 +121,6 @@ MIN_LIFT_ACCELERATION = 0.5
 
 
 @dataclass(frozen=True)
-class Load:
-    """Object in the tool.
-
-    Attributes:
-        object_class: Class of the object.
-        holding_force: Maximum force that the seal of the suction cup withstands [N].
-    """
-
-    object_class: ObjectClass
-    holding_force: float = math.inf
-
-
-@dataclass(frozen=True)
 class Obstacle:
     """An upright cylinder on the table that the arm must avoid.
 

@@ -203,7 +203,11 @@ class Ledger(Protocol):
         """
 
     def record_grasp(self, item: Item) -> None:
-        """Record that the tool holds an item; the grasp may have moved neighbouring objects."""
+        """Record that the tool holds an item; the grasp may have moved neighbouring objects.
+
+        Raises:
+            Fault: According to the ledger, the tool still holds another item.
+        """
 
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
         """Record that the tool lost an item, which may have moved any object on the table.

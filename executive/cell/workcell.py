@@ -1,4 +1,4 @@
-"""Protocols that a run requires of a work cell, its shapes, its ledger and its factory; wrapper of a cell."""
+"""What a run requires of a work cell: protocols, shapes, ground truth, ledger, factory; wrapper of a cell."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from executive.cell.config import ObjectConfig
 from executive.cell.objects import Quotas
 from executive.cell.protocols import Cell, Operator, Routes
 from executive.events import Emit, ItemChanged
-from executive.geometry import Pose
+from executive.geometry import Array, Pose
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,41 @@ class Visuals(Protocol):
 AUDIT_KEYS = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
 """Keys of the object counts of an audit: objects in permitted bins (`right`), in other bins, on the table
 (`left`), elsewhere; and, counted a second time, objects that fell into a wrong bin or were never detected."""
+
+
+@dataclass(eq=False)
+class TrueObject:
+    """Ground truth about an object of a simulated, fake or rendered scene.
+
+    Attributes:
+        label: Class of the object, or `UNKNOWN_LABEL`.
+        X_WO: Pose of the object in the world; its position is the centre of the object.
+        body: Number of the object in its world.
+        rest_positions: Positions of the object `(3,)` [m] at the start, and after each move and each fall.
+        is_dropped: True if the object fell from the tool and has not been picked up since.
+        bin: At the end of a run, name of the bin that contains the object; "" outside of all bins, None below
+            the table.
+        is_held: At the end of a run, True if the tool holds the object.
+        is_removed: True if the object was removed from the world; `bin` is then the bin before the removal.
+        model: Model of the object, already scaled, in a scene that is rendered.
+        colour: Red, green and blue of the object, each 0 to 1; black if unknown.
+    """
+
+    label: str
+    X_WO: Pose
+    body: int = 0
+    rest_positions: list[Array] = field(default_factory=list)
+    is_dropped: bool = False
+    bin: str | None = ""
+    is_held: bool = False
+    is_removed: bool = False
+    model: ObjectConfig | None = None
+    colour: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def position(self) -> Array:
+        """Centre of the object `(3,)` [m]."""
+        return self.X_WO.position
 
 
 class Accounts(Protocol):

@@ -6,7 +6,7 @@ import functools
 import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +17,9 @@ from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.frame import Box, Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
 from executive.cell.protocols import Clock, Ledger, Routes
-from executive.cell.workcell import CellOptions, KeyPath
+from executive.cell.workcell import CellOptions, KeyPath, TrueObject
 from executive.cells.table_views import find_view_errors
-from executive.cells.without_hardware import CellWithoutHardware, FinalObject, SilentOperator
+from executive.cells.without_hardware import CellWithoutHardware, SilentOperator
 from executive.cells.world_log import LogFile
 from executive.errors import InputError, Unavailable
 from executive.events import Emit, discard_event
@@ -45,33 +45,6 @@ TOUCH_DISTANCE = 0.002
 
 
 @dataclass(eq=False)
-class FakeObject:
-    """One object of a fake world.
-
-    Attributes:
-        label: Class of the object.
-        position: Centre of the object `(3,)` [m].
-        rest_positions: Positions `(3,)` [m] at the start, and after each fall and each placement.
-        is_dropped: True if the object fell from the tool and has not been picked up since.
-    """
-
-    label: str
-    position: Array
-    rest_positions: list[Array]
-    is_dropped: bool = False
-
-    def list_values(self) -> list[object]:
-        """Return the arguments of `restore`."""
-        return [self.label, self.is_dropped, self.position, *self.rest_positions]
-
-    @staticmethod
-    def restore(label: object, is_dropped: object, *positions: object) -> FakeObject:
-        """Return an object from a log: `positions` are the current position and the rest positions."""
-        position, *rest_positions = np.array(positions, dtype=float).reshape(-1, 3)
-        return FakeObject(str(label), position, rest_positions, bool(is_dropped))
-
-
-@dataclass(eq=False)
 class FakeWorld:
     """Objects and bins of a fake cell.
 
@@ -86,19 +59,20 @@ class FakeWorld:
 
     classes: Mapping[str, ObjectClass]
     bins: Collection[Bin] = ()
-    objects: list[FakeObject] = field(default_factory=list)
-    removed_objects: list[FakeObject] = field(default_factory=list)
-    held_object: FakeObject | None = None
+    objects: list[TrueObject] = field(default_factory=list)
+    removed_objects: list[TrueObject] = field(default_factory=list)
+    held_object: TrueObject | None = None
     is_commanded: bool = False
 
-    def put(self, label: str, x: float, y: float) -> FakeObject:
+    def put(self, label: str, x: float, y: float) -> TrueObject:
         """Put a new object of a class on the table, with its centre at `x` and `y` [m], and return it."""
         position = np.array([x, y, self.classes[label].height / 2])
-        fake_object = FakeObject(label, position, [position.copy()])
+        body = len(self.objects) + len(self.removed_objects)
+        fake_object = TrueObject(label, Pose.of(position), body, [position.copy()])
         self.objects.append(fake_object)
         return fake_object
 
-    def remove(self, fake_object: FakeObject) -> None:
+    def remove(self, fake_object: TrueObject) -> None:
         """Remove an object that is not held."""
         self.objects.remove(fake_object)
         self.removed_objects.append(fake_object)
@@ -114,7 +88,7 @@ class FakeWorld:
             self._roll_to_free_position(fake_object)
         fake_object.rest_positions.append(fake_object.position.copy())
 
-    def _roll_to_free_position(self, fake_object: FakeObject) -> None:
+    def _roll_to_free_position(self, fake_object: TrueObject) -> None:
         """Move an object off each overlapping object in turn, or from the wall of a bin into the bin."""
         radius = self.classes[fake_object.label].radius
         for obstacle in self.objects if self.find_bin(fake_object) is None else ():
@@ -129,7 +103,7 @@ class FakeWorld:
             offset = fake_object.position[:2] - bin.position[:2]
             fake_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
 
-    def find_bin(self, fake_object: FakeObject) -> Bin | None:
+    def find_bin(self, fake_object: TrueObject) -> Bin | None:
         """Return the bin that contains an object; if there is none, the bin on whose wall the object lies."""
         wall_margin = BIN_THICKNESS + self.classes[fake_object.label].radius / 2
         for margin in (0.0, wall_margin):
@@ -138,7 +112,7 @@ class FakeWorld:
                     return bin
         return None
 
-    def find_touched_object(self, tip_position: Array) -> FakeObject | None:
+    def find_touched_object(self, tip_position: Array) -> TrueObject | None:
         """Return the object that a cup at `tip_position` `(3,)` [m] touches from above, or None."""
         for fake_object in self.objects:
             object_class = self.classes[fake_object.label]
@@ -364,7 +338,7 @@ class FakeArm(PlanningArm[StraightMotion]):
         self.q = self._path.pop(0)
         if (held := self._world.held_object) is not None:
             height = self._world.classes[held.label].height
-            held.position = self.tool_pose.position - np.array([0.0, 0.0, height / 2])
+            held.position[:] = self.tool_pose.position - np.array([0.0, 0.0, height / 2])
         if self.next_obstacle is not None and len(self._path) <= self._half_length:
             self.contact_point = self.tool_pose.position.tolist()
             self.stop_after_collision(self.next_obstacle)
@@ -450,8 +424,8 @@ class FakeCell(CellWithoutHardware):
             return
         held = self.world.held_object
         index = None if held is None else self.world.objects.index(held)
-        objects = [each.list_values() for each in self.world.objects]
-        removed_objects = [each.list_values() for each in self.world.removed_objects]
+        objects = [_encode_object(each) for each in self.world.objects]
+        removed_objects = [_encode_object(each) for each in self.world.removed_objects]
         state = [self.steps, self.last_command_step, self.arm.q, index, objects, removed_objects]
         text = json.dumps(state, default=np.ndarray.tolist).encode()
         # Blanks pad the text to the length of the longest state so far, to overwrite all old text.
@@ -464,8 +438,9 @@ class FakeCell(CellWithoutHardware):
             self.steps = int(steps)
             self.last_command_step = int(last_command_step)
             self.arm.q = np.array(q, dtype=float).reshape(self.arm.q.shape)
-            self.world.objects = [FakeObject.restore(*fields) for fields in objects]
-            self.world.removed_objects = [FakeObject.restore(*fields) for fields in removed_objects]
+            restored = [_decode_object(body, *each) for body, each in enumerate(objects + removed_objects)]
+            self.world.objects = restored[: len(objects)]
+            self.world.removed_objects = restored[len(objects) :]
             self.world.held_object = None if held is None else self.world.objects[held]
         except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
             raise InputError(f'the world in "{path}" is damaged: {error}; run the mission again') from error
@@ -478,18 +453,28 @@ class FakeCell(CellWithoutHardware):
         super().advance()
         self.log_state()
 
-    def _list_final_objects(self) -> Iterator[FinalObject]:
+    def _list_final_objects(self) -> Iterator[TrueObject]:
         for each in (*self.world.objects, *self.world.removed_objects):
             bin = self.world.find_bin(each)
-            name = bin.name if bin else ""
             is_held = each is self.world.held_object
             is_removed = each in self.world.removed_objects
-            yield FinalObject(each.label, name, each.rest_positions, each.is_dropped, is_held, is_removed)
+            yield replace(each, bin=bin.name if bin else "", is_held=is_held, is_removed=is_removed)
 
     def close(self) -> None:
         self.arm.close()
         if self._log is not None:
             self._log.close()
+
+
+def _encode_object(fake_object: TrueObject) -> list[object]:
+    """Return the arguments of `_decode_object` after the number, for the log."""
+    return [fake_object.label, fake_object.is_dropped, fake_object.position, *fake_object.rest_positions]
+
+
+def _decode_object(body: int, label: object, is_dropped: object, *positions: object) -> TrueObject:
+    """Return an object from the log: `positions` are the current position and the rest positions."""
+    position, *rest_positions = np.array(positions, dtype=float).reshape(-1, 3)
+    return TrueObject(str(label), Pose.of(position), body, rest_positions, bool(is_dropped))
 
 
 @functools.cache

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from executive.cell.arm import Arm
 from executive.cell.config import CellConfig
 from executive.cell.objects import UNKNOWN_LABEL, Bin
 from executive.cell.protocols import STEP, Cell, Detector, Localizer, Routes, StepClock, Tool
-from executive.cell.workcell import AUDIT_KEYS, CellOptions, Visuals
+from executive.cell.workcell import AUDIT_KEYS, CellOptions, TrueObject, Visuals
 from executive.events import Emit, TargetSelected
 from executive.geometry import Array
 from executive.ledger.item import ItemRecord, State
@@ -23,29 +23,8 @@ from executive.perception.camera_model import MountedCamera
 from executive.perception.detectors.requests import screen_detectors
 
 
-@dataclass(frozen=True, eq=False)
-class FinalObject:
-    """An object at the end of a run.
-
-    Attributes:
-        label: Class of the object, or `UNKNOWN_LABEL`.
-        bin: Name of the bin that contains the object; "" outside of all bins, None below the table.
-        rest_positions: Positions of the object `(3,)` [m] at the start, and after each move and each fall.
-        is_dropped: True if the object fell from the tool and has not been picked up since.
-        is_held: True if the tool holds the object.
-        is_removed: True if the object was removed from the world; `bin` is then the bin before the removal.
-    """
-
-    label: str
-    bin: str | None
-    rest_positions: Sequence[Array]
-    is_dropped: bool
-    is_held: bool = False
-    is_removed: bool = False
-
-
 def count_outcomes(
-    objects: Iterable[FinalObject],
+    objects: Iterable[TrueObject],
     records: Sequence[ItemRecord],
     bins: Mapping[str, Bin],
     routes: Routes,
@@ -86,7 +65,7 @@ def _is_any_near(points: Sequence[Array], positions: Sequence[Array], max_distan
     return any(math.dist(point[:2], place[:2]) <= max_distance for point in points for place in positions)
 
 
-def _find_outcomes(final_object: FinalObject, place: str, is_seen: bool) -> Iterator[str]:
+def _find_outcomes(final_object: TrueObject, place: str, is_seen: bool) -> Iterator[str]:
     """Yield the keys of the counts that include an object with a final `place`."""
     if final_object.is_removed:
         if is_seen:
@@ -100,7 +79,7 @@ def _find_outcomes(final_object: FinalObject, place: str, is_seen: bool) -> Iter
         yield "unseen"
 
 
-def _find_place(final_object: FinalObject, routes: Routes) -> str:
+def _find_place(final_object: TrueObject, routes: Routes) -> str:
     """Return `right`, `wrong_bin`, `left` or `elsewhere` for the final position, without regard to drops."""
     if final_object.is_held:
         return "left"
@@ -213,7 +192,7 @@ class CellWithoutHardware:
         ignored = self.accounts.ignored_positions
         return count_outcomes(objects, self.accounts.records, self.cell.bins, self.routes, gate, ignored)
 
-    def _list_final_objects(self) -> Iterable[FinalObject] | None:
+    def _list_final_objects(self) -> Iterable[TrueObject] | None:
         """Return all objects at the end of the run; None if their true positions are unknown."""
         return None
 

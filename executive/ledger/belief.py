@@ -61,7 +61,8 @@ def compute_binomial_tail(min_count: int, trial_count: int, probability: float) 
     # scipy.special contains this function, but its import takes 0.5 s.
     if min_count <= 0:
         return 1.0
-    log_p, log_q = math.log(probability), math.log1p(-probability)
+    log_p = math.log(probability)
+    log_q = math.log1p(-probability)
     return math.fsum(
         math.exp(math.log(math.comb(trial_count, count)) + count * log_p + (trial_count - count) * log_q)
         for count in range(min_count, trial_count + 1)
@@ -225,9 +226,10 @@ class Belief:
             label_map: For each class of the cell, the class that the detectors report for it.
         """
         if not self.label_map:
-            old, pairs = self.log_likelihoods, label_map.items()
-            new = {label: old[detected_label] for label, detected_label in pairs if detected_label in old}
-            self.log_likelihoods, self.label_map = defaultdict(float, new), label_map
+            old = self.log_likelihoods
+            new = {label: old[detected] for label, detected in label_map.items() if detected in old}
+            self.log_likelihoods = defaultdict(float, new)
+            self.label_map = label_map
         for label in self.log_likelihoods:
             self.log_likelihoods[label] += log_ratios[label] - self.weight_log_ratios.get(label, 0.0)
         self.weight_log_ratios = {label: log_ratios[label] for label in self.log_likelihoods}

@@ -14,6 +14,7 @@ from executive.cell.frame import Detections, ErrorRates, Observation
 from executive.cell.objects import BIN_THICKNESS, Bin, Quotas, is_quota_reached
 from executive.cell.protocols import Presence, Routes
 from executive.geometry import Array
+from executive.ledger.belief import make_viewpoint_key
 from executive.ledger.item import ItemRecord, ItemRecords, State
 from executive.ledger.look import MAX_STANDARD_DEVIATIONS
 
@@ -127,7 +128,8 @@ class BinContents:
                         record, bin_name, detections.error_rates, has_additional_object=has_additional_object
                     )
                 if record.bin_log_odds[bin_name] >= -math.log(self.config.max_miss_probability):
-                    record.reason, record.stamp, record.was_detected_in_bin = "", detections.frame.stamp, True
+                    record.reason = ""
+                    record.mark_as_detected_in_bin(detections.frame)
                     self.records.set_placed(record, bin_name)
                     break
 
@@ -141,7 +143,23 @@ class BinContents:
         """Set the time of the last detection of each placed item that an image shows in its bin."""
         for record in self.records.filter_by_state(State.PLACED):
             if self.find_presence(record, detections, observations) is Presence.PRESENT:
-                record.stamp, record.was_detected_in_bin = detections.frame.stamp, True
+                record.mark_as_detected_in_bin(detections.frame)
+
+    def update_presence(
+        self, record: ItemRecord, detections: Detections, observations: Sequence[Observation]
+    ) -> Presence:
+        """Record whether one image shows a placed item in its bin, and return the answer of the image."""
+        presence = self.find_presence(record, detections, observations)
+        if presence is Presence.GONE:
+            record.belief.add_miss(
+                detections.error_rates, make_viewpoint_key(detections),
+                was_detected_here=record.was_detected_in_bin,
+            )  # fmt: skip
+        elif presence is Presence.PRESENT:
+            record.mark_as_detected_in_bin(detections.frame)
+            record.belief.miss_probability = 1.0
+            record.clear_viewpoints()
+        return presence
 
     def find_presence(
         self, record: ItemRecord, detections: Detections, observations: Sequence[Observation]
@@ -170,7 +188,8 @@ class BinContents:
         missing_count = len(distances) - len(confident)
         for item, distance in distances.items():
             if distance > self.config.gate >= self.measure_slot_distance(item, alike):
-                distances[item], missing_count = 0.0, missing_count - 1
+                distances[item] = 0.0
+                missing_count -= 1
         rank = sorted(distances, key=distances.__getitem__, reverse=True).index(record)
         if rank >= missing_count:
             return Presence.PRESENT
@@ -193,7 +212,8 @@ def update_bin_log_odds(
     `has_additional_object` is True if the look shows more objects of the item's class in the bin than the
     ledger knows.
     """
-    miss_rate, false_positive_rate = rates.miss_rate, rates.false_detections * BIN_AREA_FRACTION
-    likelihood_ratio = (1.0 - miss_rate) / false_positive_rate if has_additional_object else miss_rate
+    likelihood_ratio = rates.miss_rate
+    if has_additional_object:
+        likelihood_ratio = (1.0 - rates.miss_rate) / (rates.false_detections * BIN_AREA_FRACTION)
     log_odds = record.bin_log_odds[bin_name] + math.log(likelihood_ratio)
     record.bin_log_odds[bin_name] = max(0.0, log_odds)

@@ -45,15 +45,19 @@ class Coverage:
     probability of an object at the point. A look multiplies the values of the searched points by the miss
     rate of the detector. A change of the table that may have moved an object to a point resets the value.
 
+    Changes are numbered from 1. The parameter `change_count` of a method is the number of changes before a
+    look; later changes may have moved objects.
+
     Args:
         table: The workspace.
     """
 
     def __init__(self, table: TableConfig) -> None:
-        (x_min, x_max), (y_min, y_max) = table.x, table.y
-        xs = np.arange(x_min - GRID_MARGIN, x_max + GRID_MARGIN + GRID_PITCH / 2, GRID_PITCH)
-        ys = np.arange(y_min - GRID_MARGIN, y_max + GRID_MARGIN + GRID_PITCH / 2, GRID_PITCH)
-        self._min_xy, self._max_xy = np.array([x_min, y_min]), np.array([x_max, y_max])
+        self._min_xy, self._max_xy = np.array([table.x, table.y]).T
+        low = self._min_xy - GRID_MARGIN
+        high = self._max_xy + GRID_MARGIN + GRID_PITCH / 2
+        xs = np.arange(low[0], high[0], GRID_PITCH)
+        ys = np.arange(low[1], high[1], GRID_PITCH)
         self._points = np.array([(x, y, POINT_HEIGHT) for x in xs for y in ys])
         self._workspace_mask = self._find_points_inside(self._points, 0.0)
         inside_mask = self._find_points_inside(self._points, WORKSPACE_TOLERANCE)
@@ -71,6 +75,13 @@ class Coverage:
         self._full_look_count = 0
         self._last_full_look_numbers = np.full(len(self._points), -RECENT_FULL_LOOK_COUNT)
         """Number of the last look at the whole image that showed each point `(N,)`."""
+        self._changes: list[tuple[Array, float]] = []
+        """Centre `(3,)` [m] and radius [m] of each change; the radius is infinite for the whole table."""
+
+    @property
+    def change_count(self) -> int:
+        """Number of changes of the table so far."""
+        return len(self._changes)
 
     def update(self, look: Detections, uncertain_positions: Sequence[Array] = ()) -> None:
         """Update the miss probabilities of the points that a look searched.
@@ -98,13 +109,33 @@ class Coverage:
             in_area_mask = look.frame.compute_area_mask(self._points, look.area, BORDER_WIDTH)
             self._last_full_look_numbers[visible_mask & in_area_mask] = self._full_look_count
 
-    def reset_near(self, centre: Array, radius: float, change_number: int) -> None:
-        """Reset the points within `radius` [m] of `centre` `(3,)` [m] after a change of the table."""
+    def record_change(self, centre: Array, radius: float) -> None:
+        """Record that objects within `radius` [m] of `centre` `(3,)` [m] may have been moved."""
+        self._changes.append((centre, radius))
         near_mask = self._compute_distances(centre) <= radius
         self._miss_probabilities[near_mask] = self._initial_values[near_mask]
-        self._last_change_numbers[near_mask] = change_number
+        self._last_change_numbers[near_mask] = self.change_count
         for searched_mask in self._searched_masks.values():
             searched_mask[near_mask] = False
+
+    def is_unmoved(self, record: ItemRecord) -> bool:
+        """Return True if no change after the last detection of an item may have moved the item."""
+        return self.is_unchanged(record.position, record.change_count)
+
+    def is_unchanged(self, position: Array, change_count: int) -> bool:
+        """Return True if no change after `change_count` may have moved an object at `position` `(3,)` [m]."""
+        return self.find_change_number(position, change_count) is None
+
+    def find_change_number(self, position: Array, change_count: int) -> int | None:
+        """Return the number of the first change after `change_count` near `position` `(3,)` [m], or None."""
+        for number, (centre, radius) in enumerate(self._changes[change_count:], change_count + 1):
+            if float(np.linalg.norm(centre[:2] - position[:2])) <= radius:
+                return number
+        return None
+
+    def is_table_unchanged(self, change_count: int) -> bool:
+        """Return True if no change after `change_count` concerns the whole table."""
+        return all(math.isfinite(radius) for _, radius in self._changes[change_count:])
 
     def find_miss_probability(self, position: Array) -> float:
         """Return the probability that looks have missed an object at `position` `(3,)` [m]."""
@@ -154,42 +185,3 @@ class Coverage:
         xy = points[:, :2]
         inside_mask = (self._min_xy - margin <= xy) & (xy <= self._max_xy + margin)
         return np.asarray(inside_mask.all(axis=1))
-
-
-class Staleness:
-    """Changes of the table in chronological order, numbered from 1.
-
-    The parameter `change_count` is the number of changes before a look; later changes may have moved objects.
-    """
-
-    def __init__(self) -> None:
-        self._changes: list[tuple[Array, float]] = []
-        """Centre `(3,)` [m] and radius [m] of each change; the radius is infinite for the whole table."""
-
-    @property
-    def change_count(self) -> int:
-        """Number of changes so far."""
-        return len(self._changes)
-
-    def record_change(self, centre: Array, radius: float) -> None:
-        """Record that objects within `radius` [m] of `centre` `(3,)` [m] may have been moved."""
-        self._changes.append((centre, radius))
-
-    def is_unmoved(self, record: ItemRecord) -> bool:
-        """Return True if no change after the last detection of an item may have moved the item."""
-        return self.is_unchanged(record.position, record.change_count)
-
-    def is_unchanged(self, position: Array, change_count: int) -> bool:
-        """Return True if no change after `change_count` may have moved an object at `position` `(3,)` [m]."""
-        return self.find_change_number(position, change_count) is None
-
-    def find_change_number(self, position: Array, change_count: int) -> int | None:
-        """Return the number of the first change after `change_count` near `position` `(3,)` [m], or None."""
-        for number, (centre, radius) in enumerate(self._changes[change_count:], change_count + 1):
-            if float(np.linalg.norm(centre[:2] - position[:2])) <= radius:
-                return number
-        return None
-
-    def is_table_unchanged(self, change_count: int) -> bool:
-        """Return True if no change after `change_count` concerns the whole table."""
-        return all(math.isfinite(radius) for _, radius in self._changes[change_count:])

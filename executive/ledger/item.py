@@ -12,7 +12,7 @@ import numpy as np
 
 from executive.cell.frame import Frame, Observation
 from executive.cell.json_values import round_values
-from executive.cell.objects import Item, KnownItem, Target
+from executive.cell.objects import Item, Target
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
@@ -157,34 +157,24 @@ class ItemRecord:
             self.belief.look_count, self.failed_pick_count, self.bin, self.reason,
         )  # fmt: skip
 
-    def make_known_item(self, *, is_skipped: bool, attempts: int) -> KnownItem:
-        """Return the item for skills; `is_skipped`: the mission does not sort the class any more.
-
-        `attempts` is the number of failed attempts to pick the object at the position of the item.
-        """
-        state = self.state.value
-        if self.state is State.DROPPED:
-            state = State.REJECTED.value if self.reason else State.LOST.value
-        elif self.state is State.SEEN:
-            state = State.SKIPPED.value if is_skipped else "deferred" if self.deferral_rank else "open"
-        return KnownItem(
-            self.item, self.label, state, self.bin, self.position, attempts, self.drop_count,
-            self.deferral_count, self.deferral_rank,
-        )  # fmt: skip
-
     def distance_to(self, position: Array) -> float:
         """Return the distance [m] of the item from a position `(3,)` [m]."""
         return float(np.linalg.norm(self.position - position))
 
     def set_state(self, state: State, reason: str) -> None:
         """Set the state and its reason."""
-        self.state, self.reason = state, reason
+        self.state = state
+        self.reason = reason
 
     def mark_as_taken_away(self, change_count: int) -> None:
         """Set the item to DROPPED, because looks showed that it left its place on the table or in a bin."""
         if self.state is State.PLACED:
-            self.bin, self.reason, self.slot = "", "", None
-        self.state, self.was_taken_away, self.change_count = State.DROPPED, True, change_count
+            self.bin = ""
+            self.reason = ""
+            self.slot = None
+        self.state = State.DROPPED
+        self.was_taken_away = True
+        self.change_count = change_count
         self.bin_log_odds.clear()
         self.belief.miss_probability = 1.0
         self.clear_viewpoints()
@@ -193,7 +183,8 @@ class ItemRecord:
         """Clear the looks by viewpoint, and the counts of repeats and contradictions, which are obsolete."""
         self.belief.last_label_by_viewpoint.clear()
         self.belief.miss_count_by_viewpoint.clear()
-        self.belief.repeat_count = self.contradiction_count = 0
+        self.belief.repeat_count = 0
+        self.contradiction_count = 0
 
     def update_position(self, position: Array, std: float, *, is_unmoved: bool) -> None:
         """Set the position to a measurement or, if the item is unmoved, to the weighted mean of positions.
@@ -206,13 +197,15 @@ class ItemRecord:
         if self.distance_to(position) > SAME_POSITION_TOLERANCE:
             self.empty_probe_count = 0
         if is_unmoved and math.isfinite(self.standard_error):
-            old_weight, new_weight = self.standard_error**-2, std**-2
+            old_weight = self.standard_error**-2
+            new_weight = std**-2
             weight = old_weight + new_weight
             self.position = np.asarray((self.position * old_weight + position * new_weight) / weight)
             self.standard_error = weight**-0.5
         else:
             self.was_detected_after_move = math.isfinite(self.standard_error)
-            self.position, self.standard_error = position, std
+            self.position = position
+            self.standard_error = std
         if not self.was_detected_after_move:
             self.first_position = self.position
         self.belief.miss_probability = 1.0
@@ -224,8 +217,16 @@ class ItemRecord:
         if the item cannot have moved since its last detection.
         """
         self.update_position(observation.position, observation.std, is_unmoved=is_unmoved)
-        self.bias_std, self.confidence = bias_std, observation.detection.confidence
-        self.change_count, self.frame_id, self.stamp = frame.change_count, frame.id, frame.stamp
+        self.bias_std = bias_std
+        self.confidence = observation.detection.confidence
+        self.change_count = frame.change_count
+        self.frame_id = frame.id
+        self.stamp = frame.stamp
+
+    def mark_as_detected_in_bin(self, frame: Frame) -> None:
+        """Record that a frame shows the placed item in its bin."""
+        self.stamp = frame.stamp
+        self.was_detected_in_bin = True
 
     def merge(self, new_item: ItemRecord, max_class_error: float) -> None:
         """Add the evidence and the position of `new_item`, which is the same object after a move.
@@ -244,12 +245,16 @@ class ItemRecord:
         self.empty_probe_count = 0
         self.was_taken_away = False
         # `first_position` stays the position before the move.
-        self.position, self.standard_error = new_item.position, new_item.standard_error
         self.was_detected_after_move = True
-        self.change_count, self.frame_id = new_item.change_count, new_item.frame_id
-        self.stamp, self.confidence = new_item.stamp, new_item.confidence
+        self.position = new_item.position
+        self.standard_error = new_item.standard_error
+        self.change_count = new_item.change_count
+        self.frame_id = new_item.frame_id
+        self.stamp = new_item.stamp
+        self.confidence = new_item.confidence
         if self.state is State.PHANTOM:
-            self.belief.log_odds, self.reason = new_item.belief.log_odds, ""
+            self.belief.log_odds = new_item.belief.log_odds
+            self.reason = ""
         if self.state in (State.DROPPED, State.PHANTOM):
             self.state = State.REJECTED if self.reason else State.SEEN
 
@@ -286,16 +291,24 @@ class ItemRecords:
         return [record for record in self if record.state in states]
 
     def add(
-        self, belief: Belief, position: Array, change_count: int, stamp: float, *, was_place_empty: bool
+        self,
+        belief: Belief,
+        position: Array,
+        frame: Frame,
+        *,
+        was_place_empty: bool,
+        was_place_searched: bool,
     ) -> ItemRecord:
         """Add an item with the name `<class>-<number>` and return its record.
 
-        `position` `(3,)` [m], `change_count` and `stamp` [s] are values of the first detection.
+        `position` `(3,)` [m] and `frame` are values of the first detection.
         """
         label = belief.first_label
         self._name_counts[label] += 1
         name = f"{label}-{self._name_counts[label]}"
-        self._records[name] = ItemRecord(name, belief, position, change_count, stamp, was_place_empty)
+        self._records[name] = ItemRecord(
+            name, belief, position, frame.change_count, frame.stamp, was_place_empty, was_place_searched
+        )
         return self._records[name]
 
     def remove(self, record: ItemRecord) -> None:
@@ -314,11 +327,6 @@ class ItemRecords:
 
     def set_placed(self, record: ItemRecord, bin_name: str) -> None:
         """Set the state of an item to PLACED in a bin, and emit the item."""
-        record.bin, record.was_taken_away = bin_name, False
+        record.bin = bin_name
+        record.was_taken_away = False
         self.change_state(record, State.PLACED)
-
-    def reject(self, record: ItemRecord, reason: str) -> None:
-        """Reject an item; a held or dropped item keeps its state until a look shows the item on the table."""
-        record.reason = f"{reason}: {record.last_contradiction}" if record.last_contradiction else reason
-        is_off_table = record.state in (State.HELD, State.DROPPED)
-        self.change_state(record, record.state if is_off_table else State.REJECTED)

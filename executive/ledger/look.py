@@ -19,7 +19,7 @@ from executive.cell.json_values import round_values
 from executive.events import DetectedObject, FrameSearched
 from executive.geometry import Array
 from executive.ledger.belief import ITEM_AREA_FRACTION, Belief, make_viewpoint_key
-from executive.ledger.coverage import Coverage, Staleness
+from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, ItemRecords, State
 from executive.ledger.outcomes import MIN_EXISTENCE_PROBABILITY, Certainty
 
@@ -34,7 +34,7 @@ MAX_MISS_PROBABILITY_OF_MOVED_ITEM = 0.05
 
 
 def associate(
-    observations: Iterable[Observation], records: Sequence[ItemRecord], staleness: Staleness, gate: float
+    observations: Iterable[Observation], records: Sequence[ItemRecord], coverage: Coverage, gate: float
 ) -> dict[Observation, ItemRecord]:
     """Return the item of each observation that shows a known item.
 
@@ -44,7 +44,7 @@ def associate(
     Args:
         observations: Confident observations on the table.
         records: Items on the table.
-        staleness: Record of the actions of the robot that may have moved objects.
+        coverage: Changes of the table by the robot.
         gate: Lower bound of the gating distance (`compute_association_distance`) [m].
     """
     pairs = []
@@ -53,7 +53,7 @@ def associate(
             distance = record.distance_to(observation.position)
             if distance <= compute_association_distance(record, observation, gate):
                 is_other_class = record.detected_label != observation.detection.label
-                rank = (not staleness.is_unmoved(record), is_other_class, distance)
+                rank = (not coverage.is_unmoved(record), is_other_class, distance)
                 pairs.append((rank, observation, record))
     matches: dict[Observation, ItemRecord] = {}
     for _, observation, record in sorted(pairs, key=lambda pair: pair[0]):
@@ -81,7 +81,7 @@ def may_show_item(observation: Observation, record: ItemRecord, gate: float) -> 
 
 
 def find_moved_item(
-    new_item: ItemRecord, records: Iterable[ItemRecord], staleness: Staleness, certainty: Certainty
+    new_item: ItemRecord, records: Iterable[ItemRecord], coverage: Coverage, certainty: Certainty
 ) -> ItemRecord | None:
     """Return the item that may have been dropped or moved to the position of a new item, or None.
 
@@ -94,7 +94,7 @@ def find_moved_item(
         or new_item.belief.existence_probability < MIN_EXISTENCE_PROBABILITY
     ):
         return None
-    candidates = [item for item in records if _may_be_same_object(item, new_item, staleness, certainty)]
+    candidates = [item for item in records if _may_be_same_object(item, new_item, coverage, certainty)]
 
     def make_sort_key(item: ItemRecord) -> tuple[bool, float]:
         return item.state is not State.DROPPED, _compute_horizontal_distance(item, new_item)
@@ -109,7 +109,7 @@ def find_duplicate(record: ItemRecord, records: Iterable[ItemRecord], gate: floa
 
 
 def _may_be_same_object(
-    old_item: ItemRecord, new_item: ItemRecord, staleness: Staleness, certainty: Certainty
+    old_item: ItemRecord, new_item: ItemRecord, coverage: Coverage, certainty: Certainty
 ) -> bool:
     """Return True if a new item may be the same object as an old item that recent images no longer show.
 
@@ -125,7 +125,7 @@ def _may_be_same_object(
         return False
     if old_item.state is State.DROPPED:
         return new_item.was_place_searched and new_item.first_stamp > old_item.stamp
-    change_number = staleness.find_change_number(old_item.position, old_item.change_count)
+    change_number = coverage.find_change_number(old_item.position, old_item.change_count)
     may_be_moved_by_robot = change_number is not None and new_item.first_change_count >= change_number
     may_be_moved_by_person = (
         _compute_horizontal_distance(old_item, new_item) <= MAX_PUSH_DISTANCE
@@ -146,7 +146,6 @@ def _may_be_same_object(
 
 
 def _compute_horizontal_distance(record: ItemRecord, other_record: ItemRecord) -> float:
-    """Return the horizontal distance between two items [m]."""
     return float(np.linalg.norm((record.position - other_record.position)[:2]))
 
 
@@ -156,19 +155,20 @@ EXPECTED_OBJECT_COUNT = 3.0
 
 def make_look_event(look: Detections, observations: Sequence[Observation]) -> FrameSearched:
     """Return the event of a look; `observations` are the localized detections."""
-    confident_objects = [_make_detected_object(entry) for entry in observations if entry.is_confident]
-    doubtful_objects = [_make_detected_object(entry) for entry in observations if not entry.is_confident]
-    frame, unknown_labels = look.frame, [detection.label for detection in look.unknown]
     return FrameSearched(
-        frame.id, frame.camera, look.detector, look.view, confident_objects, doubtful_objects, unknown_labels
-    )
+        look.frame.id, look.frame.camera, look.detector, look.view,
+        confident=[_make_detected_object(entry) for entry in observations if entry.is_confident],
+        doubtful=[_make_detected_object(entry) for entry in observations if not entry.is_confident],
+        unknown_labels=[detection.label for detection in look.unknown],
+    )  # fmt: skip
 
 
 def _make_detected_object(observation: Observation) -> DetectedObject:
-    """Return the recorded values of an observation, rounded."""
-    detection, position = observation.detection, round_values(observation.position, 4)
-    confidence, box = round(detection.confidence, 4), round_values(detection.box, 2)
-    return DetectedObject(detection.label, confidence, box, position, observation.contradiction)
+    detection = observation.detection
+    return DetectedObject(
+        detection.label, round(detection.confidence, 4), round_values(detection.box, 2),
+        round_values(observation.position, 4), observation.contradiction,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -178,15 +178,13 @@ class LookUpdate:
     Attributes:
         certainty: Decisions about items, with the thresholds of the ledger.
         records: All items; `apply` adds new items.
-        coverage: Miss probabilities of the grid points on the table; `apply` updates them.
-        staleness: Actions of the robot that may have moved objects on the table.
+        coverage: Changes of the table, and miss probabilities of its grid points; `apply` updates these.
         look: Detections in the image of the look.
     """
 
     certainty: Certainty
     records: ItemRecords
     coverage: Coverage
-    staleness: Staleness
     look: Detections
 
     @property
@@ -215,18 +213,20 @@ class LookUpdate:
 
     def _is_unmoved_since_capture(self, position: Array) -> bool:
         """Return True if no object at `position` `(3,)` [m] may have been moved since the capture."""
-        return self.staleness.is_unchanged(position, self.look.frame.change_count)
+        return self.coverage.is_unchanged(position, self.look.frame.change_count)
 
     def _update_detected_items(
         self, known_items: Sequence[ItemRecord], observations: Sequence[Observation]
     ) -> list[ItemRecord]:
         """Update known items with confident observations, add new items, and return the detected items."""
         # An object detected at the position of an improbable item that may have been moved is a new item.
-        rates, viewpoint, staleness = self.look.error_rates, make_viewpoint_key(self.look), self.staleness
-        candidates = [item for item in known_items if item.belief.is_probable or staleness.is_unmoved(item)]
-        matches = associate(observations, candidates, staleness, self.config.gate)
+        rates = self.look.error_rates
+        viewpoint = make_viewpoint_key(self.look)
+        is_unmoved = self.coverage.is_unmoved
+        candidates = [item for item in known_items if item.belief.is_probable or is_unmoved(item)]
+        matches = associate(observations, candidates, self.coverage, self.config.gate)
         unmatched_items = [record for record in candidates if record not in matches.values()]
-        moved_items = [item for item in unmatched_items if not staleness.is_unmoved(item)]
+        moved_items = [item for item in unmatched_items if not is_unmoved(item)]
         moved_items += self.records.filter_by_state(State.DROPPED)
         detected_items = []
         for observation in observations:
@@ -238,13 +238,12 @@ class LookUpdate:
             record = matches.get(observation) or self._add_item(observation, prior_odds)
             if record.reason.startswith(REASON_UNCERTAIN) and not record.failed_pick_count:
                 record.set_state(State.SEEN, "")
-            is_unmoved = staleness.is_unmoved(record)
-            if not is_unmoved:
+            if not is_unmoved(record):
                 record.clear_viewpoints()
             label = observation.detection.label
             is_ambiguous = self._may_show_any_item(observation, unmatched_items)
             record.belief.add_detection(label, rates, viewpoint, is_ambiguous=is_ambiguous)
-            record.store(observation, self.look.frame, rates.bias, is_unmoved=is_unmoved)
+            record.store(observation, self.look.frame, rates.bias, is_unmoved=is_unmoved(record))
             detected_items.append(record)
         return detected_items
 
@@ -300,7 +299,7 @@ class LookUpdate:
         """
         phantoms = []
         for index, new_item in enumerate(detected_items):
-            if known_item := find_moved_item(new_item, self.records, self.staleness, self.certainty):
+            if known_item := find_moved_item(new_item, self.records, self.coverage, self.certainty):
                 known_item.merge(new_item, self.config.max_class_error)
                 detected_items[index] = known_item
                 if new_item.first_stamp == new_item.stamp:
@@ -321,24 +320,21 @@ class LookUpdate:
         return duplicates
 
     def _make_certainty_key(self, record: ItemRecord) -> tuple[bool, bool, int]:
-        """Return a key that sorts items from uncertain to certain."""
-        return record.belief.is_confirmed, self.staleness.is_unmoved(record), record.belief.look_count
+        return record.belief.is_confirmed, self.coverage.is_unmoved(record), record.belief.look_count
 
     def _add_item(self, observation: Observation, prior_odds: float) -> ItemRecord:
         """Add a new item; `prior_odds` are the prior odds that the item exists."""
-        belief, frame = Belief(observation.detection.label, math.log(prior_odds)), self.look.frame
+        belief = Belief(observation.detection.label, math.log(prior_odds))
         position = observation.position
         was_place_empty = self.coverage.find_miss_probability(position) <= self.config.max_miss_probability
-        record = self.records.add(
-            belief, position, frame.change_count, frame.stamp, was_place_empty=was_place_empty
-        )
-        record.was_place_searched = self.coverage.was_searched(position)
-        return record
+        return self.records.add(
+            belief, position, self.look.frame, was_place_empty=was_place_empty,
+            was_place_searched=self.coverage.was_searched(position),
+        )  # fmt: skip
 
     def _compute_expected_count(self, observation: Observation) -> float:
         """Return the expected number of objects at an observed position that earlier looks have missed."""
         return EXPECTED_OBJECT_COUNT * self.coverage.find_miss_probability(observation.position)
 
     def _may_show_any_item(self, observation: Observation, records: Sequence[ItemRecord]) -> bool:
-        """Return True if an observation may show one of the items in `records`."""
         return any(may_show_item(observation, record, self.config.gate) for record in records)

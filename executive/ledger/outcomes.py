@@ -23,6 +23,9 @@ MIN_LOOKS_TO_REJECT = 40
 """Minimum number of looks at an item that is rejected because the looks disagree about its class."""
 MIN_CONTRADICTIONS_TO_REJECT = 3
 """Minimum number of looks that contradict the class (`ItemRecord.contradiction_count`) of a rejected item."""
+MIN_LOG_RATIO_OF_WEIGHT = math.log(0.01)
+"""Minimum log likelihood ratio of a weight that agrees with a class, against objects of no declared class. At
+the minimum, the class and an undeclared class (prior odds 0.01) are equally probable."""
 MIN_REPEATS_FOR_SATURATION = 2
 """Number of repeated classes after which more looks from a viewpoint add hardly any evidence."""
 MAX_CLASS_ERROR_FOR_TOUCH = 0.2
@@ -73,6 +76,12 @@ class Certainty:
             max_error = MAX_CLASS_ERROR_FOR_TOUCH
         return record.belief.class_error <= max_error
 
+    def is_class_certain_by_weight(self, record: ItemRecord) -> bool:
+        """Return True if the class of an item is certain according to its last weighing."""
+        belief = record.belief
+        fits = belief.weight_log_ratios.get(belief.label, -math.inf) >= MIN_LOG_RATIO_OF_WEIGHT
+        return fits and belief.class_error <= self.config.max_class_error
+
     def may_be_on_table(self, record: ItemRecord) -> bool:
         """Return True if an item in the state SEEN may still lie on the table."""
         may_exist = record.belief.existence_probability > self.config.max_miss_probability
@@ -111,13 +120,27 @@ class Certainty:
             # A rejected item counts as existing, so that the end of the run does not discard it as a phantom.
             belief.log_odds = max(belief.log_odds, 0.0)
 
-    def register_low_touch(self, record: ItemRecord) -> bool:
-        """Count a touch below the height of the class; return False if the touch contradicts the class.
+    def add_touch(self, record: ItemRecord, contradiction: str, *, may_have_missed_top: bool) -> bool:
+        """Update an item with a touch; return False if the height of the touch contradicts the class.
 
-        The first low touch is no contradiction if the looks prove the class: the cup may have missed the top.
+        After a touch at the height of the class, other heights are no contradiction, because the item may
+        have tipped over. The first touch that may have missed the top is no contradiction if the looks prove
+        the class.
         """
-        record.low_touch_count += 1
-        return record.low_touch_count == 1 and record.belief.class_error <= self.config.max_class_error
+        record.belief.is_confirmed = True
+        record.had_contact = True
+        record.empty_probe_count = 0
+        if not contradiction:
+            record.touched_label = record.label
+            record.low_touch_count = 0
+        if record.touched_label == record.label:
+            return True
+        if may_have_missed_top:
+            record.low_touch_count += 1
+            if record.low_touch_count == 1 and record.belief.class_error <= self.config.max_class_error:
+                return True
+        record.last_contradiction = contradiction
+        return False
 
     def _needs_other_viewpoint(self, record: ItemRecord) -> bool:
         """Return True if only looks from a second viewpoint can prove the class of an item."""

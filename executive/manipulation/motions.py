@@ -10,7 +10,7 @@ import numpy as np
 
 from executive.cell.arm import Arm, Goal, Motion, Task
 from executive.cell.frame import Detections, Observation
-from executive.cell.objects import Item, Load, Target
+from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Crowded, NoDepth, Unavailable, Unreachable
 from executive.geometry import GRAVITY, Array
@@ -212,7 +212,7 @@ def make_task(cell: Cell) -> Task:
 def make_transport_task(cell: Cell, item: Item) -> Task:
     """Return the task of a motion with `item` as the load, and with all other objects as obstacles."""
     object_class = cell.classes[cell.ledger.get_label(item)]
-    return Task(Load(object_class, cell.tool.holding_force), list_obstacles(cell, item))
+    return Task(object_class, cell.tool.holding_force, list_obstacles(cell, item))
 
 
 def detect_and_record_drop(cell: Cell, item: Item) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import NECK_LENGTH, TOOL_RADIUS, CellConfig
-from executive.cell.objects import BIN_THICKNESS, Load, Obstacle
+from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
 from executive.motion.arms import SAMPLING_MARGIN
@@ -54,14 +54,14 @@ class Discs(NamedTuple):
     min_cosine: float
 
 
-def make_tool_discs(config: CellConfig, load: Load | None) -> Discs:
+def make_tool_discs(config: CellConfig, load: ObjectClass | None) -> Discs:
     """Return the discs of the tool and its load."""
     if load is None:
         radii = np.array([config.tool.cup_radius, TOOL_RADIUS])
         return Discs(np.array([0.0, -NECK_LENGTH]), radii, MIN_COSINE_UNLOADED)
-    load_radius = load.object_class.radius + load.object_class.contact_radius + POSITION_TOLERANCE
+    load_radius = load.radius + load.contact_radius + POSITION_TOLERANCE
     # The load has a disc at its bottom and one at its top, because the tool may tilt.
-    offsets = np.array([load.object_class.height, 0.0, -NECK_LENGTH])
+    offsets = np.array([load.height, 0.0, -NECK_LENGTH])
     return Discs(offsets, np.array([load_radius, load_radius, TOOL_RADIUS]), MIN_COSINE_LOADED)
 
 

@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from executive.cell.objects import MIN_LIFT_ACCELERATION, SAFETY_FACTOR, Load
+from executive.cell.objects import MIN_LIFT_ACCELERATION, SAFETY_FACTOR, ObjectClass
 from executive.cell.protocols import STEP
 from executive.geometry import GRAVITY, Array
 from executive.motion.clearance_model import ClearanceModel, NearestPairs
@@ -66,11 +66,11 @@ class PayloadLimit:
         max_lift_acceleration: Maximum upward acceleration [m/s²].
     """
 
-    def __init__(self, load: Load, kinematics: Kinematics) -> None:
+    def __init__(self, load: ObjectClass, holding_force: float, kinematics: Kinematics) -> None:
         # Maximum of |a + g| [m/s²].
-        self._max_specific_force = load.holding_force / SAFETY_FACTOR / load.object_class.mass
+        self._max_specific_force = holding_force / SAFETY_FACTOR / load.mass
         self.max_lift_acceleration = max(self._max_specific_force - GRAVITY, MIN_LIFT_ACCELERATION)
-        self._centre_offset = load.object_class.height / 2
+        self._centre_offset = load.height / 2
         self._kinematics = kinematics
 
     def find_acceleration_fraction(self, trajectory: Trajectory) -> float:

@@ -93,7 +93,7 @@ class MotionSearch:
         tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, end_tcp_and_axis, strict=True))
         clearance = ClearanceModel(config, task.obstacles, tcps[:, :2], discs)
         clearance.relax_end_margins(tcps, axes)
-        payload = PayloadLimit(task.load, kinematics) if task.load else None
+        payload = PayloadLimit(task.load, task.holding_force, kinematics) if task.load else None
         self._departure = departure = self._plan_departure(start, float(tcps[0, 2]), payload)
         free_start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
         self.problem = MotionProblem(free_start, Connector(limits), kinematics, clearance, payload)

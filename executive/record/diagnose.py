@@ -10,11 +10,11 @@ from pathlib import Path, PurePath
 from executive.errors import RecordLost
 from executive.events import RunEnded
 from executive.mission.load import LoadedMission
-from executive.record.diagnosis import Diagnosis, FailureNode, LostItem
+from executive.record.diagnosis import Diagnosis, FailureNode
 from executive.record.picture_recorder import find_picture
 from executive.record.result import is_resumable
 from executive.record.run_directory import RunDirectory
-from executive.record.timeline import ItemHistory, Look, Sighting, Timeline, get_skill_name
+from executive.record.timeline import Look, Timeline, get_skill_name
 from executive.tree.node import Advice, ControlNode, PropagatedFailure, load_control_nodes
 from executive.tree.specification import Node, Reason, SkillNode, SubtreeNode
 
@@ -45,7 +45,6 @@ def diagnose(
     is_skill = isinstance(node, SkillNode)
     node_name = run.format_skill_name(end.node) if is_skill else node.path_name if node else ""
     items = timeline.items.find_items_in_states("seen", "dropped", "held")
-    labels = {name: item.last_change.label for name, item in items.items() if name not in run.lost_items}
     # The last line of a traceback is `module.RecordLost: message`.
     is_record_lost = f".{RecordLost.__name__}: " in timeline.traceback
     return Diagnosis(
@@ -62,9 +61,11 @@ def diagnose(
             if entry.explanation or entry is run.failure_path[-1]
         ],
         last_look=run.find_last_look(),
-        lost_items=[_make_lost_item(name, item) for name, item in run.lost_items.items()],
+        lost_items=[timeline.items.histories[name] for name in run.lost_items],
         halted_skills=[run.format_skill_name(path) for path in run.halted_skills],
-        unsorted_items=[name for name, label in labels.items() if label in loaded.routes],
+        unsorted_items=[
+            name for name, last in items.items() if name not in run.lost_items and last.label in loaded.routes
+        ],
         arm_state=arm_state,
         held_item=end.held_item,
         raised_at=_find_exception_location(timeline.traceback),
@@ -101,7 +102,7 @@ class _FailedRun:
 
     Attributes:
         failure_path: Nodes from the root to the origin of the failure; empty if no node of the tree failed.
-        lost_items: History of the items whose loss made the run fail, by name of the item.
+        lost_items: Last changes of the items whose loss made the run fail, by name of the item.
         deciding_activation: Last activation of the node that determined the status, or None.
         deciding_node: Node of the mission that determined the status, or None.
         halted_skills: Paths of the skills that the end of the run or `deciding_node` halted.
@@ -109,15 +110,17 @@ class _FailedRun:
     """
 
     def __init__(self, loaded: LoadedMission, timeline: Timeline, end: RunEnded) -> None:
-        self.loaded, self.timeline, self.end = loaded, timeline, end
+        self.loaded = loaded
+        self.timeline = timeline
+        self.end = end
         is_failure = end.status == "FAILURE"
         nodes = _find_nodes_on_path(loaded.tree, end.node)
         self.failure_path = _trace_failure(nodes, timeline, end) if is_failure else []
         # Lost items make a run fail after its tree has succeeded; then no node determined the status.
         self.lost_items = {
-            name: item
-            for name, item in timeline.items.by_name.items()
-            if is_failure and not end.node and item.last_change.state == "lost"
+            name: last
+            for name, last in timeline.items.changes.items()
+            if is_failure and not end.node and last.state == "lost"
         }
         self.deciding_activation = timeline.activation_by_path.get(end.node)
         self.deciding_node = nodes[-1] if nodes else None
@@ -155,17 +158,17 @@ class _FailedRun:
             return f"{self.format_skill_name(end.node)} failed ({reason}){attempt_text}: {end.message}"
         return f"{self.failure_path[-1].name}{attempt_text}: {end.message}{skills_text}"
 
-    def find_last_look(self) -> Sighting | Look | None:
+    def find_last_look(self) -> Look | None:
         """Return the last look in which `item` was detected; without such a look, the last look."""
-        item = self.timeline.items.by_name.get(self.item)
-        if item is None or item.sighting is None:
-            return self.timeline.items.look
-        return replace(item.sighting, attempts=item.last_change.attempts)
+        items = self.timeline.items
+        history = items.histories.get(self.item)
+        if history is None or history.look is None:
+            return items.look
+        return replace(history.look, attempts=items.changes[self.item].attempts)
 
     def find_picture_file(self, run_folder: Path) -> str:
         """Return the path of the picture of the failure, else of the last selection of the item, else ""."""
-        item = self.timeline.items.by_name.get(self.item)
-        failed = item.failure if self.lost_items and item is not None else self.deciding_activation
+        failed = self.timeline.failures.get(self.item) if self.lost_items else self.deciding_activation
         folder = RunDirectory(run_folder).pictures
         file = find_picture(folder, self.item, failed.reason if failed is not None else "")
         file = file or find_picture(folder, self.item, "")
@@ -219,14 +222,6 @@ def _format_source_location(node: Node) -> str:
     return f"{node.span.source.path}:{node.span.line}"
 
 
-def _make_lost_item(name: str, item: ItemHistory) -> LostItem:
-    failed = item.failure
-    failure = ""
-    if failed is not None:
-        failure = f"{get_skill_name(failed.node)}.{failed.reason} at {failed.end:.2f} s: {failed.message}"
-    return LostItem(name, item.sighting, item.unseen_look_count, item.pick_time, item.drop_time, failure)
-
-
 def _describe_arm(is_at_rest: Callable[[], bool]) -> str:
     try:
         return "at rest" if is_at_rest() else "it is not at rest after the command to brake"
@@ -267,9 +262,11 @@ def _list_advice(run: _FailedRun, arm_state: str, is_record_lost: bool) -> Itera
         yield CAMERA_ADVICE
     elif run.failure_path:
         yield f"to let the mission continue after {end.reason}: {', or '.join(_list_changes(run))}"
-    for name, item in run.lost_items.items():
-        place = "around ({:.2f}, {:.2f}) m".format(*item.last_change.position)
-        if item.drop_time is not None and (item.sighting is None or item.sighting.clock < item.drop_time):
+    for name, last in run.lost_items.items():
+        place = "around ({:.2f}, {:.2f}) m".format(*last.position)
+        history = run.timeline.items.histories[name]
+        dropped_at = history.dropped_at
+        if dropped_at is not None and (history.look is None or history.look.clock < dropped_at):
             place = "below the place where it was dropped"
         yield f"look for {name} by hand, {place}"
 

@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from executive.record.timeline import Look, Sighting
+from executive.record.timeline import ItemHistory, Look
 
 MAX_LINE_WIDTH = 110
 """Maximum length of a line [characters]."""
@@ -38,26 +38,6 @@ class FailureNode:
 
 
 @dataclass(frozen=True)
-class LostItem:
-    """Item that was lost.
-
-    Attributes:
-        item: Name of the item.
-        look: Last look (image with its detections) in which the item was detected, or None.
-        later_looks: Number of looks after `look`.
-        held_at, dropped_at: Times of the last pick and the last drop of the item [s], or None.
-        last_failure: Reason, time and message of the last failure of a skill that worked on the item, or "".
-    """
-
-    item: str
-    look: Sighting | None
-    later_looks: int
-    held_at: float | None
-    dropped_at: float | None
-    last_failure: str
-
-
-@dataclass(frozen=True)
 class Diagnosis:
     """Explanation of a run that did not succeed.
 
@@ -71,7 +51,7 @@ class Diagnosis:
         item: Name of the item of `node`, else of a halted skill, else of the first lost item; "" for none.
         passed_nodes: Failure path: nodes that did not handle the failure, from the root down, and the origin.
         last_look: Last look with a detection of `item`, else the last look of the run; None without a look.
-        lost_items: Items whose loss made the run fail.
+        lost_items: Histories of the items whose loss made the run fail.
         halted_skills: Names of the halted skills with their items: `Grasp of cube-1`.
         unsorted_items: Names of the unsorted items whose class has a bin.
         arm_state: `at rest`, or a text about the state of the arm.
@@ -91,8 +71,8 @@ class Diagnosis:
     node: FailureNode | None
     item: str
     passed_nodes: Sequence[FailureNode]
-    last_look: Sighting | Look | None
-    lost_items: Sequence[LostItem]
+    last_look: Look | None
+    lost_items: Sequence[ItemHistory]
     halted_skills: Sequence[str]
     unsorted_items: Sequence[str]
     arm_state: str
@@ -171,19 +151,19 @@ def wrap_lines(text: str, first_indent: str, other_indent: str, *, max_lines: in
     )  # fmt: skip
 
 
-def _format_look(look: Sighting | Look | None) -> str:
+def _format_look(look: Look | None) -> str:
     """Return image, detection and counts of the last look as text."""
     if look is None:
         return "none so far"
     image = f"frame {look.frame}, camera {look.camera}, by {look.detector}, at {look.clock:.2f} s"
-    if isinstance(look, Look):
+    if look.item is None:
         return f"{image}: {_format_count(look.found, 'object')}"
     detection = "" if look.confidence is None else f" as {look.label} {look.confidence:.2f}"
     counts = f"{_format_count(look.looks, 'look')}, {_format_count(look.attempts, 'failed attempt')} in all"
     return f"{look.item}{detection}{_format_position(look.position)}: {image}; {counts}"
 
 
-def _format_lost_item(item: LostItem) -> str:
+def _format_lost_item(item: ItemHistory) -> str:
     """Return last look, drop and last failure of a lost item as text."""
     text = item.item
     if item.look is not None:
@@ -198,5 +178,5 @@ def _format_position(position: Sequence[float] | None) -> str:
     return "" if position is None else " at ({:.3f}, {:.3f}, {:.3f}) m".format(*position)
 
 
-def _format_count(count: int, noun: str) -> str:
+def _format_count(count: int | None, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

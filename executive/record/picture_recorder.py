@@ -104,10 +104,10 @@ class PictureRecorder:
         elif isinstance(event, NodeEnded) and event.skill and event.status == "FAILURE":
             self._queue(timed, self._timeline.selections.get(event.item), event)
         elif isinstance(event, RunEnded):
-            for name, item in self._timeline.items.by_name.items():
-                label = item.last_change.label
-                if item.last_change.state == "rejected" and item.sighting and label in self._unknown_labels:
-                    self._queue(timed, TargetSelected(name, label, item.sighting.frame, ""), None)
+            for name, last in self._timeline.items.changes.items():
+                look = self._timeline.items.histories[name].look
+                if last.state == "rejected" and look and last.label in self._unknown_labels:
+                    self._queue(timed, TargetSelected(name, last.label, look.frame, ""), None)
         self._timeline(timed)
 
     def close(self, *, wait: bool = True) -> None:
@@ -142,8 +142,8 @@ class PictureRecorder:
         item = selection.item if selection else ""
         name = "_".join(filter(None, (f"{timed.tick:06d}", item, failure.reason if failure else "")))
         frame, look_event = look
-        history = self._timeline.items.by_name.get(item)
-        position = history.last_change.position if history else None
+        last = self._timeline.items.changes.get(item)
+        position = last.position if last else None
         selected_index = _find_selected_index(selection, look_event.confident, position)
         caption = _make_caption(timed.clock, frame, selection, failure)
         classes = tuple(self._timeline.items.classes)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 from executive import events
 from executive.events import DetectedObject, FrameSearched, ItemChanged
@@ -66,43 +67,34 @@ class Activation:
 class Look:
     """Look: camera image with the detections of one detector.
 
+    In the last look in which an item was detected, `found` is None, and the last six attributes describe the
+    item; otherwise these are None.
+
     Attributes:
         frame: Number of the frame.
         camera, detector: Names of the camera and of the detector.
         clock: Time of the look on the clock of the run [s].
         found: Number of confident detections.
-    """
-
-    frame: int
-    camera: str
-    detector: str
-    clock: float
-    found: int
-
-
-@dataclass(frozen=True)
-class Sighting:
-    """Detection of an item in a look.
-
-    Attributes:
-        frame, camera, detector, clock: Number of the frame, names of camera and detector, time [s].
         item: Name of the item.
         attempts: Number of failed attempts to pick the item.
         looks: Number of looks in which the item was detected, including this look.
-        label, confidence: Class and confidence of the detection nearest to the item, or None.
-        position: Position `(3,)` of the detection nearest to the item [m], or None.
+        label, confidence: Class and confidence of the detection nearest to the item.
+        position: Position `(3,)` of the detection nearest to the item [m].
     """
+
+    omits_none: ClassVar[bool] = True
 
     frame: int
     camera: str
     detector: str
     clock: float
-    item: str
-    attempts: int
-    looks: int
-    label: str | None
-    confidence: float | None
-    position: Sequence[float] | None
+    found: int | None = None
+    item: str | None = None
+    attempts: int | None = None
+    looks: int | None = None
+    label: str | None = None
+    confidence: float | None = None
+    position: Sequence[float] | None = None
 
 
 @dataclass
@@ -110,88 +102,89 @@ class ItemHistory:
     """History of one item.
 
     Attributes:
-        last_change: Last event that changed the item.
-        last_change_number: Sequence number of the item's last state change among those of all items.
-        state_change_time: Time of the item's last state change [s].
-        state_at_tree_end: State of the item at the end of the tree; the ledger sets final states afterwards.
-        sighting: Last look in which the item was detected, or None.
-        unseen_look_count: Number of looks after `sighting`.
-        pick_time, drop_time: Times of the last pick and the last drop of the item [s], or None.
-        failure: Last failed activation of a skill that worked on the item, or None.
+        item: Name of the item.
+        look: Last look in which the item was detected, or None.
+        later_looks: Number of looks after `look`.
+        held_at, dropped_at: Times of the last pick and the last drop of the item [s], or None.
+        last_failure: Reason, time and message of the last failure of a skill that worked on the item, or "".
     """
 
-    last_change: ItemChanged
-    last_change_number: int = 0
-    state_change_time: float = 0.0
-    state_at_tree_end: str = ""
-    sighting: Sighting | None = None
-    unseen_look_count: int = 0
-    pick_time: float | None = None
-    drop_time: float | None = None
-    failure: Activation | None = None
+    item: str
+    look: Look | None = None
+    later_looks: int = 0
+    held_at: float | None = None
+    dropped_at: float | None = None
+    last_failure: str = ""
 
 
 @dataclass
 class ItemsTimeline:
-    """History of all items, updated from the events of a run.
+    """Last changes and histories of all items, updated from the events of a run.
 
     Attributes:
-        by_name: History of each item by name, in the order of the first changes.
+        changes: Last change of each item by name, in the order of the first changes.
+        change_times: Time of the last change of the state of each item by name [s].
+        tree_end_states: State of each item by name at the end of the tree; final states follow later.
+        histories: History of each item by name.
         look: Last look, or None.
         classes: Detected classes as keys, in the order of their first detections.
-        _state_change_count: Number of state changes of all items.
         _detected_items: Names of the items that were detected in the current look.
     """
 
-    by_name: dict[str, ItemHistory] = field(default_factory=dict)
+    changes: dict[str, ItemChanged] = field(default_factory=dict)
+    change_times: dict[str, float] = field(default_factory=dict)
+    tree_end_states: dict[str, str] = field(default_factory=dict)
+    histories: dict[str, ItemHistory] = field(default_factory=dict)
     look: Look | None = None
     classes: dict[str, None] = field(default_factory=dict)
-    _state_change_count: int = 0
     _detected_items: list[str] = field(default_factory=list)
 
     def add_change(self, event: ItemChanged, clock: float, *, is_after_tree_end: bool) -> None:
         """Add a change of an item at the time `clock` [s]."""
-        item = self.by_name.get(event.item)
-        last_state, look_count = (item.last_change.state, item.last_change.looks) if item else ("", 0)
-        item = self.by_name.setdefault(event.item, ItemHistory(event))
-        if event.looks > look_count:
-            self._detected_items.append(event.item)
-        if event.state != last_state:
-            self._state_change_count += 1
-            item.last_change_number = self._state_change_count
-            item.state_change_time = clock
+        name = event.item
+        last = self.changes.get(name)
+        history = self.histories.setdefault(name, ItemHistory(name))
+        if event.looks > (last.looks if last else 0):
+            self._detected_items.append(name)
+        if last is None or event.state != last.state:
+            self.change_times[name] = clock
             if event.state == "held":
-                item.pick_time = clock
+                history.held_at = clock
             elif event.state == "dropped":
-                item.drop_time = clock
-        item.last_change = event
+                history.dropped_at = clock
+        self.changes[name] = event
         if not is_after_tree_end:
-            item.state_at_tree_end = event.state
+            self.tree_end_states[name] = event.state
 
     def add_look(self, event: FrameSearched, clock: float) -> None:
         """Add a look at the time `clock` [s], after `add_change` added the changes of all detected items."""
         self.look = Look(event.frame, event.camera, event.detector, clock, len(event.confident))
         # The colours follow the order of `classes`; sorting keeps them equal in most runs of a mission.
         self.classes |= dict.fromkeys(sorted(detection.label for detection in event.confident))
-        for item in self.by_name.values():
-            item.unseen_look_count += 1
+        for history in self.histories.values():
+            history.later_looks += 1
         for name in self._detected_items:
-            item = self.by_name[name]
-            item.sighting = _make_sighting(self.look, item.last_change, event.confident)
-            item.unseen_look_count = 0
+            history = self.histories[name]
+            history.look = _describe_item(self.look, self.changes[name], event.confident)
+            history.later_looks = 0
         self._detected_items.clear()
 
-    def find_items_in_states(self, *states: str) -> dict[str, ItemHistory]:
+    def find_items_in_states(self, *states: str) -> dict[str, ItemChanged]:
         """Return the items whose state at the tree's end is in `states`, except placed items and phantoms."""
         return {
-            name: item
-            for name, item in self.by_name.items()
-            if item.state_at_tree_end in states and item.last_change.state not in ("placed", "phantom")
+            name: last
+            for name, last in self.changes.items()
+            if self.tree_end_states.get(name) in states and last.state not in ("placed", "phantom")
         }
 
-    def list_items(self) -> list[ItemChanged]:
-        """Return the last event of each item, in the order of the first changes."""
-        return [item.last_change for item in self.by_name.values()]
+
+def _describe_item(look: Look, item: ItemChanged, detections: Sequence[DetectedObject]) -> Look:
+    """Return `look` with the values of an item and of the detection nearest to its position."""
+    look = replace(look, found=None, item=item.item, attempts=item.attempts, looks=item.looks)
+    if not detections:
+        return look
+    nearest = min(detections, key=lambda detection: math.dist(detection.position, item.position))
+    return replace(look, label=nearest.label, confidence=nearest.confidence, position=nearest.position)
 
 
 @dataclass
@@ -224,6 +217,7 @@ class Timeline:
         items: History of the items.
         selections: Last selection of each item as a target, by name of the item.
         selection_times: Time [s] and item of each selection of a target.
+        failures: Last failed activation of a skill that worked on an item, by name of the item.
         planning: Statistics of motion planning.
         question: Question to the operator that is not yet answered, or None.
         requests: Requests of the operator; None for the request to quit.
@@ -243,6 +237,7 @@ class Timeline:
     items: ItemsTimeline = field(default_factory=ItemsTimeline)
     selections: dict[str, events.TargetSelected] = field(default_factory=dict)
     selection_times: list[tuple[float, str]] = field(default_factory=list)
+    failures: dict[str, Activation] = field(default_factory=dict)
     planning: PlanningTotals = field(default_factory=PlanningTotals)
     question: events.OperatorAsked | None = None
     requests: list[str | None] = field(default_factory=list)
@@ -257,12 +252,14 @@ class Timeline:
         for timed in timed_events:
             timeline(timed)
         for running in timeline.find_running_activations():
-            running.end_tick, running.end = timeline.tick, timeline.clock
+            running.end_tick = timeline.tick
+            running.end = timeline.clock
         return timeline
 
     def __call__(self, timed: events.TimedEvent) -> None:
         """Add an event."""
-        self.tick, self.clock = timed.tick, timed.clock
+        self.tick = timed.tick
+        self.clock = timed.clock
         event = timed.event
         match event:
             case events.NodeStarted():
@@ -314,8 +311,10 @@ class Timeline:
             # A resumed run restarts the nodes that were running at the interruption.
             self._end_activation(interrupted, "INVALID")
         self._activation_count += 1
-        number, start = self._activation_count, (self.tick, self.clock)
-        activation = Activation(event.node, number, event.skill, event.item, "RUNNING", *start, *start)
+        activation = Activation(
+            event.node, self._activation_count, event.skill, event.item, "RUNNING",
+            self.tick, self.clock, self.tick, self.clock,
+        )  # fmt: skip
         self.activation_by_path[event.node] = activation
         self.halted_skills = ()
         if self.has_history:
@@ -326,17 +325,24 @@ class Timeline:
         if activation is None or activation.status != "RUNNING":
             return
         self._end_activation(activation, event.status)
-        activation.reason, activation.message = event.reason, event.message
+        activation.reason = event.reason
+        activation.message = event.message
         activation.item = event.item or activation.item
         if event.status != "INVALID":
-            activation.halted_skills, self.halted_skills = self.halted_skills, ()
+            activation.halted_skills = self.halted_skills
+            self.halted_skills = ()
         elif event.skill:
             self.halted_skills += (event.node,)
-        if event.skill and event.status == "FAILURE" and event.item in self.items.by_name:
-            self.items.by_name[event.item].failure = activation
+        if event.skill and event.status == "FAILURE":
+            self.failures[event.item] = activation
+            if history := self.items.histories.get(event.item):
+                skill = get_skill_name(event.node)
+                history.last_failure = f"{skill}.{event.reason} at {self.clock:.2f} s: {event.message}"
 
     def _end_activation(self, activation: Activation, status: str) -> None:
-        activation.status, activation.end_tick, activation.end = status, self.tick, self.clock
+        activation.status = status
+        activation.end_tick = self.tick
+        activation.end = self.clock
         self.end_counts.setdefault(activation.node, Counter())[status] += 1
 
     def _add_choice(self, event: events.BranchChosen) -> None:
@@ -373,11 +379,3 @@ def find_last_failure(activations: Sequence[Activation]) -> str:
 def get_skill_name(path: str) -> str:
     """Return the name or label of a skill from its path `.../name` or `.../key:name`."""
     return path.rpartition("/")[2].rpartition(":")[2]
-
-
-def _make_sighting(look: Look, item: ItemChanged, detections: Sequence[DetectedObject]) -> Sighting:
-    """Return the sighting of `item` with the detection nearest to its position."""
-    nearest = min(detections, key=lambda box: math.dist(box.position, item.position), default=None)
-    detection = (nearest.label, nearest.confidence, nearest.position) if nearest else (None, None, None)
-    look_fields = (look.frame, look.camera, look.detector, look.clock)
-    return Sighting(*look_fields, item.item, item.attempts, item.looks, *detection)

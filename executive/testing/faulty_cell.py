@@ -13,10 +13,10 @@ from typing import Any, Literal
 from executive.cell.arm import Motion
 from executive.cell.json_values import round_values
 from executive.cell.proxy import Access, intercept
-from executive.cell.workcell import CellWrapper, Workcell
+from executive.cell.workcell import CellWrapper, TrueObject, Workcell
 from executive.errors import Fault, InputError
 from executive.events import Emit, FaultInjected, NodeEnded, NodeStarted, TimedEvent, discard_event
-from executive.testing.oracle import TrueObject, WorldAccess
+from executive.testing.oracle import WorldAccess
 
 MAX_ITEM_POSITION_ERROR = 0.05
 """Maximum horizontal distance between the position of an item in the ledger and its true object [m]."""

@@ -12,7 +12,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -22,7 +22,7 @@ from executive.cell.device_config import CameraConfig
 from executive.cell.frame import Detection, Frame
 from executive.cell.objects import UNKNOWN_LABEL
 from executive.cell.protocols import Clock
-from executive.cell.workcell import Workcell, find_innermost_cell
+from executive.cell.workcell import TrueObject, Workcell, find_innermost_cell
 from executive.cells.fake import FakeCell
 from executive.cells.sim.camera import Image, SimCamera
 from executive.cells.sim.cell import SimCell
@@ -35,20 +35,6 @@ from executive.perception.detectors.requests import PendingSearch
 
 ORACLE_CONFIDENCE = 0.9
 """Confidence of all detections of an oracle."""
-
-
-class TrueObject(NamedTuple):
-    """True state of an object.
-
-    Attributes:
-        body: Identity of the object: a body id in a simulated world, a `FakeObject` in a fake world.
-        label: Class of the object.
-        position: Centre of the object `(3,)` [m].
-    """
-
-    body: Any
-    label: str
-    position: Array
 
 
 class WorldAccess:
@@ -73,14 +59,15 @@ class WorldAccess:
     @property
     def objects(self) -> Sequence[TrueObject]:
         """All loose objects, in the order of their creation."""
-        bodies = self.world.objects if self._is_fake else self.world.labels
-        return [self._describe_object(body) for body in bodies]
+        if self._is_fake:
+            return list(self.world.objects)
+        return list(map(self.world.describe_object, self.world.labels))
 
     @property
     def held_object(self) -> TrueObject | None:
         """The object at the tool, or None."""
-        body = self.world.held_object if self._is_fake else self.cell.tool.held_body
-        return None if body is None else self._describe_object(body)
+        held = self.world.held_object if self._is_fake else self.cell.tool.held_body
+        return held if self._is_fake or held is None else self.world.describe_object(held)
 
     def find_nearest_object(
         self, position: Sequence[float] | Array, max_distance: float = math.inf
@@ -109,30 +96,26 @@ class WorldAccess:
     def remove(self, true_object: TrueObject) -> None:
         """Remove an object from the world; a held object is released first."""
         self.release(true_object)
-        remove = self.world.remove if self._is_fake else self.world.remove_object
-        remove(true_object.body)
+        if self._is_fake:
+            self.world.remove(true_object)
+        else:
+            self.world.remove_object(true_object.body)
 
     def move(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
         """Displace an object by `(x, y)` [m]; a held object is released first."""
         self.release(true_object)
-        body = true_object.body
         if self._is_fake:
-            body.position[:2] += displacement
-            body.rest_positions.append(body.position.copy())
+            true_object.position[:2] += displacement
+            true_object.rest_positions.append(true_object.position.copy())
         else:
-            X_WO = self.world.get_object_pose(body)
+            X_WO = self.world.get_object_pose(true_object.body)
             position = X_WO.position + np.array([*displacement, 0.0])
-            self.world.place_object(body, Pose(X_WO.rotation, position))
+            self.world.place_object(true_object.body, Pose(X_WO.rotation, position))
 
     def release(self, true_object: TrueObject) -> None:
         """Break the seal on an object if the tool holds it."""
         if self.held_object is not None and self.held_object.body == true_object.body:
             self.cell.tool.break_seal()
-
-    def _describe_object(self, body: Any) -> TrueObject:
-        if self._is_fake:
-            return TrueObject(body, body.label, body.position.copy())
-        return TrueObject(body, self.world.labels[body], self.world.get_object_pose(body).position)
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig
 from executive.cell.frame import Box
 from executive.cell.objects import UNKNOWN_LABEL
+from executive.cell.workcell import TrueObject
 from executive.cells.sim import arrangements
-from executive.cells.sim.arrangements import SceneObject
 from executive.cells.sim.camera import (
     CELL_LIGHT,
     Image,
@@ -282,10 +282,7 @@ class SceneRenderer:
         declared_X_WC = get_camera_pose(world, self._nominal_camera).to_rounded_list(9)
         declared_matrix, _ = compute_calibration(self._nominal_camera)
         declared_calibration = {"part": whole_image, "matrix": declared_matrix, "X_WC": declared_X_WC}
-        objects = {
-            body: SceneObject(label, world.models[body], world.get_object_pose(body))
-            for body, label in world.labels.items()
-        }
+        objects = {body: world.describe_object(body) for body in world.labels}
         rendered = render(world, self._camera_matrix, X_WC, whole_image, scene.light)
         image = add_noise(rendered.image, camera.noise, rng)
         depth = None if camera.depth is None else add_depth_noise(rendered.depth, camera.depth, rng)
@@ -306,7 +303,7 @@ class SceneRenderer:
         self,
         rendered: RenderedImage,
         min_contrast: float,
-        objects: Mapping[int, SceneObject],
+        objects: Mapping[int, TrueObject],
         origin: Sequence[int] = (0, 0),
         scale: float = 1.0,
     ) -> LabelledImage | None:
@@ -330,7 +327,7 @@ class SceneRenderer:
             mask = rendered.segmentation == body
             if scene_object.label == UNKNOWN_LABEL or not mask.any():
                 continue
-            mesh = load_mesh(scene_object.model)
+            mesh = load_mesh(arrangements.get_model(scene_object))
             vertices = scene_object.X_WO.apply(mesh.vertices)
             pixels = project(rendered.matrix, rendered.X_WC, vertices)
             fraction = min(1.0, float(mask.sum()) / max(compute_silhouette_area(mesh, pixels), 1.0))

@@ -105,7 +105,7 @@ class ReportData:
         self.status = INTERRUPTED if self.outcome is None else self.outcome.status
         self.nodes = read_tree(directory.tree)
         self.timeline = Timeline.from_events(events)
-        all_items = self.timeline.items.list_items()
+        all_items = self.timeline.items.changes.values()
         self.last_item_changes = [item for item in all_items if item.state != "phantom"]
         self.activities, self.times_by_item = compute_activity_times(self.timeline, self.nodes)
         self.pictures = collect_pictures(directory.pictures, [item.item for item in all_items])

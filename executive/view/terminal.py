@@ -109,8 +109,8 @@ class LineView:
 
     def _describe_change(self, change: events.ItemChanged) -> str:
         """Return the text about a changed item; "" if only its position or its counts changed."""
-        item = self.timeline.items.by_name.get(change.item)
-        if item is not None and _get_described_fields(item.last_change) == _get_described_fields(change):
+        last = self.timeline.items.changes.get(change.item)
+        if last is not None and _get_described_fields(last) == _get_described_fields(change):
             return ""
         bin_text = f" in {change.bin}" if change.state == "placed" and change.bin else ""
         return f"{change.item} {change.state}{bin_text}" + (f": {change.reason}" if change.reason else "")
@@ -203,7 +203,7 @@ class TerminalView:
 
     def _render_items(self) -> RenderableType:
         table = Table("item", "class", "state", "bin", box=None, header_style="dim", padding=(0, 1))
-        for item in self.timeline.items.list_items():
+        for item in self.timeline.items.changes.values():
             state = Text(item.state, style=_STATE_STYLES.get(item.state, ""))
             table.add_row(Text(item.item), Text(item.label), state, Text(item.bin))
         return table

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from executive.cell.objects import UNKNOWN_LABEL
+from executive.cell.workcell import TrueObject
 from executive.cells.sim.cell import SimCell, list_final_objects
-from executive.cells.without_hardware import FinalObject, count_outcomes
+from executive.cells.without_hardware import count_outcomes
 from executive.events import ItemChanged
 from executive.ledger.item import State
 from executive.mission.load import load_mission
@@ -154,7 +155,7 @@ class AuditedCell(SimCell):
         self.objects = tuple(map(self._find, self._world.rest_positions, final_objects))
         return super().audit()
 
-    def _find(self, body: int, final_object: FinalObject) -> FoundObject:
+    def _find(self, body: int, final_object: TrueObject) -> FoundObject:
         """Return the true end of a body."""
         gate = self.config.ledger.gate
         records = self.accounts.records

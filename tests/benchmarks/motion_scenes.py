@@ -13,7 +13,7 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.objects import Load, ObjectClass, Obstacle
+from executive.cell.objects import ObjectClass, Obstacle
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import build_simulated_class, load_mesh
 from executive.cells.sim.scene import spawn_objects
@@ -76,7 +76,7 @@ class Scene:
 
     def make_carry_task(self, breakaway_force: float) -> Task:
         """Return the task of the motion into the bin with a seal of this breakaway force [N]."""
-        return Task(Load(self.kind, breakaway_force), self.others)
+        return Task(self.kind, breakaway_force, self.others)
 
 
 class SceneGenerator:

@@ -13,7 +13,6 @@ import pytest
 
 from executive.campaign.results import (
     FILE_NAME,
-    ItemRow,
     ResultsDatabase,
     RunRecord,
     RunRow,
@@ -51,11 +50,9 @@ RUN = RunRow(
     audit=Audit(agrees=False, right=1), planning=PlanningTotals(4, 2, 0.1), ticks=70, robot_time_s=0.1 + 0.2,
     wall_time_s=1.5, decision_hash="f00", run_directory="runs/x", crashes=1,
 )  # fmt: skip
-ITEM = ItemRow(
-    run_index=3, item="cube-1", label="cube", state="lost", bin="", failed_attempts=2, robot_time_s=1 / 3
-)
+ITEM = ItemChanged("cube-1", "cube", "lost", (0.5, 0.0, 0.0), 1, 2, "", "")
 SKILL = SkillRow(run_index=3, skill="Grasp", activations=3, failed_activations=2, robot_time_s=2 / 3)
-RECORD = RunRecord(RUN, (ITEM,), (SKILL,))
+RECORD = RunRecord(RUN, ((ITEM, 1 / 3),), (SKILL,))
 
 
 def make_run(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **fields: Any) -> RunRow:
@@ -102,10 +99,9 @@ def test_an_item_takes_the_time_from_its_selections_to_its_end() -> None:
     record = make_record(4, {"a": "1"}, result, timeline)
     assert (record.run.run_index, record.run.seed, record.run.variant) == (4, 7, {"a": "1"})
     assert record.run.robot_time_s == 0.333333
-    shared: dict[str, Any] = {"run_index": 4, "robot_time_s": 3.0}
     assert record.items == (
-        ItemRow(item="cube-1", label="cube", state="rejected", bin="", failed_attempts=3, **shared),
-        ItemRow(item="duck-1", label="duck", state="placed", bin="right", failed_attempts=0, **shared),
+        (change("cube-1", "rejected", attempts=3), 3.0),
+        (change("duck-1", "placed", "right"), 3.0),
     )
     grasp = SkillRow(run_index=4, skill="Grasp", activations=2, failed_activations=1, robot_time_s=0.3)
     assert record.skills == (grasp,)
@@ -126,7 +122,9 @@ def test_all_rows_are_read_as_they_were_stored(tmp_path: Path) -> None:
         (schema,) = connection.execute("SELECT sql FROM sqlite_master WHERE name = 'runs'").fetchone()
         query = "SELECT items_placed, audit_right, planning_waited_s FROM runs WHERE audit_agrees = 0"
         assert connection.execute(query).fetchall() == [(1, 1, 0.1)]
-        assert connection.execute("SELECT * FROM items").fetchall() == [tuple(vars(ITEM).values())]
+        assert connection.execute("SELECT * FROM items").fetchall() == [
+            (3, "cube-1", "cube", "lost", "", 2, 1 / 3)
+        ]
     assert "robot_time_s REAL, -- Duration on the run clock" in schema
 
 

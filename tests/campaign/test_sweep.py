@@ -191,5 +191,5 @@ def test_the_run_of_a_worker_is_equal_to_a_single_run(mission: str, size: str, t
     assert found == replace(expected, run=same_run)
     result = json.loads((Path(found.run.run_directory) / "result.json").read_text())
     assert found.run.decision_hash == result["trace"] != ""
-    assert found.run.items.placed == sum(item.state == "placed" for item in found.items) > 0
+    assert found.run.items.placed == sum(item.state == "placed" for item, _ in found.items) > 0
     assert not (Path(found.run.run_directory) / "report.html").exists()

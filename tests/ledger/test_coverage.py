@@ -43,7 +43,7 @@ def test_every_look_leaves_as_much_doubt_as_its_detector_misses(coverage: Covera
 
 def test_one_look_shows_the_surroundings_empty_also_after_a_drop(coverage: Coverage) -> None:
     coverage.update(look())
-    coverage.reset_near(MIDDLE, math.inf, change_number=1)
+    coverage.record_change(MIDDLE, math.inf)
     beside = np.array([0.53, 0.40, 0.025])
     assert coverage.find_miss_probability(beside) == PRIOR_OUTSIDE_WORKSPACE
     coverage.update(look(change_count=1))
@@ -68,7 +68,7 @@ def test_what_the_arm_hides_is_not_believed_empty(coverage: Coverage) -> None:
 
 def test_a_change_brings_the_doubt_back_whatever_a_frame_from_before_shows(coverage: Coverage) -> None:
     for _ in range(2):
-        coverage.reset_near(CORNER, 0.07, change_number=1)
+        coverage.record_change(CORNER, 0.07)
         coverage.update(look(change_count=0))
     assert coverage.find_miss_probability(CORNER) == 1.0
     assert coverage.find_miss_probability(MIDDLE) == pytest.approx(0.2**2)

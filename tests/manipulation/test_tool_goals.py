@@ -138,10 +138,10 @@ def test_what_is_carried_is_the_load_and_in_nobodys_way(fake: FakeCell, targets:
     task = make_task(fake.cell)
     assert task == make_transport_task(fake.cell, "cube-1")
     assert task.load is not None
-    assert (task.load.object_class.label, task.load.holding_force) == ("cube", 7.9)
+    assert (task.load.label, task.holding_force) == ("cube", 7.9)
     assert [obstacle.name for obstacle in task.obstacles] == ["duck-1"]
     fake.tool.breakaway_force = 3.0
-    assert make_task(fake.cell).load.holding_force == 3.0  # type: ignore[union-attr]
+    assert make_task(fake.cell).holding_force == 3.0
 
 
 def test_what_lies_in_a_bin_is_in_the_way_as_high_as_it_is_piled(fake: FakeCell) -> None:

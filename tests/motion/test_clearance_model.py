@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from executive.cell.config import TOOL_RADIUS, CellConfig
-from executive.cell.objects import BIN_THICKNESS, Load, ObjectClass, Obstacle
+from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
 from executive.motion.arms import SAMPLING_MARGIN
@@ -27,7 +27,7 @@ AWAY = np.array([[-0.6, 0.0]])
 """Ends of a motion far from everything."""
 POST = Obstacle(-0.5, 0.1, 0.03, 0.30, "the post")
 """Where nothing else is near."""
-CUBE = Load(ObjectClass("cube", 0.05, 0.0354))
+CUBE = ObjectClass("cube", 0.05, 0.0354)
 ROUND = np.array([[0.0, 0.0], *((r * math.cos(a), r * math.sin(a)) for r in (0.25, 0.5, 0.75, 1.0)
                                 for a in np.linspace(0, 2 * math.pi, 120, endpoint=False))])  # fmt: skip
 """Points of a disc of radius 1."""

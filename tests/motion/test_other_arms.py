@@ -10,7 +10,7 @@ from six_joint_arm import SixJointArm
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
 from executive.cell.device_config import ArmConfig, LimitsConfig
-from executive.cell.objects import Load, ObjectClass, Obstacle
+from executive.cell.objects import ObjectClass, Obstacle
 from executive.motion.joints import JointLimits, Kinematics
 from executive.motion.planner import Planner
 
@@ -55,7 +55,7 @@ def test_motions_of_six_joints_reach_their_goals_within_asymmetric_limits(
         goal, task = Goal((x, y, 0.053), guarded_length=0.015, guarded_speed=0.04), Task(obstacles=(wall,))
         if number % 2:
             bin = list(six.bins.values())[number % len(six.bins)].position
-            goal, task = Goal((bin[0], bin[1], 0.08)), Task(Load(CUBE, 4.0), (wall,))
+            goal, task = Goal((bin[0], bin[1], 0.08)), Task(CUBE, 4.0, (wall,))
         motion = planner.plan(q, goal, task)
         states = passed(motion)
         assert states.q.shape[1] == 6

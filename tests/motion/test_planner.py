@@ -11,7 +11,7 @@ from joint_states import passed, peaks, tool_velocities
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.objects import Load, ObjectClass, Obstacle
+from executive.cell.objects import ObjectClass, Obstacle
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.configurations import find_configuration_pairs
@@ -20,7 +20,7 @@ from executive.motion.planner import MAX_CHECK_SPACING, Planner, build_planner
 from executive.motion.trajectory import Trajectory
 
 CUBE = ObjectClass("cube", 0.05, 0.0354)
-CARRYING = Task(Load(CUBE))
+CARRYING = Task(CUBE)
 BIN = Goal((0.24, -0.44, 0.08))
 on_the_table = st.tuples(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.045, 0.06))
 
@@ -46,12 +46,12 @@ def question(name: str, planner: Planner, config: CellConfig, home: Array) -> Tr
     return {
         "pick": lambda: planner.plan(home, pick(0.5, -0.1)),
         "pick of many": lambda: planner.plan(aside, pick(0.5, -0.1), Task(obstacles=near)),
-        "carry": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 7.9), near)),
-        "carry weakly": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 2.4))),
+        "carry": lambda: planner.plan(picked, BIN, Task(CUBE, 7.9, near)),
+        "carry weakly": lambda: planner.plan(picked, BIN, Task(CUBE, 2.4)),
         "sweep past": lambda: planner.plan(beside, onto, Task(target=Obstacle(0.5, 0.0, 0.0354, 0.05, "it"))),
-        "carry hardly": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 1.0))),
-        "over a wall": lambda: planner.plan(picked, beyond, Task(Load(CUBE), wall)),
-        "straight": lambda: straight.plan(picked, BIN, Task(Load(CUBE, 3.0))),
+        "carry hardly": lambda: planner.plan(picked, BIN, Task(CUBE, 1.0)),
+        "over a wall": lambda: planner.plan(picked, beyond, Task(CUBE, obstacles=wall)),
+        "straight": lambda: straight.plan(picked, BIN, Task(CUBE, 3.0)),
     }[name]()
 
 
@@ -204,7 +204,7 @@ def test_random_motions_keep_every_limit(planner, limits, config, home) -> None:
         goal = Goal((bin[0] + rng.uniform(-0.05, 0.05), bin[1] + rng.uniform(-0.05, 0.05), 0.07))
         loaded = number % 2
         motion = (
-            planner.plan(q, goal, Task(Load(CUBE)))
+            planner.plan(q, goal, Task(CUBE))
             if loaded
             else planner.plan(q, pick(x, y), Task(obstacles=around))
         )

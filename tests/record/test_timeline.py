@@ -51,7 +51,7 @@ def test_the_journal_of_a_run_gives_the_timeline_that_was_observed(mission, tmp_
     run.run.execute()
     journal.close()
     recorded = Timeline.from_events(read_journal(Path("journal.jsonl")))
-    assert live.activations and live.items.by_name and live.items.look and live.ended
+    assert live.activations and live.items.histories and live.items.look and live.ended
     assert recorded == live
     # Without history, only the past is missing.
     past = {"activations": live.activations, "selection_times": live.selection_times}
@@ -121,11 +121,11 @@ def test_an_item_has_its_last_sighting_and_failure_and_the_number_of_looks_since
         skill_started("tree/Grasp", "cube-1"),
         skill_ended("tree/Grasp", "FAILURE", "cube-1", reason="missed"),
     )  # fmt: skip
-    item = timeline.items.by_name["cube-1"]
-    assert (item.sighting.frame, item.sighting.confidence, item.unseen_look_count) == (7, 0.8, 2)
+    item = timeline.items.histories["cube-1"]
+    assert (item.look.frame, item.look.confidence, item.later_looks) == (7, 0.8, 2)
     assert (timeline.items.look.frame, timeline.items.look.found) == (9, 1)
     assert list(timeline.items.classes) == ["cube", "ball"]
-    assert item.failure == timeline.activation_by_path["tree/Grasp"]
+    assert timeline.failures["cube-1"] == timeline.activation_by_path["tree/Grasp"]
 
 
 def test_the_accounts_after_the_end_of_the_tree_leave_the_final_states_as_they_were() -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import colorsys
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.random import Generator
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import CameraConfig, Colour, NoiseConfig, Range
 from executive.cell.objects import BIN_THICKNESS, UNKNOWN_LABEL, Bin
+from executive.cell.workcell import TrueObject
 from executive.cells.sim.camera import Light, Region
 from executive.cells.sim.models import (
     DAMAGED_MODEL_NUMBER,
@@ -171,23 +172,6 @@ MIN_BASE_DISTANCE = 0.16
 """Minimum distance of an object from the axis of the base of the arm [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class SceneObject:
-    """An object of a scene.
-
-    Attributes:
-        label: Class of the object, or `UNKNOWN_LABEL`.
-        model: Model of the object, already scaled.
-        X_WO: Pose of the object in the world.
-        colour: Red, green and blue of the object, each 0 to 1; black if unknown.
-    """
-
-    label: str
-    model: ObjectConfig
-    X_WO: Pose
-    colour: Colour = (0.0, 0.0, 0.0)
-
-
 def move_arm_randomly(world: World, camera: CameraConfig, rng: Generator) -> bool:
     """Move the arm to a random pose of a run, and return True if the tool shall hold an object."""
     poses = camera.scan_poses
@@ -223,7 +207,7 @@ def draw_region(camera: CameraConfig, rng: Generator) -> Region:
     return x, y, x + right - left, y + bottom - top
 
 
-def draw_objects(config: CellConfig, count: int, table_colour: Colour, rng: Generator) -> list[SceneObject]:
+def draw_objects(config: CellConfig, count: int, table_colour: Colour, rng: Generator) -> list[TrueObject]:
     """Return `count` random objects at the origin; some scenes contain unknown or scaled objects."""
     unknown_fraction = rng.uniform(0.05, 0.4) if rng.random() < 0.35 else 0.0
     scaled_fraction = rng.uniform(0.2, 1.0) if rng.random() < 0.35 else 0.0
@@ -237,13 +221,19 @@ def draw_objects(config: CellConfig, count: int, table_colour: Colour, rng: Gene
             model = scale_model(model, rng.uniform(0.4, 1.0))
         elif rng.random() < scaled_fraction:
             model = scale_model(model, float(rng.choice(SCALE_FACTORS)))
-        objects.append(SceneObject(label, model, Pose.identity(), colour))
+        objects.append(TrueObject(label, Pose.identity(), model=model, colour=colour))
     return objects
+
+
+def get_model(scene_object: TrueObject) -> ObjectConfig:
+    """Return the model of an object of a rendered scene."""
+    assert scene_object.model is not None
+    return scene_object.model
 
 
 def draw_arrangement(
     config: CellConfig, footprint: Array, shows_workspace: bool, table_colour: Colour, rng: Generator
-) -> list[SceneObject]:
+) -> list[TrueObject]:
     """Return a random arrangement of 0 to 20 objects, possibly with unknown objects, stacks and heaps.
 
     Args:
@@ -273,21 +263,21 @@ def draw_arrangement(
     objects = _place_side_by_side(objects, low, high, bins, all_bins, rng)
     if random_number < 0.23:
         drop_offset = np.array([0, 0, 0.04])
-        raised = [replace(o, X_WO=Pose(_draw_rotation(rng), o.X_WO.position + drop_offset)) for o in objects]
+        raised = [replace(o, X_WO=Pose(_draw_rotation(rng), o.position + drop_offset)) for o in objects]
         return simulate_fall(config, raised)
     if random_number < 0.40:
         _stack_randomly(objects, rng)
     return objects
 
 
-def draw_held_object(X_WT: Pose, config: CellConfig, rng: Generator) -> SceneObject:
+def draw_held_object(X_WT: Pose, config: CellConfig, rng: Generator) -> TrueObject:
     """Return a random object that hangs upright at the tip of the tool."""
     (held_object,) = draw_objects(config, 1, (0.5, 0.5, 0.5), rng)
-    position = X_WT.position - [0, 0, load_mesh(held_object.model).top]
+    position = X_WT.position - [0, 0, load_mesh(get_model(held_object)).top]
     return replace(held_object, X_WO=Pose(rotate_about_z(rng.uniform(0, math.tau)), position))
 
 
-def simulate_fall(config: CellConfig, objects: Sequence[SceneObject]) -> list[SceneObject]:
+def simulate_fall(config: CellConfig, objects: Sequence[TrueObject]) -> list[TrueObject]:
     """Simulate the fall of objects onto table and bins for 1.5 s, and return the objects at the final poses.
 
     Each call uses a new physics world, so that the result depends only on the initial poses.
@@ -296,12 +286,12 @@ def simulate_fall(config: CellConfig, objects: Sequence[SceneObject]) -> list[Sc
     try:
         for bin in config.bins.values():
             add_bin(client, bin)
-        bodies = [add_body(client, scene_object.model, scene_object.X_WO) for scene_object in objects]
+        bodies = [add_body(client, get_model(scene_object), scene_object.X_WO) for scene_object in objects]
         for _ in range(SETTLING_STEP_COUNT):
             client.stepSimulation()
         final_objects = []
         for body, scene_object in zip(bodies, objects, strict=True):
-            X_WO = locate_object(client, body, scene_object.model)
+            X_WO = locate_object(client, body, get_model(scene_object))
             final_objects.append(replace(scene_object, X_WO=X_WO))
         return final_objects
     finally:
@@ -331,8 +321,8 @@ def _overlaps_rectangle(bin: Bin, low: Array, high: Array) -> bool:
 
 
 def _draw_heap(
-    objects: Sequence[SceneObject], low: Array, high: Array, bins: list[Bin], rng: Generator
-) -> list[SceneObject]:
+    objects: Sequence[TrueObject], low: Array, high: Array, bins: list[Bin], rng: Generator
+) -> list[TrueObject]:
     """Return objects above each other, over a point of the table or over a bin."""
     if bins and rng.random() < 0.6:
         centre = bins[int(rng.integers(len(bins)))].position[:2]
@@ -345,31 +335,31 @@ def _draw_heap(
     return [replace(item, X_WO=Pose(_draw_rotation(rng), position)) for item, position in pairs]
 
 
-def _stack_randomly(objects: list[SceneObject], rng: Generator) -> None:
+def _stack_randomly(objects: list[TrueObject], rng: Generator) -> None:
     """Put some objects nearly centred on others; the stability of the stacks is not simulated."""
     for _ in range(int(rng.integers(1, 1 + max(1, len(objects) // 3)))):
         if len(objects) < 2:
             return
         upper, lower = (int(index) for index in rng.choice(len(objects), 2, replace=False))
         lower_object = objects[lower]
-        point = lower_object.X_WO.position[:2]
-        distances = [math.dist(item.X_WO.position[:2], point) for item in objects if item is not lower_object]
+        point = lower_object.position[:2]
+        distances = [math.dist(item.position[:2], point) for item in objects if item is not lower_object]
         if min(distances) < 0.01:
             continue
-        height = load_mesh(lower_object.model).top - load_mesh(objects[upper].model).bottom
-        position = lower_object.X_WO.position + np.array([*rng.normal(0, 0.003, 2), height])
+        height = load_mesh(get_model(lower_object)).top - load_mesh(get_model(objects[upper])).bottom
+        position = lower_object.position + np.array([*rng.normal(0, 0.003, 2), height])
         X_WO = Pose(rotate_about_z(rng.uniform(0, math.tau)), position)
         objects[upper] = replace(objects[upper], X_WO=X_WO)
 
 
 def _place_side_by_side(
-    objects: list[SceneObject], low: Array, high: Array, bins: list[Bin], all_bins: list[Bin], rng: Generator
-) -> list[SceneObject]:
+    objects: list[TrueObject], low: Array, high: Array, bins: list[Bin], all_bins: list[Bin], rng: Generator
+) -> list[TrueObject]:
     """Return objects at random free positions on the table or in `bins`; objects without room are omitted."""
     gap = rng.uniform(0.0, 0.02)
-    placed_objects: list[SceneObject] = []
+    placed_objects: list[TrueObject] = []
     for candidate in objects:
-        radius = candidate.model.radius
+        radius = get_model(candidate).radius
         for _ in range(30):
             point = rng.uniform(low, high)
             floor_height = 0.0
@@ -383,11 +373,11 @@ def _place_side_by_side(
             elif any(bin.contains(point, radius + BIN_THICKNESS) for bin in all_bins):
                 continue
             is_free = all(
-                np.linalg.norm(item.X_WO.position[:2] - point) > radius + item.model.radius + gap
+                np.linalg.norm(item.position[:2] - point) > radius + get_model(item).radius + gap
                 for item in placed_objects
             )
             if is_free and np.linalg.norm(point) > MIN_BASE_DISTANCE:
-                position = np.array([*point, floor_height - load_mesh(candidate.model).bottom])
+                position = np.array([*point, floor_height - load_mesh(get_model(candidate)).bottom])
                 X_WO = Pose(rotate_about_z(rng.uniform(0, math.tau)), position)
                 placed_objects.append(replace(candidate, X_WO=X_WO))
                 break

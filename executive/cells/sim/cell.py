@@ -9,7 +9,7 @@ from pathlib import Path
 from executive.cell.config import CellConfig
 from executive.cell.objects import BIN_THICKNESS, Bin
 from executive.cell.protocols import Routes
-from executive.cell.workcell import CellOptions
+from executive.cell.workcell import CellOptions, TrueObject
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.camera import SimCamera, find_missing_depth_sensors
 from executive.cells.sim.collision import ClearanceChecker
@@ -18,7 +18,7 @@ from executive.cells.sim.rebuild import WorldRebuilder
 from executive.cells.sim.scene import build_initial_world, derive_seeds, load_scene
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import SimVisuals, World
-from executive.cells.without_hardware import CellWithoutHardware, FinalObject
+from executive.cells.without_hardware import CellWithoutHardware
 from executive.cells.world_log import CommandLog, read_commands
 from executive.errors import InputError
 from executive.events import Emit
@@ -105,7 +105,7 @@ class SimCell(CellWithoutHardware):
     def visuals(self) -> SimVisuals:
         return SimVisuals(self._world)
 
-    def _list_final_objects(self) -> Iterator[FinalObject]:
+    def _list_final_objects(self) -> Iterator[TrueObject]:
         return list_final_objects(self._world, self._tool, self.cell.bins)
 
     def close(self) -> None:
@@ -126,17 +126,15 @@ class SimCell(CellWithoutHardware):
         return rebuilder
 
 
-def list_final_objects(world: World, tool: SuctionTool, bins: Mapping[str, Bin]) -> Iterator[FinalObject]:
+def list_final_objects(world: World, tool: SuctionTool, bins: Mapping[str, Bin]) -> Iterator[TrueObject]:
     """Yield the objects of a simulated world, including removed objects, at the end of a run."""
     for body, positions in world.rest_positions.items():
-        is_removed = body not in world.labels
-        if is_removed:
-            label, position = world.removed_objects[body]
-        else:
-            label = world.labels[body]
-            position = world.get_object_pose(body).position
+        final_object = world.removed_objects.get(body) or world.describe_object(body)
         # The centre of an object that leans on a bin wall may be above the wall.
+        position = final_object.position
         names = (name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS))
-        bin_name = None if position[2] < MIN_CENTRE_HEIGHT else next(names, "")
-        is_dropped = body in tool.dropped_bodies
-        yield FinalObject(label, bin_name, positions, is_dropped, body == tool.held_body, is_removed)
+        final_object.bin = None if position[2] < MIN_CENTRE_HEIGHT else next(names, "")
+        final_object.rest_positions = positions
+        final_object.is_dropped = body in tool.dropped_bodies
+        final_object.is_held = body == tool.held_body
+        yield final_object

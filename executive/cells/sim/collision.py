@@ -108,7 +108,7 @@ class ClearanceChecker:
         Raises:
             Blocked: The path violates the margin; the message states bodies, distance and tool position.
         """
-        load = task.load.object_class if task.load else None
+        load = task.load
         load_size = load.height + load.radius + load.contact_radius if load else 0.0
         pairs = self._list_pairs(load, self._place_obstacles(task.obstacles))
         movements = np.abs(np.diff(path, axis=0, prepend=path[:1])).cumsum(axis=0) * (self._radii + load_size)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -23,7 +23,7 @@ from executive.cell.config import NECK_LENGTH, TOOL_RADIUS, BinConfig, CellConfi
 from executive.cell.device_config import Colour
 from executive.cell.objects import BIN_THICKNESS
 from executive.cell.protocols import STEP
-from executive.cell.workcell import Shape
+from executive.cell.workcell import Shape, TrueObject
 from executive.cells import world_log
 from executive.cells.sim.model_files import find_model
 from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, locate_object
@@ -139,7 +139,7 @@ class World:
         is_idle: True during physics steps that belong to no control step of the run.
         rest_positions: Positions `(3,)` [m] of each object by body: initial position of the run, and position
             after each move by a test and after each release by the tool.
-        removed_objects: Class and last position `(3,)` [m] of each removed object, by body.
+        removed_objects: The removed objects by body.
     """
 
     def __init__(self, config: CellConfig, *, gui: bool = False, visuals: bool = True) -> None:
@@ -168,7 +168,7 @@ class World:
         self.log = CommandLog()
         self.is_idle = False
         self.rest_positions: dict[int, list[Array]] = {}
-        self.removed_objects: dict[int, tuple[str, Array]] = {}
+        self.removed_objects: dict[int, TrueObject] = {}
         self.set_joint_positions(np.radians(config.arm.poses_deg["home"]))
 
     def paint_table(self, colour: Colour, texture: str) -> None:
@@ -204,9 +204,14 @@ class World:
     def remove_object(self, body: int) -> None:
         """Remove a loose object from the world."""
         self.log.append(world_log.REMOVE, body)
-        self.removed_objects[body] = self.labels[body], self.get_object_pose(body).position
-        del self.labels[body], self.models[body]
+        self.removed_objects[body] = replace(self.describe_object(body), is_removed=True)
+        del self.labels[body]
+        del self.models[body]
         self.client.removeBody(body)
+
+    def describe_object(self, body: int) -> TrueObject:
+        """Return the class, the present pose and the model of a loose object."""
+        return TrueObject(self.labels[body], self.get_object_pose(body), body, model=self.models[body])
 
     def name_body(self, body: int) -> str:
         """Return the name of a body for messages."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.cell.arm import Goal, Motion, Task
-from executive.cell.objects import BIN_THICKNESS, Load, Obstacle
+from executive.cell.objects import BIN_THICKNESS, Obstacle
 from executive.cell.protocols import STEP
 from executive.cells.fake import FakeCell, load_empty_cell
 from executive.errors import Blocked, Fault, Unreachable
@@ -42,7 +42,7 @@ def hold_cube(fake: FakeCell) -> Task:
     """Let the tool hold a cube that stands on the table, and return the task of carrying it."""
     fake.world.held_object = fake.world.put("cube", 0.5, 0.0)
     fake.arm.set_tool_position(np.array((0.5, 0.0, 0.05)))
-    return Task(Load(fake.cell.classes["cube"]))
+    return Task(fake.cell.classes["cube"])
 
 
 def test_it_goes_up_across_and_down_and_the_last_part_slowly(fake: FakeCell) -> None:

@@ -10,7 +10,7 @@ import pytest
 from rig import Rig
 
 from executive.cell.arm import Goal, Task
-from executive.cell.objects import Load, Obstacle
+from executive.cell.objects import Obstacle
 from executive.geometry import Array
 from executive.motion.trajectory import RETREAT_TIME, Trajectory
 from tests.benchmarks.halts import measure_distance
@@ -71,7 +71,7 @@ def test_what_the_held_object_runs_into_counts_but_neither_the_tool_nor_the_tabl
     rig.touch_down(Goal((0.5, 0.1, 0.045), guarded_length=0.012, guarded_speed=0.035))
     rig.tool.close()
     assert rig.tool.held_body == held
-    task = Task(Load(rig.config.objects["cube"].build_class("cube"), rig.tool.holding_force))
+    task = Task(rig.config.objects["cube"].build_class("cube"), rig.tool.holding_force)
     rig.go(LEFT, task)
     assert rig.arm.collision is None
     motion = rig.planned(RIGHT, task)

@@ -2,22 +2,25 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from executive.cell.arm import Task
 from executive.cell.config import CellConfig
-from executive.cell.objects import Load, ObjectClass, Obstacle
+from executive.cell.objects import ObjectClass, Obstacle
 from executive.cells.sim.collision import ClearanceChecker
 from executive.errors import Blocked
 from executive.motion.arms import build_kinematics
 from executive.motion.iiwa14_kinematics import Iiwa14, interpolate_max_joint_6_angle
 from tests.motion.joint_states import reach
 
-DUCK = Task(Load(ObjectClass("duck", 0.05, 0.04)))
+DUCK = Task(ObjectClass("duck", 0.05, 0.04))
 TOWER = Obstacle(0.5, 0.1, 0.03, 0.2, "cube-3")
 COIN = Obstacle(0.5, 0.1, 0.03, 0.0005, "a coin")
+DUCK_AND_TOWER = replace(DUCK, obstacles=(TOWER,))
+DUCK_AND_COIN = replace(DUCK, obstacles=(COIN,))
 
 
 @pytest.fixture(scope="module")
@@ -67,8 +70,8 @@ def into_the_bin(height: float, *distances: float) -> list[tuple[float, float, f
         (straight(0.003, 0.004, 0.1), Task(), ""),
         ([(0.5, y, 0.23) for y in (-0.1, 0.1)], Task(obstacles=(TOWER,)), ""),
         ([(0.5, y, 0.15) for y in (0.0, 0.1)], Task(obstacles=(TOWER,)), NAMED),
-        ([(0.5, y, 0.23) for y in (-0.1, 0.1)], Task(DUCK.load, (TOWER,)), r"held duck 0\.020 m into cube-3"),
-        ([(0.5, 0.1, z) for z in (0.1, 0.0505)], Task(DUCK.load, (COIN,)), r"the held duck .* a coin"),
+        ([(0.5, y, 0.23) for y in (-0.1, 0.1)], DUCK_AND_TOWER, r"held duck 0\.020 m into cube-3"),
+        ([(0.5, 0.1, z) for z in (0.1, 0.0505)], DUCK_AND_COIN, r"the held duck .* a coin"),
         ([(0.5, 0.1, z) for z in (0.202, 0.203, 0.25)], Task(obstacles=(TOWER,)), ""),
         ([(0.5, 0.1, z) for z in (0.202, 0.201)], Task(obstacles=(TOWER,)), r"the tool 0\.001 m from cube-3"),
     ],

@@ -10,7 +10,6 @@ from rig import Rig
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.objects import Load
 from executive.cell.protocols import STEP
 from executive.motion.trajectory import Trajectory
 from tests.benchmarks.halts import measure_distance
@@ -48,7 +47,7 @@ def test_a_stop_is_short_stays_on_the_path_and_keeps_the_stop_limits(
         motion = rig.planned(PICK)
     else:
         rig.go(ON_A_CUBE)
-        motion = rig.planned(IN_A_BIN, Task(Load(overhead.objects["cube"].build_class("cube"), 7.0)))
+        motion = rig.planned(IN_A_BIN, Task(overhead.objects["cube"].build_class("cube"), 7.0))
     steps = stopped(rig, motion, share)
     assert steps <= 120
     assert measure_distance(rig.arm._commanded_q, motion) < 1e-9

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from executive.cell.objects import UNKNOWN_LABEL, Bin
-from executive.cell.workcell import AUDIT_KEYS
+from executive.cell.workcell import AUDIT_KEYS, TrueObject
 from executive.cells.sim.cell import list_final_objects
 from executive.cells.without_hardware import count_outcomes
 from executive.geometry import Pose
@@ -24,13 +24,12 @@ class OneBody:
     """A world with one body, by default a cube over the bin."""
 
     def __init__(self, label: str = "cube", place: Sequence[float] = IN_BIN) -> None:
-        self.labels = {7: label}
-        self.removed_objects: dict[int, tuple[str, np.ndarray]] = {}
+        self.removed_objects: dict[int, TrueObject] = {}
         self.rest_positions = {7: [np.array([0.5, 0.0, 0.025])]}
-        self._place = place
+        self._object = TrueObject(label, Pose.of(place))
 
-    def get_object_pose(self, body: int) -> Pose:
-        return Pose.of(self._place)
+    def describe_object(self, body: int) -> TrueObject:
+        return self._object
 
 
 def counted(bins_of_cube: tuple[str, ...], world: OneBody | None = None, **more: Any) -> dict[str, int]:
@@ -72,7 +71,7 @@ def test_a_body_counts_by_its_class_and_by_who_put_it_there(bins, place, more, e
 )
 def test_a_removed_body_counts_as_if_it_still_lay_there_if_it_was_seen(bins, place, more, end: str) -> None:
     world = OneBody()
-    world.removed_objects[7] = (world.labels.pop(7), np.array(place))
+    world.removed_objects[7] = TrueObject("cube", Pose.of(place), is_removed=True)
     assert counted(bins, world, records=[ITEM], **more) == {**NONE, end: 1}
     assert counted(bins, world, **more) == NONE
 
