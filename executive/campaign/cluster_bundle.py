@@ -29,7 +29,7 @@ from executive.campaign.results import RunRecord
 from executive.errors import InputError
 from executive.mission.yaml_files import find_mission, get_shipped_folder
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
-from executive.perception.envelope import MEASUREMENT_SUFFIX
+from executive.perception.detectors.envelope import MEASUREMENT_SUFFIX
 from executive.record.run_directory import convert_os_errors, make_unique_folder
 from executive.tree.node import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
 

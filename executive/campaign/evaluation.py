@@ -15,7 +15,7 @@ from executive.errors import InputError, explain_os_errors
 from executive.mission.cell_file import load_cell
 from executive.mission.findings import suggest_choice
 from executive.mission.yaml_files import get_shipped_folder
-from executive.perception import envelope
+from executive.perception.detectors import envelope
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 from executive.perception.localization import CellLocalizer
 from executive.record.run_directory import write_atomically

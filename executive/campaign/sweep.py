@@ -20,7 +20,7 @@ from executive.cells.sim.scene import load_scene
 from executive.errors import InputError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.yaml_files import read_source
-from executive.perception.envelope import FAKE_KIND, compute_fingerprint
+from executive.perception.detectors.envelope import FAKE_KIND, compute_fingerprint
 from executive.plugins import DISTRIBUTION, list_versions, load_cell_kind, load_skills
 from executive.record.run_directory import make_dated_folder
 

@@ -29,7 +29,7 @@ from executive.mission.yaml_files import (
     read_source,
 )
 from executive.perception.camera_model import find_calibration_doubts
-from executive.perception.envelope import find_unmeasured_detectors
+from executive.perception.detectors.envelope import find_unmeasured_detectors
 from executive.plugins import Skills
 from executive.skill import Skill
 from executive.tree.node import ControlNodes, load_control_nodes

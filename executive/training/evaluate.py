@@ -21,7 +21,7 @@ from executive.cell.frame import Answer, Box, Detection, Frame
 from executive.cell.protocols import STEP, Localizer, StepClock
 from executive.errors import Unavailable
 from executive.perception.detectors.detector_registry import build_detectors
-from executive.perception.envelope import FrameRange, compute_frame_statistics
+from executive.perception.detectors.envelope import FrameRange, compute_frame_statistics
 from executive.training.dataset import LabelledImage
 from executive.training.metrics import (
     BoxMatch,

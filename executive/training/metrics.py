@@ -22,7 +22,7 @@ from executive.cell.protocols import Localizer
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception.camera_model import intersect_plane
-from executive.perception.envelope import FrameRange, StoredErrorRates
+from executive.perception.detectors.envelope import FrameRange, StoredErrorRates
 from executive.training.dataset import LabelledImage
 
 NO_OBJECT = "nothing"

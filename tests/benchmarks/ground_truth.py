@@ -16,8 +16,8 @@ from executive.cells.without_hardware import count_outcomes
 from executive.events import ItemChanged
 from executive.ledger.item import State
 from executive.mission.load import load_mission
+from executive.perception.detectors.envelope import build_rated_detectors
 from executive.perception.detectors.requests import ClosableDetector
-from executive.perception.envelope import build_rated_detectors
 from executive.plugins import load_cell_kind, load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run

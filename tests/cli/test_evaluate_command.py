@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
+from executive.perception.detectors.envelope import read_measurements
 from executive.perception.detectors.rfdetr import LABELS_PATH, MODEL_PATH
-from executive.perception.envelope import read_measurements
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 
 

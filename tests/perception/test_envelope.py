@@ -11,7 +11,7 @@ import pytest
 from executive.cell.config import TableConfig
 from executive.cell.frame import Answer, ErrorRates, Frame, assume_rates
 from executive.mission.cell_file import load_cell
-from executive.perception.envelope import (
+from executive.perception.detectors.envelope import (
     FrameRange,
     Measurement,
     RatedDetector,

@@ -24,8 +24,8 @@ from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.yaml_files import get_shipped_folder
 from executive.motion.planner import build_planner
+from executive.perception.detectors.envelope import build_rated_detectors
 from executive.perception.detectors.requests import ClosableDetector
-from executive.perception.envelope import build_rated_detectors
 from executive.perception.localization import CellLocalizer
 
 MIN_CENTRE_HEIGHT = -0.05

@@ -25,9 +25,9 @@ from executive.cell.config import DetectorConfig
 from executive.cell.frame import Box, Detection
 from executive.errors import InputError, Unavailable
 from executive.perception.detectors.detector_registry import DetectorOptions, OptionErrors
+from executive.perception.detectors.envelope import is_measured
 from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
 from executive.perception.detectors.views import Region, remove_duplicates, search_regions
-from executive.perception.envelope import is_measured
 from executive.processes import build_command
 
 CHANNEL_MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)
