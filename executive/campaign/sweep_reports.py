@@ -16,7 +16,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
 from rich.table import Table
 
-from executive.campaign.results import RunRow, SweepSettings, describe_variant, encode_run
+from executive.campaign.results import RunRow, SweepSettings, describe_variant, encode_row
 from executive.campaign.sweep_summary import (
     Difference,
     Estimate,
@@ -49,7 +49,7 @@ STATISTICS = ("mean", *PERCENTILES)
 OPERATORS = {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
 """Comparisons by symbol."""
 _EXAMPLE = RunRow(run_index=0, seed=0, status="", audit=Audit())
-_COLUMNS = [name for name, value in encode_run(_EXAMPLE).items() if isinstance(value, (int, float))][2:]
+_COLUMNS = [name for name, value in encode_row(_EXAMPLE).items() if isinstance(value, (int, float))][2:]
 """Names of the numeric columns of a run, without `run_index` and `seed`."""
 _CONDITION_PATTERN = re.compile(
     r"\s*(\w+)\s*(?:\(\s*(\w+)\s*\))?\s*([<>]=?)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
@@ -235,7 +235,7 @@ class Condition:
         if not self.column:
             value: float | None = getattr(summary, self.metric).value
             return value
-        columns = map(encode_run, runs)
+        columns = map(encode_row, runs)
         numbers = [float(each[self.column]) for each in columns if self.column in each]
         if not numbers:
             return None
