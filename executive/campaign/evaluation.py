@@ -22,7 +22,7 @@ from executive.record.run_directory import write_atomically
 from executive.training import evaluate
 from executive.training.dataset import LabelledImage
 from executive.training.evaluate import CellDetector, Mistake
-from executive.training.metrics import NO_OBJECT, ClassMetrics, Evaluation
+from executive.training.metrics import NO_OBJECT, Evaluation
 from executive.training.rendering import generate_dataset, render_run_frames
 from executive.training.samples import LabelledDataset
 
@@ -240,8 +240,7 @@ def find_weakness(detector: DetectorUnderTest, evaluation: Evaluation) -> str:
     counts = {label: 0 for label, section in detector.cell.objects.items() if not section.looks_like}
     counts |= {label: metrics.objects for label, metrics in evaluation.by_class.items()}
     problems = [f"{count} {label} objects" for label, count in counts.items() if count < MIN_OBJECT_COUNT]
-    all_classes = ClassMetrics(evaluation.objects, evaluation.precision, evaluation.recall)
-    for name, metrics in {"all classes": all_classes, **evaluation.by_class}.items():
+    for name, metrics in {"all classes": evaluation, **evaluation.by_class}.items():
         if min(metrics.precision, metrics.recall) < MIN_ACCURACY:
             problems.append(f"precision {metrics.precision:.2f}, recall {metrics.recall:.2f} of {name}")
     return ", ".join(problems)

@@ -67,7 +67,8 @@ class ClassMetrics:
 
     Attributes:
         objects: Number of objects of these classes.
-        precision: Fraction of the detections of these classes that are correct.
+        precision: Fraction of the detections of these classes that have the correct class and an IoU of at
+            least 0.5.
         recall: Fraction of the objects that are detected with their class.
     """
 
@@ -138,15 +139,12 @@ class MeasuredErrorRates:
 
 
 @dataclass(frozen=True)
-class Evaluation:
-    """Accuracy of a detector on labelled images.
+class Evaluation(ClassMetrics):
+    """Accuracy of a detector for all classes in labelled images; images without an answer have no objects.
 
     Attributes:
         threshold: Minimum confidence of a detection.
         images: Number of images, including images without an answer.
-        objects: Number of objects in the images with an answer.
-        precision: Fraction of the detections that have the correct class and an IoU of at least 0.5.
-        recall: Fraction of the objects that are detected with their class.
         map50: Mean average precision at IoU 0.5 over detections with any confidence.
         map50_95: Mean average precision over IoUs from 0.5 to 0.95.
         centre: Distance between the centres of the detected and the true box [pixel].
@@ -166,9 +164,6 @@ class Evaluation:
 
     threshold: float
     images: int
-    objects: int
-    precision: float
-    recall: float
     map50: float
     map50_95: float
     centre: Distribution | None = None
