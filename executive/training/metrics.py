@@ -372,7 +372,7 @@ class ErrorStatistics:
         detected_count = counts["objects"] - counts["missed"]
         # Without second images, all errors of box centres count as random errors.
         jitter_variance = np.mean(self._random_variances or self._squared_offsets or 0.0)
-        bias_variance = max(np.mean(self._error_products or 0.0), 0.0)
+        bias_variance = float(np.mean(self._error_products or 0.0))
         return MeasuredErrorRates(
             miss_rate=CountedRate.estimate_proportion(counts["missed"], counts["objects"]),
             confusion_rate=CountedRate.estimate_proportion(counts["confused"], detected_count),
@@ -380,7 +380,7 @@ class ErrorStatistics:
             jitter=math.sqrt(jitter_variance),
             # Laplace's rule of succession estimates the fraction.
             repeated=(self._repeated_count + 1) / (self._error_count + 2),
-            bias=math.sqrt(bias_variance),
+            bias=math.sqrt(max(bias_variance, 0.0)),
         )
 
     def _measure_errors(
