@@ -9,14 +9,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
-from xml.etree import ElementTree
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
 from rich.table import Table
 
-from executive.campaign.results import RunRow, SweepSettings, describe_variant, encode_row
+from executive.campaign.results import RunRow, describe_variant, encode_row
 from executive.campaign.sweep_summary import (
     Difference,
     Estimate,
@@ -30,7 +29,7 @@ from executive.record.result import Audit
 from executive.record.run_directory import RunDirectory, convert_os_errors, write_atomically
 from executive.view.report import try_write_report
 from executive.view.terminal import describe_end
-from executive.view.text import render_template, replace_invalid_xml_characters
+from executive.view.text import render_template
 
 MAX_LISTED_SEEDS = 10
 """Maximum number of seeds that are listed for a group of failures."""
@@ -303,34 +302,4 @@ def format_junit(sweep: SweepResults) -> str:
     A run with the status FAULT is an error. A run with the status FAILURE or INCOMPLETE is a failure, and so
     is a successful run whose audit contradicts the ledger.
     """
-    cases = [_make_case(sweep.settings, run) for run in sweep.runs]
-    suite = ElementTree.Element(
-        "testsuite",
-        name=f"executive sweep {sweep.settings.mission_name}",
-        tests=str(len(cases)),
-        failures=str(sum(case.find("failure") is not None for case in cases)),
-        errors=str(sum(case.find("error") is not None for case in cases)),
-        time=f"{sum(run.wall_time_s for run in sweep.runs):.3f}",
-    )
-    suite.extend(cases)
-    root = ElementTree.Element("testsuites")
-    root.append(suite)
-    ElementTree.indent(root)
-    text = ElementTree.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{replace_invalid_xml_characters(text)}\n'
-
-
-def _make_case(settings: SweepSettings, run: RunRow) -> ElementTree.Element:
-    case = ElementTree.Element(
-        "testcase",
-        classname=settings.mission_name,
-        name=" ".join((f"seed {run.seed}", *(f"{key}={value}" for key, value in run.variant.items()))),
-        time=f"{run.wall_time_s:.3f}",
-    )
-    if run.problem:
-        tag = "error" if run.status == "FAULT" else "failure"
-        message = run.explanation or run.status
-        element = ElementTree.SubElement(case, tag, type=run.problem, message=message)
-        element.text = f"{run.status} {run.problem} {run.node}".strip() + f"\n{message}\n{run.run_directory}"
-    ElementTree.SubElement(case, "system-out").text = settings.make_repeat_command(run)
-    return case
+    return f"{render_template('junit.xml', sweep=sweep)}\n"
