@@ -281,10 +281,7 @@ def store_evaluation(
             if label != NO_OBJECT
         },
         counts={
-            str(count): envelope.ErrorCounts(
-                **{name: errors.get(name, 0) for name in envelope.ErrorCounts.model_fields}
-            )
-            for count, errors in sorted(evaluation.by_count.items())
+            str(count): envelope.ErrorCounts(**row) for count, row in sorted(evaluation.by_count.items())
         },
         frames=evaluation.frames,
     )

@@ -180,14 +180,12 @@ def write_page(
         for summary in sweep.summaries:
             label = f"{sweep.side} {describe_variant(summary.variant)}".strip() or "all runs"
             groups.append({"label": label, "summary": summary})
-    skills = [skill.skill for sweep in sweeps for summary in sweep.summaries for skill in summary.skills]
     problems = [(sweep, run) for sweep in sweeps for run in sweep.runs if run.problem]
     path = folder / PAGE_NAME
     page = render_template(
         "results.html",
         sweeps=sweeps,
         groups=groups,
-        skills=list(dict.fromkeys(skills)),
         differences=differences,
         changed_pairs=changed_pairs,
         problems=problems,

@@ -203,13 +203,11 @@ def _group_failures(runs: Sequence[RunRow], settings: SweepSettings) -> tuple[Fa
         if run.problem:
             groups[run.status, run.problem, run.node].append(run)
     failures = []
-    for (status, reason, node), group in groups.items():
+    for problem, group in groups.items():
         first = group[0]
         seeds = tuple(run.seed for run in group)
         command = settings.make_repeat_command(first)
-        failures.append(
-            FailureGroup(status, reason, node, seeds, first.explanation, first.run_directory, command)
-        )
+        failures.append(FailureGroup(*problem, seeds, first.explanation, first.run_directory, command))
     return tuple(sorted(failures, key=lambda failure: -len(failure.seeds)))
 
 

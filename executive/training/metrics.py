@@ -337,7 +337,8 @@ class ErrorStatistics:
                 is_comparable = second is not None and second.is_correct and sample.is_fully_visible(index)
                 self._measure_errors(match, second if is_comparable else None, index, sample, frame)
         self.confusion.update((NO_OBJECT, detection.label) for detection in false_detections)
-        counts.update(false_detections=len(false_detections))
+        # Each row has all keys, also if no object is fully visible.
+        counts.update(objects=0, missed=0, confused=0, false_detections=len(false_detections))
         for detection in false_detections if second_matches is not None else ():
             boxes = [second.box for second in second_false_detections if second.label == detection.label]
             self._error_count += 1
