@@ -158,10 +158,10 @@ def _hash_files() -> str:
     package = Path(executive.__file__).parent
     digest = hashlib.sha256()
     for folder in (package, package.parent / "skills", get_shipped_folder()):
-        files = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*")}
-        for name in sorted(name for name in files if name.endswith(HASHED_SUFFIXES)):
-            if not name.startswith("shipped/"):
-                digest.update(f"{name}\0".encode() + files[name].read_bytes())
+        for path in sorted(folder.rglob("*")):
+            name = path.relative_to(folder).as_posix()
+            if name.endswith(HASHED_SUFFIXES) and not name.startswith("shipped/"):
+                digest.update(f"{name}\0".encode() + path.read_bytes())
     return digest.hexdigest()[:12]
 
 

@@ -22,7 +22,7 @@ from executive.record.run_directory import write_atomically
 from executive.training import evaluate
 from executive.training.dataset import LabelledImage
 from executive.training.evaluate import CellDetector, Mistake
-from executive.training.metrics import NO_OBJECT, ClassMetrics, Evaluation
+from executive.training.metrics import NO_OBJECT, Evaluation
 from executive.training.rendering import generate_dataset, render_run_frames
 from executive.training.samples import LabelledDataset
 
@@ -174,9 +174,8 @@ def measure_detector(
     localizer = None
     # The method `ray` needs a simulated world.
     if cell_of_images and cell_of_images.localization != "ray":
-        objects = cell_of_images.objects
-        object_classes = {label: objects[label].build_class(label) for label in objects}
-        localizer = CellLocalizer(cell_of_images.localization, object_classes)
+        objects = {label: entry.build_class(label) for label, entry in cell_of_images.objects.items()}
+        localizer = CellLocalizer(cell_of_images.localization, objects)
     name = detector.name
     if settings.dataset is not None:
         known_classes = classes or find_detectable_labels(detector.configs, detector.base_folder)[name] or ()
@@ -240,8 +239,7 @@ def find_weakness(detector: DetectorUnderTest, evaluation: Evaluation) -> str:
     counts = {label: 0 for label, section in detector.cell.objects.items() if not section.looks_like}
     counts |= {label: metrics.objects for label, metrics in evaluation.by_class.items()}
     problems = [f"{count} {label} objects" for label, count in counts.items() if count < MIN_OBJECT_COUNT]
-    all_classes = ClassMetrics(evaluation.objects, evaluation.precision, evaluation.recall)
-    for name, metrics in {"all classes": all_classes, **evaluation.by_class}.items():
+    for name, metrics in {"all classes": evaluation, **evaluation.by_class}.items():
         if min(metrics.precision, metrics.recall) < MIN_ACCURACY:
             problems.append(f"precision {metrics.precision:.2f}, recall {metrics.recall:.2f} of {name}")
     return ", ".join(problems)
@@ -283,10 +281,7 @@ def store_evaluation(
             if label != NO_OBJECT
         },
         counts={
-            str(count): envelope.ErrorCounts(
-                **{name: errors.get(name, 0) for name in envelope.ErrorCounts.model_fields}
-            )
-            for count, errors in sorted(evaluation.by_count.items())
+            str(count): envelope.ErrorCounts(**row) for count, row in sorted(evaluation.by_count.items())
         },
         frames=evaluation.frames,
     )

@@ -10,15 +10,15 @@ import fcntl
 import json
 import os
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, is_dataclass
 from itertools import pairwise, product
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import TypeAdapter
 
-from executive.cell.json_values import DECIMAL_PLACES
+from executive.cell.json_values import DECIMAL_PLACES, to_json
 from executive.errors import InputError
 from executive.events import ItemChanged
 from executive.record.result import Audit, ItemCounts, Result, describe_disagreement
@@ -33,6 +33,9 @@ SCHEMA_VERSION = 1
 """Version of the tables, stored as `user_version` of the file."""
 BUSY_TIMEOUT = 60.0
 """Maximum time for which a transaction waits for another program that reads the file [s]."""
+JSON_COLUMNS = ("overrides", "variations", "versions", "variant")
+"""Columns with the JSON text of a mapping."""
+RowT = TypeVar("RowT")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +49,7 @@ class SweepSettings:
     variations: Mapping[str, tuple[str, ...]]
     first_seed: int
     last_seed: int
-    scene: Path | None
+    scene: Path | None = None
     saves_images: bool
     inputs_hash: str
     versions: Mapping[str, str]
@@ -146,16 +149,8 @@ def make_record(run_index: int, variant: Mapping[str, str], result: Result, time
         result: Result of the run.
         timeline: Timeline of the run; it must keep its history (`has_history`).
     """
-    run = RunRow(
-        run_index=run_index, seed=result.seed, variant=variant,
-        status=result.status, reason=result.reason, message=result.message, node=result.node,
-        items=result.items, audit=result.audit,
-        planning=replace(result.planning, waited_s=round(result.planning.waited_s, DECIMAL_PLACES)),
-        ticks=result.ticks,
-        robot_time_s=round(result.robot_time_s, DECIMAL_PLACES),
-        wall_time_s=round(result.wall_time_s, DECIMAL_PLACES),
-        decision_hash=result.trace, run_directory=result.run,
-    )  # fmt: skip
+    values = {**to_json(result), "decision_hash": result.trace, "run_directory": result.run}
+    run = TypeAdapter(RunRow).validate_python({**values, "run_index": run_index, "variant": variant})
     items = tuple((item, _measure_item_time(item.item, timeline)) for item in timeline.items.changes.values())
     return RunRecord(run, items, tuple(_list_skills(run_index, timeline)))
 
@@ -213,14 +208,14 @@ class ResultsDatabase:
                 with self._connection as connection:
                     # Tables and settings are written in one transaction.
                     connection.executescript(f"BEGIN; {SCHEMA_PATH.read_text(encoding='utf-8')}")
-                    self._insert("settings", [_encode_settings(settings)])
+                    self._insert("settings", encode_row(settings))
             (version,) = self._connection.execute("PRAGMA user_version").fetchone()
         if version != SCHEMA_VERSION:
             raise InputError(
                 f'"{path}" is no database of a sweep, or has the schema version {version}; '
                 f"this program reads version {SCHEMA_VERSION}; start a new sweep"
             )
-        (self.settings,) = map(_decode_settings, self._select("settings"))
+        (self.settings,) = self._select(SweepSettings, "settings")
         if settings is not None:
             self.lock()
 
@@ -246,17 +241,23 @@ class ResultsDatabase:
             InputError: The file cannot be written, or contains the run already.
         """
         with self._convert_sqlite_errors(), self._connection:
-            self._insert("runs", [encode_run(record.run)])
-            self._insert("items", (_encode_item(record.run.run_index, *entry) for entry in record.items))
-            self._insert("skills", map(vars, record.skills))
+            self._insert("runs", encode_row(record.run))
+            for item, time in record.items:
+                self._insert("items", {
+                    "run_index": record.run.run_index, "item": item.item, "label": item.label,
+                    "state": item.state, "bin": item.bin, "failed_attempts": item.attempts,
+                    "robot_time_s": time,
+                })  # fmt: skip
+            for skill in record.skills:
+                self._insert("skills", encode_row(skill))
 
     def read_runs(self) -> list[RunRow]:
         """Return the rows of all runs, in the order of the jobs."""
-        return list(map(_decode_run, self._select("runs ORDER BY run_index")))
+        return self._select(RunRow, "runs ORDER BY run_index")
 
     def read_skills(self) -> list[SkillRow]:
         """Return the rows of all skills, sorted by run."""
-        return [SkillRow(**row) for row in self._select("skills ORDER BY run_index, rowid")]
+        return self._select(SkillRow, "skills ORDER BY run_index, rowid")
 
     def close(self) -> None:
         """Close the file."""
@@ -265,15 +266,17 @@ class ResultsDatabase:
             os.close(self._lock_descriptor)
             self._lock_descriptor = None
 
-    def _insert(self, table: str, rows: Iterable[Mapping[str, Any]]) -> None:
-        for row in rows:
-            placeholders = ", ".join("?" * len(row))
-            statement = f"INSERT INTO {table} ({', '.join(row)}) VALUES ({placeholders})"
-            self._connection.execute(statement, tuple(row.values()))
+    def _insert(self, table: str, columns: Mapping[str, Any]) -> None:
+        placeholders = ", ".join("?" * len(columns))
+        statement = f"INSERT INTO {table} ({', '.join(columns)}) VALUES ({placeholders})"
+        self._connection.execute(statement, tuple(columns.values()))
 
-    def _select(self, source: str) -> list[dict[str, Any]]:
+    def _select(self, row_class: type[RowT], source: str) -> list[RowT]:
         with self._convert_sqlite_errors():
-            return [dict(row) for row in self._connection.execute(f"SELECT * FROM {source}")]
+            rows = self._connection.execute(f"SELECT * FROM {source}").fetchall()
+        # The adapter also converts the numbers of SQLite, which has no Boolean type.
+        adapter = TypeAdapter(row_class)
+        return [adapter.validate_python(_decode_columns(row)) for row in rows]
 
     @contextlib.contextmanager
     def _convert_sqlite_errors(self) -> Iterator[None]:
@@ -287,51 +290,29 @@ class ResultsDatabase:
             ) from error
 
 
-def encode_run(run: RunRow) -> dict[str, Any]:
-    """Return the columns of a run; those of the audit are missing if there was no audit."""
-    columns = {**vars(run), "variant": _to_json_text(run.variant)}
-    for prefix in ("items", "audit", "planning"):
-        part = columns.pop(prefix)
-        if part is not None:
-            columns |= {f"{prefix}_{name}": value for name, value in vars(part).items()}
+def encode_row(row: SweepSettings | RunRow | SkillRow) -> dict[str, Any]:
+    """Return the columns of a row, without the columns of values that are None."""
+    columns = {name: value for name, value in vars(row).items() if value is not None}
+    for name, value in list(columns.items()):
+        if name in JSON_COLUMNS:
+            columns[name] = json.dumps(value, ensure_ascii=False)
+        elif isinstance(value, Path):
+            columns[name] = str(value)
+        elif is_dataclass(value):
+            del columns[name]
+            columns |= {f"{name}_{key}": number for key, number in vars(value).items()}
     return columns
 
 
-_RUN_ADAPTER = TypeAdapter(RunRow)
-"""Converts the numbers of SQLite, which has no Boolean type, to a run."""
-
-
-def _encode_item(run_index: int, item: ItemChanged, time: float) -> dict[str, Any]:
-    return {
-        "run_index": run_index, "item": item.item, "label": item.label, "state": item.state, "bin": item.bin,
-        "failed_attempts": item.attempts, "robot_time_s": time,
-    }  # fmt: skip
-
-
-def _decode_run(columns: dict[str, Any]) -> RunRow:
-    parts: dict[str, dict[str, Any]] = {"items": {}, "audit": {}, "planning": {}}
-    for column in list(columns):
-        prefix, _, name = column.partition("_")
-        if prefix in parts:
-            parts[prefix][name] = columns.pop(column)
-    has_audit = parts["audit"]["agrees"] is not None
-    variant = json.loads(columns["variant"])
-    values = {**columns, **parts, "variant": variant, "audit": parts["audit"] if has_audit else None}
-    return _RUN_ADAPTER.validate_python(values)
-
-
-def _encode_settings(settings: SweepSettings) -> dict[str, Any]:
-    columns = {**vars(settings), "scene": settings.scene and str(settings.scene)}
-    for name in ("overrides", "variations", "versions"):
-        columns[name] = _to_json_text(columns[name])
-    return columns
-
-
-def _decode_settings(columns: dict[str, Any]) -> SweepSettings:
-    for name in ("overrides", "variations", "versions"):
-        columns[name] = json.loads(columns[name])
-    return TypeAdapter(SweepSettings).validate_python(columns)
-
-
-def _to_json_text(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False)
+def _decode_columns(row: sqlite3.Row) -> dict[str, Any]:
+    """Return the values of a row by field, without the columns that are NULL."""
+    values: dict[str, Any] = {}
+    for column, value in dict(row).items():
+        part, _, name = column.partition("_")
+        if value is None:
+            continue
+        if part in ("items", "audit", "planning"):
+            values.setdefault(part, {})[name] = value
+        else:
+            values[column] = json.loads(value) if column in JSON_COLUMNS else value
+    return values

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from datetime import datetime
@@ -18,7 +18,7 @@ from executive.campaign.results import FILE_NAME, ResultsDatabase, RunRecord, Sw
 from executive.campaign.sweep_summary import SweepResults, summarize_runs
 from executive.cells.sim.scene import load_scene
 from executive.errors import InputError
-from executive.mission.load import LoadedMission, load_mission
+from executive.mission.load import load_mission
 from executive.mission.yaml_files import read_source
 from executive.perception.detectors.envelope import FAKE_KIND, compute_fingerprint
 from executive.plugins import DISTRIBUTION, list_versions, load_cell_kind, load_skills
@@ -46,44 +46,35 @@ def make_settings(
         MissionError: A variant has errors.
         InputError: An input does not exist.
     """
-    settings = SweepSettings(
+    return _complete_settings(SweepSettings(
         mission=mission, mission_name="", cell="", overrides=overrides, variations=variations,
         first_seed=seeds[0], last_seed=seeds[-1], scene=scene,
         saves_images=saves_images, inputs_hash="", versions=dict(list_versions()),
-    )  # fmt: skip
-    missions = _load_variants(settings)
-    first = missions[0]
-    return replace(
-        settings, mission_name=first.mission.name, cell=str(first.cell_path),
-        inputs_hash=_hash_inputs(missions, scene),
-    )  # fmt: skip
+    ))  # fmt: skip
 
 
-def _load_variants(settings: SweepSettings) -> list[LoadedMission]:
-    """Load the mission of each variant and check the scene, to report an error before the first run."""
+def _complete_settings(settings: SweepSettings) -> SweepSettings:
+    """Check all inputs; return the settings with name and cell of the mission, and with a hash of the inputs.
+
+    The inputs are the texts of the missions, libraries and scene, the cell configurations, and the detector
+    weights.
+    """
     skills = load_skills()
     missions = [
         load_mission(settings.mission, skills, {**settings.overrides, **variant}, load_cell_kind)
         for variant in settings.variants
     ]
-    for loaded in missions if settings.scene else ():
+    for loaded in missions:
         load_scene(settings.scene, loaded.cell_config)
-    return missions
-
-
-def _hash_inputs(missions: Iterable[LoadedMission], scene: Path | None) -> str:
-    """Return a hash of all inputs.
-
-    The inputs are the texts of the missions, libraries and scene, the cell configurations, and the detector
-    weights.
-    """
-    inputs: list[object] = [] if scene is None else [read_source(scene).text]
+    inputs: list[object] = [] if settings.scene is None else [read_source(settings.scene).text]
     for loaded in missions:
         cell = loaded.cell_config
         names = [] if cell.kind == FAKE_KIND else [*cell.detectors]
         weights = [compute_fingerprint(cell, name, loaded.cell_path.parent)["weights"] for name in names]
         inputs += [loaded.text, dict(loaded.libraries), cell.model_dump(mode="json"), weights]
-    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
+    inputs_hash = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
+    name = missions[0].mission.name
+    return replace(settings, mission_name=name, cell=str(missions[0].cell_path), inputs_hash=inputs_hash)
 
 
 def create_sweep(settings: SweepSettings, runs_folder: Path) -> ResultsDatabase:
@@ -106,7 +97,7 @@ def open_sweep(path: Path) -> ResultsDatabase:
         file = path / FILE_NAME if path.is_dir() else path
         database = stack.enter_context(closing(ResultsDatabase(file)))
         settings = database.settings
-        if _hash_inputs(_load_variants(settings), settings.scene) != settings.inputs_hash:
+        if _complete_settings(settings).inputs_hash != settings.inputs_hash:
             raise InputError(
                 f'the mission "{settings.mission}", its libraries, its cell, its weights or its scene '
                 f'changed after the sweep "{path}" began, and the results would mix both versions; restore '

@@ -9,14 +9,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
-from xml.etree import ElementTree
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
 from rich.table import Table
 
-from executive.campaign.results import RunRow, SweepSettings, describe_variant, encode_run
+from executive.campaign.results import RunRow, describe_variant, encode_row
 from executive.campaign.sweep_summary import (
     Difference,
     Estimate,
@@ -30,7 +29,7 @@ from executive.record.result import Audit
 from executive.record.run_directory import RunDirectory, convert_os_errors, write_atomically
 from executive.view.report import try_write_report
 from executive.view.terminal import describe_end
-from executive.view.text import render_template, replace_invalid_xml_characters
+from executive.view.text import render_template
 
 MAX_LISTED_SEEDS = 10
 """Maximum number of seeds that are listed for a group of failures."""
@@ -49,7 +48,7 @@ STATISTICS = ("mean", *PERCENTILES)
 OPERATORS = {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
 """Comparisons by symbol."""
 _EXAMPLE = RunRow(run_index=0, seed=0, status="", audit=Audit())
-_COLUMNS = [name for name, value in encode_run(_EXAMPLE).items() if isinstance(value, (int, float))][2:]
+_COLUMNS = [name for name, value in encode_row(_EXAMPLE).items() if isinstance(value, (int, float))][2:]
 """Names of the numeric columns of a run, without `run_index` and `seed`."""
 _CONDITION_PATTERN = re.compile(
     r"\s*(\w+)\s*(?:\(\s*(\w+)\s*\))?\s*([<>]=?)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
@@ -181,14 +180,12 @@ def write_page(
         for summary in sweep.summaries:
             label = f"{sweep.side} {describe_variant(summary.variant)}".strip() or "all runs"
             groups.append({"label": label, "summary": summary})
-    skills = [skill.skill for sweep in sweeps for summary in sweep.summaries for skill in summary.skills]
     problems = [(sweep, run) for sweep in sweeps for run in sweep.runs if run.problem]
     path = folder / PAGE_NAME
     page = render_template(
         "results.html",
         sweeps=sweeps,
         groups=groups,
-        skills=list(dict.fromkeys(skills)),
         differences=differences,
         changed_pairs=changed_pairs,
         problems=problems,
@@ -235,7 +232,7 @@ class Condition:
         if not self.column:
             value: float | None = getattr(summary, self.metric).value
             return value
-        columns = map(encode_run, runs)
+        columns = map(encode_row, runs)
         numbers = [float(each[self.column]) for each in columns if self.column in each]
         if not numbers:
             return None
@@ -303,34 +300,4 @@ def format_junit(sweep: SweepResults) -> str:
     A run with the status FAULT is an error. A run with the status FAILURE or INCOMPLETE is a failure, and so
     is a successful run whose audit contradicts the ledger.
     """
-    cases = [_make_case(sweep.settings, run) for run in sweep.runs]
-    suite = ElementTree.Element(
-        "testsuite",
-        name=f"executive sweep {sweep.settings.mission_name}",
-        tests=str(len(cases)),
-        failures=str(sum(case.find("failure") is not None for case in cases)),
-        errors=str(sum(case.find("error") is not None for case in cases)),
-        time=f"{sum(run.wall_time_s for run in sweep.runs):.3f}",
-    )
-    suite.extend(cases)
-    root = ElementTree.Element("testsuites")
-    root.append(suite)
-    ElementTree.indent(root)
-    text = ElementTree.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{replace_invalid_xml_characters(text)}\n'
-
-
-def _make_case(settings: SweepSettings, run: RunRow) -> ElementTree.Element:
-    case = ElementTree.Element(
-        "testcase",
-        classname=settings.mission_name,
-        name=" ".join((f"seed {run.seed}", *(f"{key}={value}" for key, value in run.variant.items()))),
-        time=f"{run.wall_time_s:.3f}",
-    )
-    if run.problem:
-        tag = "error" if run.status == "FAULT" else "failure"
-        message = run.explanation or run.status
-        element = ElementTree.SubElement(case, tag, type=run.problem, message=message)
-        element.text = f"{run.status} {run.problem} {run.node}".strip() + f"\n{message}\n{run.run_directory}"
-    ElementTree.SubElement(case, "system-out").text = settings.make_repeat_command(run)
-    return case
+    return f"{render_template('junit.xml', sweep=sweep)}\n"

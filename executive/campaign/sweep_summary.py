@@ -203,13 +203,11 @@ def _group_failures(runs: Sequence[RunRow], settings: SweepSettings) -> tuple[Fa
         if run.problem:
             groups[run.status, run.problem, run.node].append(run)
     failures = []
-    for (status, reason, node), group in groups.items():
+    for problem, group in groups.items():
         first = group[0]
         seeds = tuple(run.seed for run in group)
         command = settings.make_repeat_command(first)
-        failures.append(
-            FailureGroup(status, reason, node, seeds, first.explanation, first.run_directory, command)
-        )
+        failures.append(FailureGroup(*problem, seeds, first.explanation, first.run_directory, command))
     return tuple(sorted(failures, key=lambda failure: -len(failure.seeds)))
 
 
@@ -321,36 +319,29 @@ def compute_differences(pairs: Sequence[RunPair]) -> list[Difference]:
     succeed.
     """
     both_succeeded = [pair for pair in pairs if pair.a.is_success and pair.b.is_success]
-    successes = [(pair.a.is_success, 1, pair.b.is_success, 1) for pair in pairs]
-    throughputs = [(*_get_throughput_terms(pair.a), *_get_throughput_terms(pair.b)) for pair in pairs]
-    times = [(pair.a.robot_time_s, 1, pair.b.robot_time_s, 1) for pair in both_succeeded]
     return [
-        _estimate_difference("success rate", successes),
-        _estimate_difference("objects per hour", throughputs),
-        _estimate_difference("robot time if both runs succeed [s]", times),
+        _estimate_difference("success rate", pairs, lambda run: (run.is_success, 1)),
+        _estimate_difference(
+            "objects per hour", pairs, lambda run: (run.items.placed, run.robot_time_s / SECONDS_PER_HOUR)
+        ),
+        _estimate_difference(
+            "robot time if both runs succeed [s]", both_succeeded, lambda run: (run.robot_time_s, 1)
+        ),
     ]
 
 
-def _get_throughput_terms(run: RunRow) -> tuple[float, float]:
-    """Return the number of placed objects, and the robot time [h]."""
-    return run.items.placed, run.robot_time_s / SECONDS_PER_HOUR
-
-
-def _estimate_difference(metric: str, terms: Sequence[tuple[float, float, float, float]]) -> Difference:
-    """Return the difference of two ratios of sums.
-
-    Args:
-        metric: Name of the metric.
-        terms: Numerator and denominator of the ratio of A, and of the ratio of B, for each pair.
-    """
+def _estimate_difference(
+    metric: str, pairs: Sequence[RunPair], get_terms: Callable[[RunRow], tuple[float, float]]
+) -> Difference:
+    """Return the difference of two ratios of sums; `get_terms` returns numerator and denominator of a run."""
 
     def subtract_ratios(*columns: FloatArray, axis: int) -> FloatArray:
         ratio_of_a = divide_sums(columns[0], columns[1], axis)
         return divide_sums(columns[2], columns[3], axis) - ratio_of_a
 
+    terms = [(*get_terms(pair.a), *get_terms(pair.b)) for pair in pairs]
     columns = np.array(terms, dtype=float).reshape(-1, 4).T
-    if not (columns[1].sum() and columns[3].sum()):
+    if not columns[1::2].sum(axis=1).all():
         return Difference(metric)
-    a = float(columns[0].sum() / columns[1].sum())
-    b = float(columns[2].sum() / columns[3].sum())
+    a, b = divide_sums(columns[::2], columns[1::2], axis=1).tolist()
     return Difference(metric, a, b, b - a, *compute_bootstrap_interval(subtract_ratios, tuple(columns)))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from executive.cli.options import check_usage, json_option, mission_argument, overrides_option
-from executive.cli.streams import keep_stdout_clean, print_json
+from executive.cli.streams import keep_stdout_clean, print_json, print_result
 from executive.errors import ExitCode, InputError
 
 if TYPE_CHECKING:
@@ -61,10 +61,7 @@ def check_command(missions: tuple[str, ...], overrides: dict[str, str], as_json:
             entries = [{**asdict(finding), "excerpt": finding.shown_excerpt} for finding in listed_findings]
             endings = list(map(asdict, failures))
             reports.append({"mission": mission, "ok": is_valid, "findings": entries, "endings": endings})
-    if as_json:
-        print_json(reports)
-    else:
-        click.echo("\n".join(texts))
+    print_result(reports, "\n".join(texts), as_json=as_json)
     return ExitCode.SUCCESS if all(report["ok"] for report in reports) else ExitCode.INVALID_INPUT
 
 
@@ -141,7 +138,7 @@ def tree_command(
                 output = format_btcpp(loaded.mission, loaded.skills)
             case _:
                 output = draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
-    print_json(output) if as_json else click.echo(output)
+    print_result(output, output, as_json=as_json)
 
 
 @click.command(name="schema")

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import click
 
 from executive.cli.options import json_option
-from executive.cli.streams import keep_stdout_clean, print_json
+from executive.cli.streams import keep_stdout_clean, print_result
 from executive.errors import ExitCode, InputError
 
 
@@ -41,11 +41,8 @@ def doctor_command(as_json: bool) -> ExitCode:
     """
     with keep_stdout_clean():
         results = list(run_checks())
-    if as_json:
-        print_json([result._asdict() for result in results])
-    else:
-        for status, subject, message in results:
-            click.echo(f"{status:7}  {subject:9}  {message}")
+    lines = [f"{status:7}  {subject:9}  {message}" for status, subject, message in results]
+    print_result([result._asdict() for result in results], "\n".join(lines), as_json=as_json)
     return ExitCode.FAILURE if any(result.status == "problem" for result in results) else ExitCode.SUCCESS
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from executive.cli import options
-from executive.cli.streams import keep_stdout_clean, open_unescaped_stderr, print_json
+from executive.cli.streams import keep_stdout_clean, open_unescaped_stderr, print_json, print_result
 from executive.errors import ExitCode
 
 
@@ -205,7 +205,4 @@ def report_command(run: str, runs_folder: Path, as_json: bool) -> None:
         from executive.view.report import write_report
 
         file = write_report(find_run(run, runs_folder))
-    if as_json:
-        print_json({"report": str(file), "bytes": file.stat().st_size})
-    else:
-        click.echo(file)
+    print_result({"report": str(file), "bytes": file.stat().st_size}, str(file), as_json=as_json)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 import click
 
 from executive.cli.options import json_option
-from executive.cli.streams import keep_stdout_clean, print_json
+from executive.cli.streams import keep_stdout_clean, print_json, print_result
 from executive.errors import ExitCode, InputError
 
 if TYPE_CHECKING:
@@ -48,10 +48,8 @@ def skills_command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
     if conform:
         return ExitCode.SUCCESS if _check_conformance(skills, as_json) else ExitCode.FAILURE
     declarations = [collect_declarations(key, skill) for key, skill in skills.items()]
-    if as_json:
-        print_json(declarations if name is None else declarations[0])
-    else:
-        click.echo("\n".join(map(_describe_skill if name else _summarize_skill, declarations)))
+    text = "\n".join(map(_describe_skill if name else _summarize_skill, declarations))
+    print_result(declarations if name is None else declarations[0], text, as_json=as_json)
     return ExitCode.SUCCESS
 
 

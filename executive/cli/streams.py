@@ -106,3 +106,8 @@ def keep_stdout_clean() -> Iterator[None]:
 def print_json(value: Any) -> None:
     """Print `value` to stdout as one JSON object or array."""
     click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def print_result(value: Any, text: str, *, as_json: bool) -> None:
+    """Print the result of a command to stdout: `value` as JSON, or `text`."""
+    print_json(value) if as_json else click.echo(text)

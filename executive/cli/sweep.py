@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from executive.cli import options
-from executive.cli.streams import keep_stdout_clean, print_json
+from executive.cli.streams import keep_stdout_clean, print_json, print_result
 from executive.errors import ExitCode
 
 
@@ -223,5 +223,5 @@ def faults_command(
                 text = "\n".join(fault_campaign.list_result_lines(campaign))
                 has_problems = any(trial.problems for trial in campaign.trials)
                 exit_code = int(has_problems) if campaign.is_complete else ExitCode.HALTED
-    print_json(output) if as_json else click.echo(text)
+    print_result(output, text, as_json=as_json)
     return exit_code

@@ -28,7 +28,6 @@ from executive.training.metrics import (
     Distribution,
     ErrorStatistics,
     Evaluation,
-    RepeatedErrors,
     is_ignored,
     match_detections,
 )
@@ -93,7 +92,6 @@ def evaluate(
         cell: Cell whose workspace is measured: brightness, contrast and colours; None: no measurement.
     """
     errors = ErrorStatistics(localizer)
-    repeated_errors = RepeatedErrors(localizer)
     average_precision = AveragePrecision()
     statistics_of_frames: list[Mapping[str, float]] = []
     latencies: list[float] = []
@@ -113,12 +111,12 @@ def evaluate(
         average_precision.add([entry for entry in answer.confident if not is_ignored(entry, sample)], sample)
         min_confidence = answer.error_rates.threshold if threshold is None else threshold
         matches = _match_confident(answer, sample, min_confidence)
-        errors.add(matches, sample, frame)
+        second_matches = None
         if sample.repeated_image is not None:
             with contextlib.suppress(Unavailable):
                 second_answer, _ = detector.detect(replace(frame, image=sample.repeated_image))
                 second_matches = _match_confident(second_answer, sample, min_confidence)
-                repeated_errors.add(matches, second_matches, sample, frame)
+        errors.add(matches, second_matches, sample, frame)
         if cell is not None and (frame_statistics := compute_frame_statistics(frame, cell)):
             statistics_of_frames.append(frame_statistics)
         if mistakes is not None:
@@ -142,7 +140,7 @@ def evaluate(
         why=unavailable_reason,
         answered_by=dict(answer_counts),
         by_count={count: dict(counts) for count, counts in errors.counts_by_object_count.items()},
-        reliability=errors.estimate_error_rates(repeated_errors),
+        reliability=errors.estimate_error_rates(),
         frames=FrameRange.compute(statistics_of_frames),
     )
 

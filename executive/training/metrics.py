@@ -67,7 +67,8 @@ class ClassMetrics:
 
     Attributes:
         objects: Number of objects of these classes.
-        precision: Fraction of the detections of these classes that are correct.
+        precision: Fraction of the detections of these classes that have the correct class and an IoU of at
+            least 0.5.
         recall: Fraction of the objects that are detected with their class.
     """
 
@@ -138,15 +139,12 @@ class MeasuredErrorRates:
 
 
 @dataclass(frozen=True)
-class Evaluation:
-    """Accuracy of a detector on labelled images.
+class Evaluation(ClassMetrics):
+    """Accuracy of a detector for all classes in labelled images; images without an answer have no objects.
 
     Attributes:
         threshold: Minimum confidence of a detection.
         images: Number of images, including images without an answer.
-        objects: Number of objects in the images with an answer.
-        precision: Fraction of the detections that have the correct class and an IoU of at least 0.5.
-        recall: Fraction of the objects that are detected with their class.
         map50: Mean average precision at IoU 0.5 over detections with any confidence.
         map50_95: Mean average precision over IoUs from 0.5 to 0.95.
         centre: Distance between the centres of the detected and the true box [pixel].
@@ -166,9 +164,6 @@ class Evaluation:
 
     threshold: float
     images: int
-    objects: int
-    precision: float
-    recall: float
     map50: float
     map50_95: float
     centre: Distribution | None = None
@@ -280,6 +275,10 @@ def compute_ious(boxes: Sequence[Box], other_boxes: Sequence[Box]) -> NDArray[np
 class ErrorStatistics:
     """Counts of correct and wrong detections, and distances between detected and true positions.
 
+    Two images of a scene differ only in the noise of the sensor, so that the systematic error of an object is
+    equal in both images. Half the mean squared difference of the two errors is the variance of the random
+    error; the mean product of the two errors is the variance of the systematic error.
+
     Args:
         localizer: Computes the positions of detections; None: positions are not evaluated.
 
@@ -302,23 +301,48 @@ class ErrorStatistics:
         self.centre_errors: list[float] = []
         self.position_errors: list[float] = []
         self.localization_errors: list[float] = []
+        # Numbers of errors in first images with a second image, and of those that the second image repeats.
+        self._error_count = 0
+        self._repeated_count = 0
+        # Values for each object and axis: squares and variances in the image [pixel²], products on the table
+        # [m²].
         self._squared_offsets: list[float] = []
+        self._random_variances: list[float] = []
+        self._error_products: list[float] = []
 
-    def add(self, matches: Sequence[BoxMatch], sample: LabelledImage, frame: Frame) -> None:
-        """Count the matches of one image, and measure the position errors of its correct detections."""
+    def add(
+        self, matches: Sequence[BoxMatch], second_matches: Sequence[BoxMatch] | None, sample: LabelledImage,
+        frame: Frame,
+    ) -> None:  # fmt: skip
+        """Count the matches of one image, and measure the position errors of its correct detections.
+
+        `second_matches` are the matches in a second image of the scene; None without a second image.
+        """
         self._image_count += 1
         counts = self.counts_by_object_count[len(sample.labels)]
         match_by_object, false_detections = split_matches(matches)
+        second_by_object, second_false_detections = split_matches(second_matches or ())
         for index, label in enumerate(sample.labels):
             match = match_by_object.get(index)
+            second = second_by_object.get(index)
             self.confusion[label, match.detection.label if match else NO_OBJECT] += 1
             if sample.is_fully_visible(index) and (match or not is_occluded(index, matches, sample)):
                 is_confused = match is not None and not match.is_correct
                 counts.update(objects=1, missed=match is None, confused=is_confused)
+                if second_matches is not None and (match is None or is_confused):
+                    is_repeated = (match and match.detection.label) == (second and second.detection.label)
+                    self._error_count += 1
+                    self._repeated_count += is_repeated
             if match is not None and match.is_correct:
-                self._measure_errors(match, index, sample, frame)
+                is_comparable = second is not None and second.is_correct and sample.is_fully_visible(index)
+                self._measure_errors(match, second if is_comparable else None, index, sample, frame)
         self.confusion.update((NO_OBJECT, detection.label) for detection in false_detections)
-        counts.update(false_detections=len(false_detections))
+        # Each row has all keys, also if no object is fully visible.
+        counts.update(objects=0, missed=0, confused=0, false_detections=len(false_detections))
+        for detection in false_detections if second_matches is not None else ():
+            boxes = [second.box for second in second_false_detections if second.label == detection.label]
+            self._error_count += 1
+            self._repeated_count += bool(compute_ious([detection.box], boxes).max(initial=0.0) >= MIN_IOU)
 
     @property
     def labels(self) -> list[str]:
@@ -341,28 +365,35 @@ class ErrorStatistics:
         )
         return {row: {column: self.confusion[row, column] for column in columns} for row in rows}
 
-    def estimate_error_rates(self, repeats: RepeatedErrors) -> MeasuredErrorRates | None:
+    def estimate_error_rates(self) -> MeasuredErrorRates | None:
         """Return the error rates for fully visible objects, or None if there was no answer."""
         if not self._image_count:
             return None
         counts = sum(self.counts_by_object_count.values(), Counter[str]())
         detected_count = counts["objects"] - counts["missed"]
-        jitter = float(np.sqrt(np.mean(self._squared_offsets))) if self._squared_offsets else 0.0
+        # Without second images, all errors of box centres count as random errors.
+        jitter_variance = np.mean(self._random_variances or self._squared_offsets or 0.0)
+        bias_variance = float(np.mean(self._error_products or 0.0))
         return MeasuredErrorRates(
             miss_rate=CountedRate.estimate_proportion(counts["missed"], counts["objects"]),
             confusion_rate=CountedRate.estimate_proportion(counts["confused"], detected_count),
             false_detections=CountedRate.estimate_mean_count(counts["false_detections"], self._image_count),
-            jitter=jitter if repeats.jitter is None else repeats.jitter,
+            jitter=math.sqrt(jitter_variance),
             # Laplace's rule of succession estimates the fraction.
-            repeated=(repeats.repeated_count + 1) / (repeats.error_count + 2),
-            bias=repeats.bias,
+            repeated=(self._repeated_count + 1) / (self._error_count + 2),
+            bias=math.sqrt(max(bias_variance, 0.0)),
         )
 
-    def _measure_errors(self, match: BoxMatch, index: int, sample: LabelledImage, frame: Frame) -> None:
-        """Measure the position errors of a correct detection of the object `index`."""
+    def _measure_errors(
+        self, match: BoxMatch, second: BoxMatch | None, index: int, sample: LabelledImage, frame: Frame
+    ) -> None:
+        """Measure the position errors of a correct detection of the object `index`, perhaps in two images."""
         self.centre_errors.append(float(np.hypot(*match.offset)))
         if sample.is_fully_visible(index):
             self._squared_offsets += ((match.offset * sample.pixel_scale) ** 2).tolist()
+        if second is not None:
+            difference = (match.offset - second.offset) * sample.pixel_scale
+            self._random_variances += (difference**2 / 2).tolist()
         if not sample.is_fully_inside(index):
             return
         if "positions" in sample.truth:
@@ -370,80 +401,11 @@ class ErrorStatistics:
             position = intersect_plane(frame.matrix, frame.X_WC, match.detection.centre, true_position[2])
             self.position_errors.append(float(np.linalg.norm(position - true_position) * 1000))
         if self._localizer is not None and "centres" in sample.truth:
+            true_centre = np.array(sample.truth["centres"][index])
             # A run omits objects without a measured depth, too.
             with contextlib.suppress(NoDepth):
-                position = self._localizer.locate(match.detection, frame)
-                true_centre = np.array(sample.truth["centres"][index])
-                self.localization_errors.append(float(np.linalg.norm(position - true_centre) * 1000))
-
-
-class RepeatedErrors:
-    """Errors that are repeated in a second image, and random and systematic parts of position errors.
-
-    Two images of a scene differ only in the noise of the sensor, so that the systematic error of an object is
-    equal in both images. Half the mean squared difference of the two errors is the variance of the random
-    error; the mean product of the two errors is the variance of the systematic error.
-
-    Args:
-        localizer: Computes the positions of detections; None: systematic errors are not measured.
-
-    Attributes:
-        error_count: Number of errors in the first images.
-        repeated_count: Number of errors in the first images that occur in the second images, too.
-    """
-
-    def __init__(self, localizer: Localizer | None) -> None:
-        self._localizer = localizer
-        self.error_count = 0
-        self.repeated_count = 0
-        # Values for each object and axis: variances in the image [pixel²], products on the table [m²].
-        self._random_variances: list[float] = []
-        self._error_products: list[float] = []
-
-    def add(
-        self, matches: list[BoxMatch], second_matches: list[BoxMatch], sample: LabelledImage, frame: Frame
-    ) -> None:
-        """Count the errors in the first image of a scene, and the errors that the second image repeats."""
-        first_by_object, first_false_detections = split_matches(matches)
-        second_by_object, second_false_detections = split_matches(second_matches)
-        for index, label in enumerate(sample.labels):
-            if not sample.is_fully_visible(index):
-                continue
-            first_match = first_by_object.get(index)
-            second_match = second_by_object.get(index)
-            if first_match is None and is_occluded(index, matches, sample):
-                continue
-            first_label = first_match and first_match.detection.label
-            second_label = second_match and second_match.detection.label
-            self.error_count += first_label != label
-            self.repeated_count += first_label != label and first_label == second_label
-            if first_match and second_match and first_match.is_correct and second_match.is_correct:
-                self._add_errors(first_match, second_match, sample, frame)
-        for detection in first_false_detections:
-            boxes = [second.box for second in second_false_detections if second.label == detection.label]
-            self.error_count += 1
-            self.repeated_count += bool(compute_ious([detection.box], boxes).max(initial=0.0) >= MIN_IOU)
-
-    @property
-    def jitter(self) -> float | None:
-        """Standard deviation of a box centre's random error [pixel of the frame]; None without a value."""
-        return float(np.sqrt(np.mean(self._random_variances))) if self._random_variances else None
-
-    @property
-    def bias(self) -> float:
-        """Standard deviation of the systematic error of a position, along each axis of the table [m]."""
-        variance = float(np.mean(self._error_products)) if self._error_products else 0.0
-        return math.sqrt(max(variance, 0.0))
-
-    def _add_errors(self, first: BoxMatch, second: BoxMatch, sample: LabelledImage, frame: Frame) -> None:
-        """Add the random and systematic errors of one object from its detections in both images."""
-        assert first.object_index is not None
-        difference = (first.offset - second.offset) * sample.pixel_scale
-        self._random_variances += (difference**2 / 2).tolist()
-        if self._localizer is None or "centres" not in sample.truth:
-            return
-        true_centre = np.array(sample.truth["centres"][first.object_index])
-        with contextlib.suppress(NoDepth):
-            positions = [self._localizer.locate(match.detection, frame) for match in (first, second)]
-            errors = (np.array(positions) - true_centre)[:, :2]
-            self._error_products += errors.prod(axis=0).tolist()
+                error = self._localizer.locate(match.detection, frame) - true_centre
+                self.localization_errors.append(float(np.linalg.norm(error) * 1000))
+                if second is not None:
+                    second_error = self._localizer.locate(second.detection, frame) - true_centre
+                    self._error_products += (error * second_error)[:2].tolist()

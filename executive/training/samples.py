@@ -6,19 +6,19 @@ import math
 import os
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
-from executive.cell.frame import Box
 from executive.errors import MAX_QUOTATION_LENGTH, InputError
 from executive.geometry import Array
 from executive.mission.yaml_files import has_outside_link
 from executive.training.dataset import (
     MAX_LABEL_FILE_SIZE,
+    DatasetEntry,
     LabelledImage,
     find_label_file,
     find_splits,
@@ -104,21 +104,6 @@ class _CocoFile(BaseModel):
     categories: list[_CocoCategory]
 
 
-@dataclass
-class ImageAnnotation:
-    """The labelled objects of an image.
-
-    Attributes:
-        labels: Class of each object.
-        boxes: Left, top, right and bottom of each object, inside of the upright image [pixel].
-        scale: Factors on x and y from the annotations to the image, which may be resized.
-    """
-
-    labels: tuple[str, ...]
-    boxes: tuple[Box, ...]
-    scale: tuple[float, float]
-
-
 class LabelledDataset:
     """Labelled images of a split of a dataset.
 
@@ -145,13 +130,16 @@ class LabelledDataset:
         if split not in splits:
             parts = "images, for instance .jpg, and a COCO file, or labels/ and data.yaml (YOLO)"
             raise InputError(f"{self._name} contains no labelled images; it must contain {parts}")
+        self._split = split
         self._source = splits[split]
-        self.annotations: dict[Path, ImageAnnotation] = {}
+        self.annotations: dict[Path, DatasetEntry] = {}
         self.notes: Counter[str] = Counter()
         self._relative_boxes = [np.zeros((0, 4))]
         is_coco = self._source.file.suffix == ".json"
         path = self._source.file if is_coco else self._source.images[0].parent
-        self._property_folder = folder if path == folder else path.parent
+        property_folder = folder if path == folder else path.parent
+        self._ignored_boxes = read_image_properties(property_folder / "ignored.json")
+        self._truth = read_image_properties(property_folder / "truth.json")
         self.classes = self._read_coco() if is_coco else self._read_yolo()
         boxes = np.concatenate(self._relative_boxes)
         form = COCO_FORM if is_coco else YOLO_FORM
@@ -178,19 +166,15 @@ class LabelledDataset:
         Raises:
             InputError: An image cannot be read.
         """
-        ignored_boxes = read_image_properties(self._property_folder / "ignored.json")
-        truth = read_image_properties(self._property_folder / "truth.json")
-        for path, annotation in self.annotations.items():
-            ignored = np.reshape(ignored_boxes.get(path.name, ()), (-1, 4)) * (annotation.scale * 2)
+        for path, entry in self.annotations.items():
             yield LabelledImage(
-                path.name, read_image(path), annotation.labels, annotation.boxes,
-                tuple(map(tuple, ignored.tolist())), truth.get(path.name, {}),
-            )  # fmt: skip
+                path.name, read_image(path), entry.labels, entry.boxes, entry.ignored_boxes, entry.truth
+            )
 
     @property
     def object_counts(self) -> Counter[str]:
         """Number of objects of each class."""
-        return Counter(label for annotation in self.annotations.values() for label in annotation.labels)
+        return Counter(label for entry in self.annotations.values() for label in entry.labels)
 
     @property
     def summary(self) -> str:
@@ -210,9 +194,10 @@ class LabelledDataset:
             InputError: There are known class names, but no object has one of them.
         """
         spellings = {name.casefold(): name for name in known} | {name: name for name in known}
-        for annotation in self.annotations.values():
-            pairs = ((label, label.strip().casefold()) for label in annotation.labels)
-            annotation.labels = tuple(spellings.get(name, spellings.get(key, name)) for name, key in pairs)
+        for path, entry in self.annotations.items():
+            pairs = ((label, label.strip().casefold()) for label in entry.labels)
+            labels = tuple(spellings.get(name, spellings.get(key, name)) for name, key in pairs)
+            self.annotations[path] = replace(entry, labels=labels)
         if known and not self.object_counts.keys() & set(known):
             names = ", ".join(self.object_counts)
             problem = f"no class of the objects ({names}) is a class of {source} ({', '.join(known)})"
@@ -310,9 +295,13 @@ class LabelledDataset:
         reasons = np.select([is_small, is_outside, is_copy], [SMALL, OUTSIDE, "duplicates dropped"], "")
         self.notes.update(reasons[reasons != ""].tolist())
         kept = np.flatnonzero(reasons == "").tolist()
-        self.annotations[path] = ImageAnnotation(
-            tuple(labels[index] for index in kept), tuple(map(tuple, boxes[kept].tolist())),
-            (size[0] / stated_size[0], size[1] / stated_size[1]) if is_resized else (1.0, 1.0),
+        # The annotations of an image may have been written before the image was resized.
+        scale = np.divide(size, stated_size) if is_resized else np.ones(2)
+        ignored = np.reshape(self._ignored_boxes.get(path.name, ()), (-1, 4)) * np.tile(scale, 2)
+        self.annotations[path] = DatasetEntry(
+            self._split, path.name, size, tuple(labels[index] for index in kept),
+            tuple(map(tuple, boxes[kept].tolist())), tuple(map(tuple, ignored.tolist())),
+            self._truth.get(path.name, {}),
         )  # fmt: skip
 
 

@@ -134,12 +134,12 @@ def write_coco_dataset(dataset: Mapping[str, LabelledDataset], folder: Path) -> 
     entries = []
     classes = list(dict.fromkeys([*dataset["train"].classes, *dataset["valid"].object_counts]))
     for split, images in dataset.items():
-        for index, (path, annotation) in enumerate(images.annotations.items()):
-            size, is_plain = read_image_header(path)
+        for index, (path, entry) in enumerate(images.annotations.items()):
+            _, is_plain = read_image_header(path)
             file = path.absolute() if is_plain else build_image_path(folder, "coco", split, f"{index}.png")
             if not is_plain:
                 save_image(file, read_image(path))
-            entries.append(DatasetEntry(split, str(file), size, annotation.labels, annotation.boxes))
+            entries.append(DatasetEntry(split, str(file), entry.size, entry.labels, entry.boxes))
     write_annotations(folder, "coco", entries, classes)
     return classes
 

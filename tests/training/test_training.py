@@ -84,7 +84,7 @@ def test_epochs_are_put_together_from_the_rows_a_trainer_spreads_them_over(tmp_p
 
 def test_a_card_states_settings_and_figures():
     centre = Distribution(0.6, 1.5, 2.9, 3.4)
-    accuracy = Evaluation(0.5, 300, 900, 0.991, 0.99, 0.995, 0.8, centre=centre)
+    accuracy = Evaluation(900, 0.991, 0.99, 0.5, 300, 0.995, 0.8, centre=centre)
     epochs = [{"train/loss": 6.5, "val/mAP_50": 0.5}]
     text = render_card("Small model", "Finds cubes.", {"seed": "1"}, epochs, accuracy)
     assert text.startswith("# Small model\n\nFinds cubes.\n")
