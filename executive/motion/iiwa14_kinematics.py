@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from executive.errors import Unreachable
-from executive.geometry import Array, Pose
-from executive.motion.joints import BranchKey, JointRange, Solutions, wrap_angles
+from executive.geometry import Array, Pose, format_point
+from executive.motion.joints import BranchKey, JointRange, wrap_angles
 
 IIWA14_JOINT_COUNT = 7
 """Number of joints of the arm."""
@@ -133,12 +133,14 @@ class Iiwa14:
         flip, angle = branch
         return self._solve_angles(poses, np.array([angle]))[:, int(flip), 0]
 
-    def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
+    def solve_all(
+        self, X_WT: Pose, q_seed: ArrayLike, angle_step: float
+    ) -> tuple[Array, Sequence[BranchKey]]:
         """Return the solutions for all flips and evenly spaced redundancy angles, that of `q_seed` first."""
         offsets = np.radians(np.arange(0.0, 360.0, math.degrees(angle_step)))
         angles = self.find_branch(q_seed)[1] + offsets
         solutions = self._solve_angles([X_WT], angles).reshape(-1, IIWA14_JOINT_COUNT)
-        return Solutions(solutions, list(product(range(len(FLIPS)), angles.tolist())))
+        return solutions, list(product(range(len(FLIPS)), angles.tolist()))
 
     def _solve_angles(self, poses: Sequence[Pose], angles: Array) -> Array:
         """Return the solutions `(N, 8, S, 7)` [rad] of `N` tool poses, by flip and redundancy angle.
@@ -194,9 +196,8 @@ class Iiwa14:
             cause = f"{shortfall:.3f} m nearer than joint 4 permits ({self._min_wrist_distance:.2f} m)"
         else:
             return
-        x, y, z = X_WT.position
         raise Unreachable(
-            f"the tool cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m: its wrist would be {distance:.3f} m from "
+            f"the tool cannot reach {format_point(X_WT.position)}: its wrist would be {distance:.3f} m from "
             f"the shoulder, {cause}"
         )
 

@@ -41,7 +41,12 @@ MAX_CHECK_SPACING = math.radians(1.0)
 
 
 class Planner:
-    """Plans motions of the arm of a cell file, optionally with an additional collision check.
+    """Plans motions of the arm of a cell file.
+
+    Args:
+        config: The cell file.
+        check_collision: Additional collision check, or None.
+        kinematics: Kinematics of the arm; None: those of `config.arm.urdf`.
 
     Attributes:
         kinematics: Kinematics of the arm.
@@ -49,10 +54,13 @@ class Planner:
     """
 
     def __init__(
-        self, config: CellConfig, kinematics: Kinematics, check_collision: CollisionCheck | None = None
+        self,
+        config: CellConfig,
+        check_collision: CollisionCheck | None = None,
+        kinematics: Kinematics | None = None,
     ) -> None:
         self.limits = JointLimits.from_config(config.arm.limits)
-        self.kinematics = kinematics
+        self.kinematics = kinematics or build_planning_kinematics(config)
         self._config = config
         self._check_collision = check_collision
 
@@ -95,7 +103,7 @@ class Planner:
         has_guarded_part = motion.guarded_start_time < math.inf
         # The first state always belongs to the free part, which therefore is never empty.
         free_qs = qs[: max(1, math.ceil(motion.guarded_start_time / STEP))] if has_guarded_part else qs
-        problem.require_clearance(free_qs)
+        problem.clearance.require_clearance(*self.kinematics.compute_tcps_and_axes(free_qs))
         if self._check_collision is not None:
             free_path = downsample_path(free_qs, MAX_CHECK_SPACING)
             self._check_collision(free_path, _treat_target_as_obstacle(task))
@@ -107,11 +115,6 @@ def _treat_target_as_obstacle(task: Task) -> Task:
     """Return the task of the part before the guarded part, in which the target counts as an obstacle."""
     targets = () if task.target is None else (task.target,)
     return replace(task, obstacles=(*task.obstacles, *targets), target=None)
-
-
-def build_planner(config: CellConfig, check_collision: CollisionCheck | None = None) -> Planner:
-    """Return the planner for the arm of a cell file, optionally with an additional collision check."""
-    return Planner(config, build_planning_kinematics(config), check_collision)
 
 
 M = TypeVar("M", bound=Motion)

@@ -19,7 +19,7 @@ from executive.cell.config import CellConfig
 from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
 from executive.cells.sim.world import DISTANCE, LINK_A, POSITION_B, World, name_load
 from executive.errors import Blocked
-from executive.geometry import Array
+from executive.geometry import Array, format_point
 
 ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
@@ -136,11 +136,9 @@ class ClearanceChecker:
             for key, approach in closest.items():
                 min_distance = min(approach.min_distance, start_distances.get(key, math.inf))
                 if approach.distance < min_distance - ROUNDING_ERROR:
-                    x, y, z = self.world.get_tool_pose().position
-                    raise Blocked(
-                        f"the motion would bring {approach}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m; "
-                        f"the minimum clearance is {self._margin:.3f} m"
-                    )
+                    place = format_point(self.world.get_tool_pose().position)
+                    message = f"the motion would bring {approach}, with the tool at {place}; "
+                    raise Blocked(f"{message}the minimum clearance is {self._margin:.3f} m")
 
     def find_violation(self, q: Array) -> ClosestApproach | None:
         """Return the closest approach of the unloaded arm at `q` `(n,)` [rad], or None if it is allowed."""
