@@ -127,15 +127,17 @@ class Plan(Generic[M]):
 
     Attributes:
         clock: Clock of the run.
+        query: Bytes of the joint positions at the start, goal and task of the motion.
         ready_time: Time before which the plan is not ready [s].
         future: Planned motion, or exception of the planner, from the worker thread.
-        report: Function that is called once when the plan is ready, or None.
+        report: Function that is called once when the plan is ready.
     """
 
+    query: tuple[bytes, Goal | str, Task]
     clock: Clock
     ready_time: float
     future: Future[M]
-    report: Callable[[], None] | None = None
+    report: Callable[[], None] = lambda: None
 
     @property
     def ready(self) -> bool:
@@ -148,9 +150,8 @@ class Plan(Generic[M]):
             return False
         wait_until_done(self.future)
         report = self.report
-        self.report = None
-        if report is not None:
-            report()
+        self.report = lambda: None
+        report()
         return True
 
     def result(self) -> M:
@@ -194,7 +195,6 @@ class PlanningArm(Generic[M]):
         self._emit = emit
         self._reach_problems: dict[Goal, str] = {}
         self._worker = ThreadPoolExecutor(1, "planner")
-        self._stored_query: tuple[bytes, Goal | str, Task] | None = None
         self._stored_plan: Plan[M] | None = None
 
     @property
@@ -241,15 +241,15 @@ class PlanningArm(Generic[M]):
             Fault: The arm is moving, or the cell file has no such pose.
         """
         self._require_rest("plan a motion")
-        is_planned_ahead = (self._end_q.tobytes(), goal, task) == self._stored_query
+        stored_plan = self._stored_plan
         plan = self._store_plan(goal, task)
-        self._stored_query = self._stored_plan = None
+        self._stored_plan = None
         request_time = self._clock.now
 
         def report() -> None:
             duration = 0.0 if plan.future.exception() else plan.future.result().duration
             delay = self._clock.now - request_time
-            self._emit(MotionPlanned(is_planned_ahead, round(delay, 4), round(duration, 4)))
+            self._emit(MotionPlanned(plan is stored_plan, round(delay, 4), round(duration, 4)))
 
         plan.report = report
         return plan
@@ -268,15 +268,15 @@ class PlanningArm(Generic[M]):
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self.poses))}')
         start = self._end_q.copy()
         query = (start.tobytes(), goal, task)
-        if self._stored_plan is None or query != self._stored_query:
-            if self._stored_plan is not None:
-                # A plan that the worker has already started cannot be cancelled, but nobody reads its result.
-                self._stored_plan.future.cancel()
-            ready_time = self._clock.now + self._planning_time
-            end = self.poses[goal] if isinstance(goal, str) else goal
-            future = self._worker.submit(self._plan_motion, start, end, task)
-            self._stored_query = query
-            self._stored_plan = Plan(self._clock, ready_time, future)
+        plan = self._stored_plan
+        if plan is not None and plan.query == query:
+            return plan
+        if plan is not None:
+            # A plan that the worker has already started cannot be cancelled, but nobody reads its result.
+            plan.future.cancel()
+        end = self.poses[goal] if isinstance(goal, str) else goal
+        future = self._worker.submit(self._plan_motion, start, end, task)
+        self._stored_plan = Plan(query, self._clock, self._clock.now + self._planning_time, future)
         return self._stored_plan
 
     def _require_rest(self, action: str) -> None:

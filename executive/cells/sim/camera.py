@@ -304,11 +304,9 @@ class SimCamera(MountedCamera):
     def describe_displacement(self, frame: Frame) -> str:
         return describe_displacement(frame, self._bins)
 
-    def _get_true_view(self) -> tuple[Array, Pose]:
-        return compute_calibration(self._true_config)[0], get_camera_pose(self._world, self._true_config)
-
     def _capture_images(self) -> tuple[Image, Array | None]:
-        rendered = self._render(*self._get_true_view())
+        matrix, _ = compute_calibration(self._true_config)
+        rendered = self._render(matrix, get_camera_pose(self._world, self._true_config))
         rng = np.random.default_rng([self._seed, self._frame_count])
         image = add_noise(rendered.image, self._true_config.noise, rng)
         if self.config.depth is None:
