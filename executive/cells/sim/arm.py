@@ -136,7 +136,7 @@ class SimArm(PlanningArm[Trajectory]):
 
     @property
     def tool_velocity(self) -> Array:
-        states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
+        states = self._world.client.getJointStates(self._world.arm, self._world.joints)
         q, q_change = np.array([(state[0], state[1] * DIFFERENTIATION_STEP) for state in states]).T
         compute_pose = self.kinematics.compute_tool_pose
         return (compute_pose(q + q_change).position - compute_pose(q).position) / DIFFERENTIATION_STEP

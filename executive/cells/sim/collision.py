@@ -68,11 +68,6 @@ class ClosestApproach(NamedTuple):
     distance: float
     min_distance: float
 
-    @property
-    def slack(self) -> float:
-        """Distance beyond the minimum distance [m], negative for a violation."""
-        return self.distance - self.min_distance
-
     def __str__(self) -> str:
         relation = f"{self.distance:.3f} m from" if self.distance >= 0 else f"{-self.distance:.3f} m into"
         return f"{self.part} {relation} {self.body}"
@@ -129,7 +124,8 @@ class ClearanceChecker:
                 clear_until[i] = pair_movements[i][index] + distance - self._margin - ROUNDING_ERROR
                 for approach in approaches:
                     key = approach.part, approach.body
-                    closest[key] = min(closest.get(key, approach), approach, key=attrgetter("slack"))
+                    pair = (closest.get(key, approach), approach)
+                    closest[key] = min(pair, key=lambda each: each.distance - each.min_distance)
             if index == 0:
                 start_distances = {key: approach.distance for key, approach in closest.items()}
             start_distances = {key: start_distances[key] for key in closest if key in start_distances}
@@ -155,8 +151,8 @@ class ClearanceChecker:
         """Return all pairs; `obstacles` contains name and body of each obstacle."""
         world = self.world
         robot = world.robot
+        joints = world.joints
         bodies = [("the table", world.table), *world.bin_bodies.items(), *obstacles]
-        joints = range(robot.joint_count)
         links = range(robot.first_collision_link, world.tool_index + 1)
         pairs = [BodyPair((world.arm, body), links, joints, body_name=name) for name, body in bodies]
         for link_a, link_b in robot.self_collision_pairs:
@@ -216,11 +212,10 @@ class ClearanceChecker:
         """Return the maximum distance of a point of the arm from the axis of each joint `(n,)` [m]."""
         world = self.world
         client = world.client
-        joints = range(world.robot.joint_count)
-        states = client.getLinkStates(world.arm, joints, computeForwardKinematics=True)
+        states = client.getLinkStates(world.arm, world.joints, computeForwardKinematics=True)
         axes = [
             client.rotateVector(state[5], client.getJointInfo(world.arm, joint)[JOINT_AXIS])
-            for joint, state in zip(joints, states, strict=True)
+            for joint, state in zip(world.joints, states, strict=True)
         ]
         links = np.diff([*(state[4] for state in states), world.get_tool_pose().position], axis=0)
         lengths = np.linalg.norm(links, axis=1)
