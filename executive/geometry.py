@@ -91,6 +91,12 @@ class Pose:
         return [round(float(value), digits) for value in (*self.position, *self.quaternion)]
 
 
+def format_point(point: ArrayLike) -> str:
+    """Return a point `(3,)` [m] with its unit, for messages."""
+    x, y, z = np.asarray(point).tolist()
+    return f"({x:.3f}, {y:.3f}, {z:.3f}) m"
+
+
 def rotate_about_z(angle: float) -> Array:
     """Return the rotation `(3, 3)` by `angle` [rad] about the z axis."""
     c = math.cos(angle)

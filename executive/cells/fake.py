@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -106,11 +107,8 @@ class FakeWorld:
     def find_bin(self, fake_object: TrueObject) -> Bin | None:
         """Return the bin that contains an object; if there is none, the bin on whose wall the object lies."""
         wall_margin = BIN_THICKNESS + self.classes[fake_object.label].radius / 2
-        for margin in (0.0, wall_margin):
-            for bin in self.bins:
-                if bin.contains(fake_object.position, margin):
-                    return bin
-        return None
+        places = product((0.0, wall_margin), self.bins)
+        return next((bin for margin, bin in places if bin.contains(fake_object.position, margin)), None)
 
     def find_touched_object(self, tip_position: Array) -> TrueObject | None:
         """Return the object that a cup at `tip_position` `(3,)` [m] touches from above, or None."""

@@ -165,13 +165,18 @@ def make_object_goal(
         spacing: Scale of the spiral of contact points [m].
     """
     x, y, z = map(float, position)
-    dx, dy = _compute_offset(failed_attempts, object_class.contact_radius, spacing)
+    # After n failed attempts, the contact point on a solid object lies on a Vogel spiral, at the distance
+    # spacing * sqrt(n) and the angle n * GOLDEN_ANGLE; on an object with a hole, it lies on the ring.
+    angle = failed_attempts * GOLDEN_ANGLE
+    distance = object_class.contact_radius or spacing * math.sqrt(failed_attempts)
+    contact_x = x + distance * math.cos(angle)
+    contact_y = y + distance * math.sin(angle)
     end_height = compute_min_contact_height(object_class, z, overtravel)
     if failed_attempts >= ATTEMPTS_BEFORE_PROBE:
         end_height = min(end_height, z - object_class.height / 2 + PROBE_CLEARANCE)
     guarded_length = z + object_class.height / 2 + descent - end_height
     fast_length = 0.0 if failed_attempts else max(0.0, descent - slow_descent)
-    return Goal((x + dx, y + dy, end_height), None, guarded_length, descent_speed, fast_length)
+    return Goal((contact_x, contact_y, end_height), None, guarded_length, descent_speed, fast_length)
 
 
 def compute_min_contact_height(object_class: ObjectClass, centre_height: float, overtravel: float) -> float:
@@ -289,18 +294,6 @@ def _is_free(cell: Cell, position: tuple[float, float], min_distance: float, ite
         math.dist(position, (obstacle.x, obstacle.y)) > min_distance + obstacle.radius
         for obstacle in list_obstacles(cell, item)
     )
-
-
-def _compute_offset(failed_attempts: int, contact_radius: float, spacing: float) -> tuple[float, float]:
-    """Return the offset `(x, y)` [m] of the contact point from the centre of the object.
-
-    After n failed attempts, the contact point on a solid object lies on a Vogel spiral, at the distance
-    spacing * sqrt(n) and the angle n * GOLDEN_ANGLE. On an object with a hole, whose `contact_radius` is
-    above 0, the contact point lies at the distance `contact_radius` instead.
-    """
-    angle = failed_attempts * GOLDEN_ANGLE
-    distance = contact_radius or spacing * math.sqrt(failed_attempts)
-    return distance * math.cos(angle), distance * math.sin(angle)
 
 
 def sort_by_tour(cell: Cell, targets: Sequence[Target]) -> list[Target]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from executive.cell.config import NECK_LENGTH, TOOL_RADIUS, CellConfig
 from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
 from executive.errors import Blocked
-from executive.geometry import Array
+from executive.geometry import Array, format_point
 from executive.motion.arms import SAMPLING_MARGIN
 
 OBSERVED_RADIUS = 0.05
@@ -187,8 +187,8 @@ class ClearanceModel:
         """
         tilt_slack = self._compute_tilt_slack(axes)
         if tilt_slack.min() < -MAX_EXTRA_TILT:
-            tcp = tcps[np.argmin(tilt_slack)]
-            raise Blocked(f"the motion would tilt the tool too far{_describe_tcp(tcp)}")
+            place = format_point(tcps[np.argmin(tilt_slack)])
+            raise Blocked(f"the motion would tilt the tool too far, with the tool at {place}")
         near_prisms = self._find_near_prisms(tcps, axes, 0.0)
         # Undetected objects need no margin. The load must not be pressed into the table or a floor.
         prisms = self._prisms.select(near_prisms)
@@ -202,7 +202,7 @@ class ClearanceModel:
             shortfall = (tolerances[prism] - slack[state, prism]) * 1000
             raise Blocked(
                 f"the motion would bring tool or load {shortfall:.0f} mm too near to "
-                f"{prisms.names[near_prisms[prism]]}{_describe_tcp(tcps[state])}"
+                f"{prisms.names[near_prisms[prism]]}, with the tool at {format_point(tcps[state])}"
             )
 
     def _find_near_prisms(self, tcps: Array, axes: Array, max_slack: float) -> NDArray[np.intp]:
@@ -256,12 +256,6 @@ class ClearanceModel:
     def _compute_tilt_slack(self, axes: Array) -> Array:
         """Return the slack of the tilt for tool axes `(..., 3)` as a distance [m]; negative: too tilted."""
         return DISTANCE_PER_COSINE * (-axes[..., 2] - self._discs.min_cosine)
-
-
-def _describe_tcp(tcp: Array) -> str:
-    """Return the end of a message about the tool centre point `(3,)` [m]."""
-    x, y, z = tcp
-    return f", with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m"
 
 
 def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:

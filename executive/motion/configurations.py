@@ -70,14 +70,14 @@ def find_configuration_pairs(
     x, y, z = goal.position
     poses = [make_tool_down_pose((x, y, z + length)), make_tool_down_pose((x, y, z))]
     for angle_step, margin in ((COARSE_ANGLE_STEP, PREFERRED_LIMIT_DISTANCE), (FINE_ANGLE_STEP, 0.0)):
-        upper, lower = (kinematics.solve_all(pose, q_start, angle_step) for pose in poses)
+        (upper_qs, _), (lower_qs, branches) = (kinematics.solve_all(p, q_start, angle_step) for p in poses)
         joint_range = kinematics.joint_range.shrink(margin)
-        _turn_last_joint(upper.qs, lower.qs, joint_range, goal.yaw, float(q_start[-1]))
-        is_inside = joint_range.contains(upper.qs) & joint_range.contains(lower.qs)
+        _turn_last_joint(upper_qs, lower_qs, joint_range, goal.yaw, float(q_start[-1]))
+        is_inside = joint_range.contains(upper_qs) & joint_range.contains(lower_qs)
         if is_inside.any():
-            branches = tuple(lower.branches[index] for index in np.flatnonzero(is_inside))
-            return ConfigurationPairs(upper.qs[is_inside], lower.qs[is_inside], branches)
-    raise _make_unreachable_error(kinematics, poses, (upper.qs, lower.qs))
+            inside_branches = tuple(branches[index] for index in np.flatnonzero(is_inside))
+            return ConfigurationPairs(upper_qs[is_inside], lower_qs[is_inside], inside_branches)
+    raise _make_unreachable_error(kinematics, poses, (upper_qs, lower_qs))
 
 
 def find_vertical_waypoints(kinematics: Kinematics, q: Array, length: float) -> Array | None:

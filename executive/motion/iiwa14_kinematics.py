@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from executive.errors import Unreachable
-from executive.geometry import Array, Pose
-from executive.motion.joints import BranchKey, JointRange, Solutions, wrap_angles
+from executive.geometry import Array, Pose, format_point
+from executive.motion.joints import BranchKey, JointRange, wrap_angles
 
 IIWA14_JOINT_COUNT = 7
 """Number of joints of the arm."""
@@ -133,12 +133,14 @@ class Iiwa14:
         flip, angle = branch
         return self._solve_angles(poses, np.array([angle]))[:, int(flip), 0]
 
-    def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
+    def solve_all(
+        self, X_WT: Pose, q_seed: ArrayLike, angle_step: float
+    ) -> tuple[Array, Sequence[BranchKey]]:
         """Return the solutions for all flips and evenly spaced redundancy angles, that of `q_seed` first."""
         offsets = np.radians(np.arange(0.0, 360.0, math.degrees(angle_step)))
         angles = self.find_branch(q_seed)[1] + offsets
         solutions = self._solve_angles([X_WT], angles).reshape(-1, IIWA14_JOINT_COUNT)
-        return Solutions(solutions, list(product(range(len(FLIPS)), angles.tolist())))
+        return solutions, list(product(range(len(FLIPS)), angles.tolist()))
 
     def _solve_angles(self, poses: Sequence[Pose], angles: Array) -> Array:
         """Return the solutions `(N, 8, S, 7)` [rad] of `N` tool poses, by flip and redundancy angle.
@@ -174,31 +176,27 @@ class Iiwa14:
 
         The function solves the triangle of shoulder, elbow and wrist for a tool pose. The angle at the
         shoulder leads from the line to the wrist to the upper arm [rad].
+
+        Raises:
+            Unreachable: The wrist is too near to the shoulder or too far from the shoulder.
         """
         wrist = X_WT.position - self._wrist_to_tool * X_WT.rotation[:, 2]
         shoulder_to_wrist = wrist - (0.0, 0.0, SHOULDER_HEIGHT)
         distance = float(np.linalg.norm(shoulder_to_wrist))
-        self._require_reachable_wrist(X_WT, distance)
+        excess = distance - self._max_wrist_distance
+        shortfall = self._min_wrist_distance - distance
+        if max(excess, shortfall) > _ROUNDING_ERROR:
+            cause = f"{excess:.3f} m beyond the reach of the arm ({self._max_wrist_distance:.2f} m)"
+            if shortfall > 0:
+                cause = f"{shortfall:.3f} m nearer than joint 4 permits ({self._min_wrist_distance:.2f} m)"
+            raise Unreachable(
+                f"the tool cannot reach {format_point(X_WT.position)}: its wrist would be {distance:.3f} m "
+                f"from the shoulder, {cause}"
+            )
         cos4 = (distance**2 - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
         cos_upper_arm_angle = (UPPER_ARM**2 + distance**2 - FOREARM**2) / (2 * UPPER_ARM * distance)
         upper_arm_angle, q4 = (math.acos(min(1.0, max(-1.0, c))) for c in (cos_upper_arm_angle, cos4))
         return _compute_elbow_frame(shoulder_to_wrist), (upper_arm_angle, q4)
-
-    def _require_reachable_wrist(self, X_WT: Pose, distance: float) -> None:
-        """Raise Unreachable if the distance from shoulder to wrist [m] is too large or too small."""
-        if distance > self._max_wrist_distance + _ROUNDING_ERROR:
-            excess = distance - self._max_wrist_distance
-            cause = f"{excess:.3f} m beyond the reach of the arm ({self._max_wrist_distance:.2f} m)"
-        elif distance < self._min_wrist_distance - _ROUNDING_ERROR:
-            shortfall = self._min_wrist_distance - distance
-            cause = f"{shortfall:.3f} m nearer than joint 4 permits ({self._min_wrist_distance:.2f} m)"
-        else:
-            return
-        x, y, z = X_WT.position
-        raise Unreachable(
-            f"the tool cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m: its wrist would be {distance:.3f} m from "
-            f"the shoulder, {cause}"
-        )
 
     def _compute_frames(self, q: ArrayLike) -> list[Pose]:
         """Return the frames of joints 1 to 7 at `q` `(7,)` [rad], followed by the frame of the tool."""

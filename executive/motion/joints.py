@@ -115,18 +115,6 @@ class JointLimits:
         return np.max(np.where(d >= v * ramp_time, d / v + ramp_time, time_below_max_velocity), axis=-1)
 
 
-class Solutions(NamedTuple):
-    """Inverse-kinematics solutions of one tool pose in `N` branches.
-
-    Attributes:
-        qs: Joint positions `(N, n)` [rad], possibly outside the joint range; NaN in rows without a solution.
-        branches: Branch of each row.
-    """
-
-    qs: Array
-    branches: Sequence[BranchKey]
-
-
 class Kinematics(Protocol):
     """Kinematics of an arm with `n` joints, and of the tool on its flange.
 
@@ -156,9 +144,12 @@ class Kinematics(Protocol):
             Unreachable: A pose is too near to the arm or too far from the arm.
         """
 
-    def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
-        """Return the solutions of a tool pose in all branches.
+    def solve_all(
+        self, X_WT: Pose, q_seed: ArrayLike, angle_step: float
+    ) -> tuple[Array, Sequence[BranchKey]]:
+        """Return the solutions `(N, n)` [rad] of a tool pose in all `N` branches, and the branch of each row.
 
+        A solution may be outside of `joint_range`; a row without a solution is NaN.
         A redundant arm has infinitely many branches; the function samples the redundancy angle at intervals
         of `angle_step` [rad]. One sample is the redundancy angle of `q_seed` `(n,)` [rad]. Calls with equal
         `q_seed` and `angle_step` return equal branches in equal order.

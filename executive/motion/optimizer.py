@@ -156,14 +156,6 @@ class MotionProblem:
     clearance: ClearanceModel
     payload: PayloadLimit | None = None
 
-    def require_clearance(self, qs: Array) -> None:
-        """Check that joint positions `(N, n)` [rad] keep the required distances from obstacles.
-
-        Raises:
-            Blocked: A distance is too small.
-        """
-        self.clearance.require_clearance(*self.kinematics.compute_tcps_and_axes(qs))
-
     def compute_slack(self, qs: Array) -> Array:
         """Return the slack `(N,)` of joint positions `(N, n)` [rad]; it is negative for a violation."""
         return self.find_nearest_pairs(qs, math.inf).slack

@@ -41,7 +41,12 @@ MAX_CHECK_SPACING = math.radians(1.0)
 
 
 class Planner:
-    """Plans motions of the arm of a cell file, optionally with an additional collision check.
+    """Plans motions of the arm of a cell file.
+
+    Args:
+        config: The cell file.
+        check_collision: Additional collision check, or None.
+        kinematics: Kinematics of the arm; None: those of `config.arm.urdf`.
 
     Attributes:
         kinematics: Kinematics of the arm.
@@ -49,10 +54,13 @@ class Planner:
     """
 
     def __init__(
-        self, config: CellConfig, kinematics: Kinematics, check_collision: CollisionCheck | None = None
+        self,
+        config: CellConfig,
+        check_collision: CollisionCheck | None = None,
+        kinematics: Kinematics | None = None,
     ) -> None:
         self.limits = JointLimits.from_config(config.arm.limits)
-        self.kinematics = kinematics
+        self.kinematics = kinematics or build_planning_kinematics(config)
         self._config = config
         self._check_collision = check_collision
 
@@ -95,7 +103,7 @@ class Planner:
         has_guarded_part = motion.guarded_start_time < math.inf
         # The first state always belongs to the free part, which therefore is never empty.
         free_qs = qs[: max(1, math.ceil(motion.guarded_start_time / STEP))] if has_guarded_part else qs
-        problem.require_clearance(free_qs)
+        problem.clearance.require_clearance(*self.kinematics.compute_tcps_and_axes(free_qs))
         if self._check_collision is not None:
             free_path = downsample_path(free_qs, MAX_CHECK_SPACING)
             self._check_collision(free_path, _treat_target_as_obstacle(task))
@@ -109,11 +117,6 @@ def _treat_target_as_obstacle(task: Task) -> Task:
     return replace(task, obstacles=(*task.obstacles, *targets), target=None)
 
 
-def build_planner(config: CellConfig, check_collision: CollisionCheck | None = None) -> Planner:
-    """Return the planner for the arm of a cell file, optionally with an additional collision check."""
-    return Planner(config, build_planning_kinematics(config), check_collision)
-
-
 M = TypeVar("M", bound=Motion)
 """Type of the motions of an arm."""
 
@@ -124,15 +127,17 @@ class Plan(Generic[M]):
 
     Attributes:
         clock: Clock of the run.
+        query: Bytes of the joint positions at the start, goal and task of the motion.
         ready_time: Time before which the plan is not ready [s].
         future: Planned motion, or exception of the planner, from the worker thread.
-        report: Function that is called once when the plan is ready, or None.
+        report: Function that is called once when the plan is ready.
     """
 
+    query: tuple[bytes, Goal | str, Task]
     clock: Clock
     ready_time: float
     future: Future[M]
-    report: Callable[[], None] | None = None
+    report: Callable[[], None] = lambda: None
 
     @property
     def ready(self) -> bool:
@@ -145,9 +150,8 @@ class Plan(Generic[M]):
             return False
         wait_until_done(self.future)
         report = self.report
-        self.report = None
-        if report is not None:
-            report()
+        self.report = lambda: None
+        report()
         return True
 
     def result(self) -> M:
@@ -191,7 +195,6 @@ class PlanningArm(Generic[M]):
         self._emit = emit
         self._reach_problems: dict[Goal, str] = {}
         self._worker = ThreadPoolExecutor(1, "planner")
-        self._stored_query: tuple[bytes, Goal | str, Task] | None = None
         self._stored_plan: Plan[M] | None = None
 
     @property
@@ -238,15 +241,15 @@ class PlanningArm(Generic[M]):
             Fault: The arm is moving, or the cell file has no such pose.
         """
         self._require_rest("plan a motion")
-        is_planned_ahead = (self._end_q.tobytes(), goal, task) == self._stored_query
+        stored_plan = self._stored_plan
         plan = self._store_plan(goal, task)
-        self._stored_query = self._stored_plan = None
+        self._stored_plan = None
         request_time = self._clock.now
 
         def report() -> None:
             duration = 0.0 if plan.future.exception() else plan.future.result().duration
             delay = self._clock.now - request_time
-            self._emit(MotionPlanned(is_planned_ahead, round(delay, 4), round(duration, 4)))
+            self._emit(MotionPlanned(plan is stored_plan, round(delay, 4), round(duration, 4)))
 
         plan.report = report
         return plan
@@ -265,15 +268,15 @@ class PlanningArm(Generic[M]):
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self.poses))}')
         start = self._end_q.copy()
         query = (start.tobytes(), goal, task)
-        if self._stored_plan is None or query != self._stored_query:
-            if self._stored_plan is not None:
-                # A plan that the worker has already started cannot be cancelled, but nobody reads its result.
-                self._stored_plan.future.cancel()
-            ready_time = self._clock.now + self._planning_time
-            end = self.poses[goal] if isinstance(goal, str) else goal
-            future = self._worker.submit(self._plan_motion, start, end, task)
-            self._stored_query = query
-            self._stored_plan = Plan(self._clock, ready_time, future)
+        plan = self._stored_plan
+        if plan is not None and plan.query == query:
+            return plan
+        if plan is not None:
+            # A plan that the worker has already started cannot be cancelled, but nobody reads its result.
+            plan.future.cancel()
+        end = self.poses[goal] if isinstance(goal, str) else goal
+        future = self._worker.submit(self._plan_motion, start, end, task)
+        self._stored_plan = Plan(query, self._clock, self._clock.now + self._planning_time, future)
         return self._stored_plan
 
     def _require_rest(self, action: str) -> None:

@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError
@@ -280,14 +280,6 @@ def downsample_path(qs: Array, max_spacing: float) -> Array:
     return qs[[*indices, len(qs) - 1]]
 
 
-class _BrakingProfile(NamedTuple):
-    """Path times `s` [s], rates `r`, and derivatives `dr/dt` [1/s] at `N` control steps, each `(N,)`."""
-
-    path_times: Array
-    rates: Array
-    rate_derivatives: Array
-
-
 def plan_braking(trajectory: Trajectory, start_time: float, limits: JointLimits) -> Array:
     """Return the path times `(N,)` [s] of the control steps after `start_time`, until the arm is at rest.
 
@@ -299,11 +291,11 @@ def plan_braking(trajectory: Trajectory, start_time: float, limits: JointLimits)
     min_peak_fraction = math.inf
     for profile in _list_profiles(trajectory, start_time):
         peak_fraction = _compute_peak_fraction(trajectory, start_time, profile, limits)
-        if peak_fraction <= 1.0:
-            return profile.path_times
         if peak_fraction < min_peak_fraction:
-            best_path_times = profile.path_times
+            best_path_times = profile[0]
             min_peak_fraction = peak_fraction
+        if peak_fraction <= 1.0:
+            break
     return best_path_times
 
 
@@ -320,8 +312,12 @@ def plan_retreat(collision_time: float, rest_time: float) -> Array:
     return np.asarray(rest_time - path_length * fractions**3 * (10 - 15 * fractions + 6 * fractions**2))
 
 
-def _list_profiles(trajectory: Trajectory, start_time: float) -> Iterator[_BrakingProfile]:
-    """Yield braking profiles and the completion of the motion, the shortest first."""
+def _list_profiles(trajectory: Trajectory, start_time: float) -> Iterator[Array]:
+    """Yield braking profiles and the completion of the motion, the shortest first.
+
+    The rows of a profile `(3, N)` are path time `s` [s], rate `r` and derivative `dr/dt` [1/s] at `N` control
+    steps.
+    """
     remaining_time = max(0.0, trajectory.duration - start_time)
     completion_index = np.searchsorted(_BRAKING_TIMES, remaining_time)
     for index, braking_time in enumerate(_BRAKING_TIMES.tolist()):
@@ -329,7 +325,7 @@ def _list_profiles(trajectory: Trajectory, start_time: float) -> Iterator[_Braki
             step_count = _count_steps(remaining_time)
             end_time = start_time + remaining_time
             path_times = np.minimum(start_time + STEP * np.arange(1, step_count + 1), end_time)
-            yield _BrakingProfile(path_times, np.ones(step_count), np.zeros(step_count))
+            yield np.array([path_times, np.ones(step_count), np.zeros(step_count)])
         for ramp_fraction in _RAMP_FRACTIONS:
             yield _make_profile(start_time, braking_time, ramp_fraction)
 
@@ -339,7 +335,7 @@ def _count_steps(duration: float) -> int:
     return max(1, math.ceil(duration / STEP - _STEP_COUNT_ROUNDING))
 
 
-def _make_profile(start_time: float, braking_time: float, ramp_fraction: float) -> _BrakingProfile:
+def _make_profile(start_time: float, braking_time: float, ramp_fraction: float) -> Array:
     """Return the profile that brakes from full speed at `start_time` to rest within `braking_time` [s]."""
     inputs = InputParameter(1)
     inputs.control_interface = ControlInterface.Velocity
@@ -353,11 +349,11 @@ def _make_profile(start_time: float, braking_time: float, ramp_fraction: float) 
     Ruckig(1).calculate(inputs, profile)
     times = (step * STEP for step in range(1, _count_steps(profile.duration) + 1))
     samples = [profile.at_time(min(time, profile.duration)) for time in times]
-    return _BrakingProfile(*np.array(samples)[:, :, 0].T)
+    return np.array(samples)[:, :, 0].T
 
 
 def _compute_peak_fraction(
-    trajectory: Trajectory, start_time: float, profile: _BrakingProfile, limits: JointLimits
+    trajectory: Trajectory, start_time: float, profile: Array, limits: JointLimits
 ) -> float:
     """Return the largest joint acceleration or jerk of a braking profile as a fraction of its stop limit."""
     accelerations = [trajectory.state_at(start_time).qdd]

@@ -172,7 +172,7 @@ class TruthCamera(SimCamera):
 
     def _find_true_detections(self) -> tuple[Detection, ...]:
         outlines = []
-        camera_matrix, X_WC = self._get_true_view()
+        camera_matrix, X_WC = self.get_true_view()
         for body, label in self._world.labels.items():
             vertices = self._world.get_object_pose(body).apply(load_mesh(self._world.models[body]).vertices)
             distances = X_WC.inverse().apply(vertices)[:, 2]

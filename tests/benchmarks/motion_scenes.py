@@ -23,7 +23,7 @@ from executive.errors import InputError, Unreachable
 from executive.geometry import make_tool_down_pose
 from executive.manipulation.tool_goals import make_object_goal, make_slot_goal
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.planner import Planner, build_planner
+from executive.motion.planner import Planner
 
 MAX_TRIES = 50
 """Maximum number of scenes drawn to find one whose object can be held and reached."""
@@ -34,7 +34,7 @@ def open_world(cell: CellConfig) -> Iterator[tuple[World, Planner]]:
     """Yield a world without objects, and a planner that makes all checks of the planner of a run."""
     world, clearance = World(cell, visuals=False), ClearanceChecker(cell)
     try:
-        yield world, build_planner(cell, clearance.check)
+        yield world, Planner(cell, clearance.check)
     finally:
         clearance.close()
         world.close()

@@ -13,7 +13,7 @@ from executive.cells import world_log as log
 from executive.cells.fake import load_empty_cell
 from executive.cells.world_log import CommandLog, read_commands
 from executive.errors import InputError
-from executive.motion.planner import build_planner
+from executive.motion.planner import Planner
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
     cell = load_empty_cell()
     written = CommandLog(path)
     joints = [1 / 3, *np.random.default_rng(1).normal(size=7)]
-    motion = build_planner(cell).plan(np.radians(cell.arm.poses_deg["home"]), Goal((0.5, 0.0, 0.1)))
+    motion = Planner(cell).plan(np.radians(cell.arm.poses_deg["home"]), Goal((0.5, 0.0, 0.1)))
     written.append(log.JOINT_TARGETS, *joints)
     written.append_motion(motion)
     written.close()

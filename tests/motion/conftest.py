@@ -12,7 +12,7 @@ from executive.cell.config import CellConfig
 from executive.geometry import Array
 from executive.motion.arms import build_kinematics
 from executive.motion.joints import JointLimits, Kinematics
-from executive.motion.planner import Planner, build_planner
+from executive.motion.planner import Planner
 from executive.motion.trajectory import Connector
 
 
@@ -38,7 +38,7 @@ def connector(limits: JointLimits) -> Connector:
 
 @pytest.fixture(scope="session")
 def planner(config: CellConfig) -> Planner:
-    return build_planner(config)
+    return Planner(config)
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose
-from executive.motion.joints import BranchKey, JointRange, Solutions, wrap_angles
+from executive.motion.joints import BranchKey, JointRange, wrap_angles
 
 HEIGHT, UPPER_ARM, FOREARM, WRIST_TO_FLANGE = 0.30, 0.45, 0.42, 0.10  # [m]
 AXES = "zyyzyz"
@@ -55,14 +55,14 @@ class SixJointArm:
         return np.add(tip, (0.0, 0.0, HEIGHT)), axis
 
     def find_branch(self, q: ArrayLike) -> BranchKey:
-        solutions = self.solve_all(self.compute_tool_pose(q), q, 0.0)
-        return solutions.branches[int(np.argmin(np.abs(wrap_angles(solutions.qs - q)).max(axis=1)))]
+        qs, branches = self.solve_all(self.compute_tool_pose(q), q, 0.0)
+        return branches[int(np.argmin(np.abs(wrap_angles(qs - q)).max(axis=1)))]
 
     def solve(self, poses: Sequence[Pose], branch: BranchKey) -> Array:
         (index,) = branch
-        return np.array([self.solve_all(X_WT, np.zeros(6), 0.0).qs[int(index)] for X_WT in poses])
+        return np.array([self.solve_all(X_WT, np.zeros(6), 0.0)[0][int(index)] for X_WT in poses])
 
-    def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
+    def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> tuple[Array, list[BranchKey]]:
         x, y, z = X_WT.position - self._wrist_to_tool * X_WT.rotation[:, 2] - (0.0, 0.0, HEIGHT)
         radius = math.hypot(x, y)
         cos3 = (radius**2 + z**2 - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
@@ -79,7 +79,7 @@ class SixJointArm:
             row[4] = wrist * math.atan2(math.hypot(c[0], c[1]), c[2])
             row[3] = math.atan2(wrist * c[1], wrist * c[0])
             row[5] = math.atan2(wrist * b[2], -wrist * a[2])
-        return Solutions(wrap_angles(qs), [(index,) for index in range(len(FLIPS))])
+        return wrap_angles(qs), [(index,) for index in range(len(FLIPS))]
 
     def _last_frame(self, q: ArrayLike) -> tuple[Array, Array]:
         frame = self.compute_joint_frames(q)[-1]

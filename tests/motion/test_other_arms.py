@@ -45,7 +45,7 @@ def test_motions_of_six_joints_reach_their_goals_within_asymmetric_limits(
 ) -> None:
     checked = []
     planner, limits = (
-        Planner(six, arm, lambda path, task: checked.append(path)),
+        Planner(six, lambda path, task: checked.append(path), arm),
         JointLimits.from_config(LIMITS),
     )
     rng, q = np.random.default_rng(3), HOME

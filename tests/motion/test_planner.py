@@ -16,7 +16,7 @@ from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.iiwa14_kinematics import interpolate_max_joint_6_angle
-from executive.motion.planner import MAX_CHECK_SPACING, Planner, build_planner
+from executive.motion.planner import MAX_CHECK_SPACING, Planner
 from executive.motion.trajectory import Trajectory
 
 CUBE = ObjectClass("cube", 0.05, 0.0354)
@@ -42,7 +42,7 @@ def question(name: str, planner: Planner, config: CellConfig, home: Array) -> Tr
     picked = planner.plan(home, pick(0.5, -0.1)).end
     motion = config.motion.model_copy(update={"straight": 0.05})
     beside, onto = planner.plan(home, Goal((0.42, 0.0, 0.01))).end, Goal((0.5, 0.0, 0.035), None, 0.02, 0.035)
-    straight = build_planner(config.model_copy(update={"motion": motion}))
+    straight = Planner(config.model_copy(update={"motion": motion}))
     return {
         "pick": lambda: planner.plan(home, pick(0.5, -0.1)),
         "pick of many": lambda: planner.plan(aside, pick(0.5, -0.1), Task(obstacles=near)),
@@ -124,7 +124,7 @@ def neighbours(x: float, y: float, turn: float, count: int, top: float) -> tuple
 
 def test_the_collision_check_gets_the_complete_path_and_the_obstacles(config, home) -> None:
     asked = []
-    motion = build_planner(config, lambda path, task: asked.append((path, task))).plan(home, BIN, CARRYING)
+    motion = Planner(config, lambda path, task: asked.append((path, task))).plan(home, BIN, CARRYING)
     ((path, task),) = asked
     assert task == CARRYING
     assert np.array_equal(path[[0, -1]], [motion.start, motion.end])
@@ -139,7 +139,7 @@ def test_what_is_to_be_touched_is_in_the_way_until_the_guarded_part(config, home
         Obstacle(0.6, 0.2, CUBE.radius, 0.05, "duck-1"),
     )
     task = Task(obstacles=(duck,), target=target)
-    planner = build_planner(config, lambda path, task: asked.append((path, task)))
+    planner = Planner(config, lambda path, task: asked.append((path, task)))
     motion = planner.plan(home, Goal((0.5, 0.0, 0.035), guarded_length=0.02, guarded_speed=0.035), task)
     (free, before), (guarded, after) = asked
     assert (before, after) == (Task(obstacles=(duck, target)), task)
@@ -158,10 +158,10 @@ def test_the_next_way_is_taken_when_the_first_is_blocked(config, home) -> None:
         if len(asked) < 3:
             raise Blocked("too near")
 
-    motion = build_planner(config, check).plan(home, pick(0.5, 0.0))
+    motion = Planner(config, check).plan(home, pick(0.5, 0.0))
     assert len(asked) == 4, "the last way in two parts"
     assert np.array_equal(asked[3][-1], motion.end)
-    assert motion.duration > build_planner(config).plan(home, pick(0.5, 0.0)).duration
+    assert motion.duration > Planner(config).plan(home, pick(0.5, 0.0)).duration
     assert not np.array_equal(asked[0][-1], asked[2][-1])
 
 
@@ -173,7 +173,7 @@ def test_when_all_ways_are_blocked_the_error_is_the_first_ones_and_counts(config
         raise Blocked(f"way {len(asked)} is too near")
 
     with pytest.raises(Blocked) as caught:
-        build_planner(config, check).plan(home, pick(0.5, 0.0))
+        Planner(config, check).plan(home, pick(0.5, 0.0))
     assert 5 < len(asked) < 40
     assert str(caught.value) == f"way 1 is too near; all {len(asked)} motions that were tried are blocked"
 

@@ -16,7 +16,7 @@ from executive.cells.sim.tool import LIP_LENGTH
 from executive.cells.sim.world import BODY_B, LINK_A, NORMAL_FORCE, POSITION_A, World, name_load
 from executive.errors import Fault
 from executive.events import Emit, discard_event
-from executive.geometry import Array
+from executive.geometry import Array, format_point
 from executive.motion.planner import Planner, PlanningArm
 from executive.motion.trajectory import Trajectory, plan_braking, plan_retreat
 
@@ -54,9 +54,9 @@ class ContactMonitor:
             if (part, body) in self._last_contact_steps:
                 self._last_contact_steps[part, body] = now
             elif force > MIN_CONTACT_FORCE and not (lip_may_touch and self._is_lip(part, position)):
-                x, y, z = self._world.get_tool_pose().position
                 name = self._world.name_body(body)
-                return f"{part} ran into {name}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m", position
+                place = format_point(self._world.get_tool_pose().position)
+                return f"{part} ran into {name}, with the tool at {place}", position
         return "", None
 
     def _is_lip(self, part: str, position: Sequence[float]) -> bool:
@@ -136,7 +136,7 @@ class SimArm(PlanningArm[Trajectory]):
 
     @property
     def tool_velocity(self) -> Array:
-        states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
+        states = self._world.client.getJointStates(self._world.arm, self._world.joints)
         q, q_change = np.array([(state[0], state[1] * DIFFERENTIATION_STEP) for state in states]).T
         compute_pose = self.kinematics.compute_tool_pose
         return (compute_pose(q + q_change).position - compute_pose(q).position) / DIFFERENTIATION_STEP

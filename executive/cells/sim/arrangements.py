@@ -306,7 +306,7 @@ def _move_tool(world: World, X_WT: Pose) -> None:
             world.arm, world.flange_index, X_WL.position, X_WL.quaternion,
             maxNumIterations=60, residualThreshold=1e-4,
         )  # fmt: skip
-        world.set_joint_positions(q[: world.robot.joint_count])
+        world.set_joint_positions(q[: len(world.joints)])
 
 
 def _draw_rotation(rng: Generator) -> Array:

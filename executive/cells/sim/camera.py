@@ -139,7 +139,6 @@ class FixedViewRenderer:
         self._world = world
         self._region = region
         self._light = light
-        self._client = world.client
         static_bodies = (world.floor, world.table, *world.bin_bodies.values())
         self._static_shapes = [shape for body in static_bodies for shape in self._list_shapes(body)]
         # PyBullet reports wrong colours of the arm after the first call of `changeVisualShape`.
@@ -174,16 +173,16 @@ class FixedViewRenderer:
         try:
             for body, link, index, _ in hidden_shapes:
                 # TinyRenderer omits a shape whose opacity, the last number of the colour, is 0.
-                self._client.changeVisualShape(body, link, index, rgbaColor=(0, 0, 0, 0))
+                self._world.client.changeVisualShape(body, link, index, rgbaColor=(0, 0, 0, 0))
             return render(self._world, matrix, X_WC, self._region, self._light)
         finally:
             for body, link, index, colour in hidden_shapes:
-                self._client.changeVisualShape(body, link, index, rgbaColor=colour)
+                self._world.client.changeVisualShape(body, link, index, rgbaColor=colour)
 
     def _list_shapes(self, body: int) -> list[_VisualShape]:
         """Return all visual shapes of a body."""
         shapes: list[_VisualShape] = []
-        for _, link, *_, colour in (data[:8] for data in self._client.getVisualShapeData(body)):
+        for _, link, *_, colour in (data[:8] for data in self._world.client.getVisualShapeData(body)):
             index = sum(other_link == link for _, other_link, *_ in shapes)
             shapes.append((body, link, index, colour))
         return shapes
@@ -304,11 +303,11 @@ class SimCamera(MountedCamera):
     def describe_displacement(self, frame: Frame) -> str:
         return describe_displacement(frame, self._bins)
 
-    def _get_true_view(self) -> tuple[Array, Pose]:
+    def get_true_view(self) -> tuple[Array, Pose]:
         return compute_calibration(self._true_config)[0], get_camera_pose(self._world, self._true_config)
 
     def _capture_images(self) -> tuple[Image, Array | None]:
-        rendered = self._render(*self._get_true_view())
+        rendered = self._render(*self.get_true_view())
         rng = np.random.default_rng([self._seed, self._frame_count])
         image = add_noise(rendered.image, self._true_config.noise, rng)
         if self.config.depth is None:

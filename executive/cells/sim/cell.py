@@ -23,7 +23,7 @@ from executive.cells.world_log import CommandLog, read_commands
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.yaml_files import get_shipped_folder
-from executive.motion.planner import build_planner
+from executive.motion.planner import Planner
 from executive.perception.detectors.envelope import build_rated_detectors
 from executive.perception.detectors.requests import ClosableDetector
 from executive.perception.localization import CellLocalizer
@@ -68,7 +68,7 @@ class SimCell(CellWithoutHardware):
         scene = load_scene(options.scene, config)
         world = self._world = build_initial_world(config, seed, gui=options.gui, scene=scene)
         self._clearance_checker = ClearanceChecker(config)
-        planner = build_planner(config, self._clearance_checker.check)
+        planner = Planner(config, self._clearance_checker.check)
         self._tool = SuctionTool(world, config.tool, load_seed)
         rebuilder = None if options.resume is None else self._rebuild_world(options.resume.log_path)
         self._arm = SimArm(world, planner, config, clock, lambda: self._tool.held_body, emit, rebuilder)

@@ -19,7 +19,7 @@ from executive.cell.config import CellConfig
 from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
 from executive.cells.sim.world import DISTANCE, LINK_A, POSITION_B, World, name_load
 from executive.errors import Blocked
-from executive.geometry import Array
+from executive.geometry import Array, format_point
 
 ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
@@ -67,11 +67,6 @@ class ClosestApproach(NamedTuple):
     body: str
     distance: float
     min_distance: float
-
-    @property
-    def slack(self) -> float:
-        """Distance beyond the minimum distance [m], negative for a violation."""
-        return self.distance - self.min_distance
 
     def __str__(self) -> str:
         relation = f"{self.distance:.3f} m from" if self.distance >= 0 else f"{-self.distance:.3f} m into"
@@ -129,18 +124,17 @@ class ClearanceChecker:
                 clear_until[i] = pair_movements[i][index] + distance - self._margin - ROUNDING_ERROR
                 for approach in approaches:
                     key = approach.part, approach.body
-                    closest[key] = min(closest.get(key, approach), approach, key=attrgetter("slack"))
+                    pair = (closest.get(key, approach), approach)
+                    closest[key] = min(pair, key=lambda each: each.distance - each.min_distance)
             if index == 0:
                 start_distances = {key: approach.distance for key, approach in closest.items()}
             start_distances = {key: start_distances[key] for key in closest if key in start_distances}
             for key, approach in closest.items():
                 min_distance = min(approach.min_distance, start_distances.get(key, math.inf))
                 if approach.distance < min_distance - ROUNDING_ERROR:
-                    x, y, z = self.world.get_tool_pose().position
-                    raise Blocked(
-                        f"the motion would bring {approach}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m; "
-                        f"the minimum clearance is {self._margin:.3f} m"
-                    )
+                    place = format_point(self.world.get_tool_pose().position)
+                    message = f"the motion would bring {approach}, with the tool at {place}; "
+                    raise Blocked(f"{message}the minimum clearance is {self._margin:.3f} m")
 
     def find_violation(self, q: Array) -> ClosestApproach | None:
         """Return the closest approach of the unloaded arm at `q` `(n,)` [rad], or None if it is allowed."""
@@ -157,8 +151,8 @@ class ClearanceChecker:
         """Return all pairs; `obstacles` contains name and body of each obstacle."""
         world = self.world
         robot = world.robot
+        joints = world.joints
         bodies = [("the table", world.table), *world.bin_bodies.items(), *obstacles]
-        joints = range(robot.joint_count)
         links = range(robot.first_collision_link, world.tool_index + 1)
         pairs = [BodyPair((world.arm, body), links, joints, body_name=name) for name, body in bodies]
         for link_a, link_b in robot.self_collision_pairs:
@@ -218,11 +212,10 @@ class ClearanceChecker:
         """Return the maximum distance of a point of the arm from the axis of each joint `(n,)` [m]."""
         world = self.world
         client = world.client
-        joints = range(world.robot.joint_count)
-        states = client.getLinkStates(world.arm, joints, computeForwardKinematics=True)
+        states = client.getLinkStates(world.arm, world.joints, computeForwardKinematics=True)
         axes = [
             client.rotateVector(state[5], client.getJointInfo(world.arm, joint)[JOINT_AXIS])
-            for joint, state in zip(joints, states, strict=True)
+            for joint, state in zip(world.joints, states, strict=True)
         ]
         links = np.diff([*(state[4] for state in states), world.get_tool_pose().position], axis=0)
         lengths = np.linalg.norm(links, axis=1)

@@ -68,7 +68,7 @@ class WorldRebuilder:
             ) from error
 
     def _start_motion(self, duration: float, samples: str) -> None:
-        states = np.frombuffer(base64.b64decode(samples), "<f8").reshape(3, -1, self._world.robot.joint_count)
+        states = np.frombuffer(base64.b64decode(samples), "<f8").reshape(3, -1, len(self._world.joints))
         self.motion = Trajectory([SampledMotion(JointState(*states), duration)]) if duration else None
         self.braking_start = (self.braking_start[0], 0.0)
 

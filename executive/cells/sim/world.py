@@ -69,11 +69,6 @@ class RobotModel:
     link_radius: float
     ik_seed_deg: tuple[float, ...]
 
-    @property
-    def joint_count(self) -> int:
-        """Number of joints."""
-        return len(self.max_torques)
-
 
 ROBOT_MODELS: Mapping[str, RobotModel] = {
     "kuka_iiwa/model.urdf": RobotModel(
@@ -128,6 +123,7 @@ class World:
         client: The connection to the physics server, which identifies bodies by integers.
         arm: Body of the arm, fixed at the origin.
         robot: Model of the arm.
+        joints: Indices of the joints of the arm, which are also the indices of the links up to the flange.
         flange_index: Index of the link with the flange.
         tool_index: Index of the link of the tool, whose frame is the frame of the flange.
         table, floor: Bodies of the table and of the floor under the table.
@@ -145,8 +141,9 @@ class World:
     def __init__(self, config: CellConfig, *, gui: bool = False, visuals: bool = True) -> None:
         self.config = config
         self.robot = ROBOT_MODELS[config.arm.urdf]
-        self.flange_index = self.robot.joint_count - 1
-        self.tool_index = self.robot.joint_count
+        self.joints = range(len(self.robot.max_torques))
+        self.flange_index = self.joints[-1]
+        self.tool_index = len(self.joints)
         self.client = BulletClient(pybullet.GUI if gui else pybullet.DIRECT)
         self.client.setGravity(0, 0, -9.81)
         self.client.setTimeStep(STEP)
@@ -236,7 +233,7 @@ class World:
 
     def get_joint_positions(self) -> Array:
         """Return the joint positions of the arm `(n,)` [rad]."""
-        states = self.client.getJointStates(self.arm, range(self.robot.joint_count))
+        states = self.client.getJointStates(self.arm, self.joints)
         return np.array([state[0] for state in states])
 
     def set_joint_positions(self, q: Sequence[float] | Array) -> None:
@@ -250,10 +247,9 @@ class World:
         If a command precedes every physics step, the full position gain leaves a tracking error of 0.0005°.
         """
         self.log.append(world_log.JOINT_TARGETS, time, *q)
-        joint_count = self.robot.joint_count
         self.client.setJointMotorControlArray(
-            self.arm, range(joint_count), pybullet.POSITION_CONTROL, targetPositions=q.tolist(),
-            forces=self.robot.max_torques, positionGains=[1.0] * joint_count,
+            self.arm, self.joints, pybullet.POSITION_CONTROL, targetPositions=q.tolist(),
+            forces=self.robot.max_torques, positionGains=[1.0] * len(q),
         )  # fmt: skip
 
     def get_flange_pose(self) -> Pose:

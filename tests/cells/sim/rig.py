@@ -13,7 +13,7 @@ from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
 from executive.events import Event
 from executive.geometry import Array, Pose
-from executive.motion.planner import build_planner
+from executive.motion.planner import Planner
 from executive.motion.trajectory import Trajectory
 
 WHITE = (1.0, 1.0, 1.0)
@@ -31,7 +31,7 @@ class Rig:
         self.config = config
         self.world = World(config, visuals=False)
         self.clearance = ClearanceChecker(config)
-        self.planner = build_planner(config, self.clearance.check)
+        self.planner = Planner(config, self.clearance.check)
         self.clock = StepClock(lambda: self.world.step_count * STEP)
         self.events: list[Event] = []
         self.tool = SuctionTool(self.world, config.tool)
