@@ -282,7 +282,7 @@ def find_input_format(access: Access) -> InputFormat:
     if access.name in COMMANDS:
         return InputFormat("command", NONE)
     name, codec = INPUT_FORMATS[access.name]
-    return InputFormat(name.format(*access.all_arguments, detector=access.detector), codec)
+    return InputFormat(name.format(*access.arguments, detector=access.detector), codec)
 
 
 def check_input(name: str, value: JsonValue) -> None:

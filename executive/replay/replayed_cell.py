@@ -221,6 +221,7 @@ class ReplayedCell(CellWrapper):
 
     Attributes:
         log: Recorded inputs before the last interruption.
+        replayer: Source of the recorded values.
         last_interruption: Interruption at the end of the log, or None if the run is only replayed.
         pending_interruption: Interruption at this control step; None after `resume`, or without interruption.
         is_live: True if all reads and commands go to the inner cell.
@@ -231,7 +232,7 @@ class ReplayedCell(CellWrapper):
         step_count = None if last_interruption is None else last_interruption.kept_step_count
         self.log = log if step_count is None else log.select_before(step_count)
         self.last_interruption = last_interruption
-        self._replayer = InputReplayer(self.log)
+        self.replayer = InputReplayer(self.log)
         self._has_raised_stop = False
         self.is_live = False
         clock = StepClock(self._read_clock, self.log.control_period)
@@ -243,11 +244,6 @@ class ReplayedCell(CellWrapper):
     def steps(self) -> int:
         """Number of control steps since the run began."""
         return self.inner.steps if self.is_live else self._steps
-
-    @property
-    def missing_input_message(self) -> str:
-        """Message about the first input without a recorded value, or ""."""
-        return self._replayer.missing_input_message
 
     @property
     def has_run_ended(self) -> bool:
@@ -293,7 +289,7 @@ class ReplayedCell(CellWrapper):
 
     def _begin_step(self, step_count: int) -> None:
         self._steps = step_count
-        self._replayer.begin_step(step_count)
+        self.replayer.begin_step(step_count)
 
     def _make_final_interruption(self, step_count: int) -> Interruption | None:
         """Return the interruption after `step_count` control steps, or None."""
@@ -305,14 +301,14 @@ class ReplayedCell(CellWrapper):
         """Return the time on the clock of the cell [s]."""
         if self.is_live:
             return self.inner.cell.clock.now
-        offset: float = self._replayer.read("clock")
+        offset: float = self.replayer.read("clock")
         return self._steps * self.log.control_period + offset
 
     def _handle_access(self, access: Access) -> Any:
         """Return the recorded result of an access to the cell, or the result from the inner cell."""
         if self.is_live:
             return access.proceed()
-        return self._replayer.read(*find_input_format(access))
+        return self.replayer.read(*find_input_format(access))
 
 
 def _make_exception(reading: InputRead) -> BaseException:
