@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from executive.cell.config import ObjectConfig
 from executive.cell.objects import Quotas
-from executive.cell.protocols import Cell, Operator, Routes
+from executive.cell.protocols import Cell, Ledger, Operator, Routes
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array, Pose
 
@@ -86,8 +86,8 @@ class TrueObject:
         return self.X_WO.position
 
 
-class Accounts(Protocol):
-    """Part of the ledger that a run needs at its end and at its resumption."""
+class Accounts(Ledger, Protocol):
+    """Ledger with what a run needs at its end and at its resumption."""
 
     def set_final_states(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the tree succeeded."""
@@ -97,10 +97,6 @@ class Accounts(Protocol):
 
     def count_states(self) -> dict[str, int]:
         """Return the number of items by final state; the key `seen` is the total without phantoms."""
-
-    @property
-    def unknown_labels(self) -> Mapping[str, int]:
-        """For each label that the cell file does not declare: maximum number of its boxes in one frame."""
 
     @property
     def assumption_reasons(self) -> Sequence[str]:
