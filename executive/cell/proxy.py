@@ -10,30 +10,21 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
+from executive.cell import protocols
 from executive.cell.arm import Arm, Planning
-from executive.cell.protocols import (
-    Behaviours,
-    Camera,
-    Cell,
-    Detector,
-    Ledger,
-    Localizer,
-    Operator,
-    Request,
-    Tool,
-)
+from executive.cell.protocols import Cell
 
 _PROTOCOLS: Mapping[str, type] = {
     "arm": Arm,
     "plan": Planning,
-    "tool": Tool,
-    "camera": Camera,
-    "detector": Detector,
-    "request": Request,
-    "ledger": Ledger,
-    "operator": Operator,
-    "localizer": Localizer,
-    "behaviours": Behaviours,
+    "tool": protocols.Tool,
+    "camera": protocols.Camera,
+    "detector": protocols.Detector,
+    "request": protocols.Request,
+    "ledger": protocols.Ledger,
+    "operator": protocols.Operator,
+    "localizer": protocols.Localizer,
+    "behaviours": protocols.Behaviours,
 }
 """Protocol by role: role of a part of the cell, or of an object that a part returns."""
 _RETURNED_ROLES = {"arm.plan": "plan", "detector.request": "request"}

@@ -214,7 +214,7 @@ class CellKind(Protocol):
 
 
 class CellWrapper:
-    """Work cell that forwards each call to another work cell; a subclass overrides some methods.
+    """Work cell that forwards each call to another work cell; a subclass overrides `advance` or `steps`.
 
     Attributes:
         inner: The wrapped work cell.
@@ -226,6 +226,10 @@ class CellWrapper:
         self.inner = inner
         self.cell = inner.cell
         self.accounts = inner.accounts
+        self.log_to = inner.log_to
+        self.visuals = inner.visuals
+        self.audit = inner.audit
+        self.close = inner.close
 
     @property
     def steps(self) -> int:
@@ -237,25 +241,9 @@ class CellWrapper:
         """Control step of the last command to the arm or the tool."""
         return self.inner.last_command_step
 
-    def log_to(self, path: Path) -> None:
-        """Start a log file from which the simulated world can be reconstructed."""
-        self.inner.log_to(path)
-
     def advance(self) -> None:
         """Execute one control step."""
         self.inner.advance()
-
-    def visuals(self) -> Visuals | None:
-        """Return the shapes and poses of the bodies for displays, or None if the cell has no visuals."""
-        return self.inner.visuals()
-
-    def audit(self) -> Mapping[str, int] | None:
-        """Return the number of objects by true place, by `AUDIT_KEYS`; None without ground truth."""
-        return self.inner.audit()
-
-    def close(self) -> None:
-        """Release all resources of the cell."""
-        self.inner.close()
 
 
 def find_innermost_cell(workcell: Workcell) -> Workcell:
