@@ -299,9 +299,7 @@ class ReplayedCell(CellWrapper):
 
     def _handle_access(self, access: Access) -> Any:
         """Return the recorded result of an access to the cell, or the result from the inner cell."""
-        if self.is_live:
-            return access.proceed()
-        return self.replayer.read(*find_input_format(access))
+        return access.proceed() if self.is_live else self.replayer.read(*find_input_format(access))
 
 
 def _make_exception(reading: InputRead) -> BaseException:

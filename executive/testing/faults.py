@@ -236,7 +236,7 @@ def detector_dead() -> Effect:
 
 def detector_hangs() -> Effect:
     """Return an effect: requests are answered when the fault ends; a node that ends before gets no answer."""
-    return make_detector_effect("detector_hangs", lambda answer: answer, hangs=True)
+    return make_detector_effect("detector_hangs", hangs=True)
 
 
 def detector_unsure() -> Effect:
@@ -249,16 +249,17 @@ def detector_finds_nothing() -> Effect:
     return make_detector_effect("detector_finds_nothing", _remove_detections)
 
 
-def make_detector_effect(name: str, change_answer: AnswerChange, hangs: bool = False) -> Effect:
+def make_detector_effect(name: str, change_answer: AnswerChange | None = None, hangs: bool = False) -> Effect:
     """Return an effect: the detector answers with changed answers, or not before the end of the fault."""
     return Effect(name, interceptors={"request": _change_answer}, arguments=(change_answer, hangs))
 
 
 def _change_answer(
-    proceed: Callable[[], Any], occurrence: Occurrence, change: Callable[[Any], Any], hangs: bool = False
+    proceed: Callable[[], Any], occurrence: Occurrence, change: Callable[..., Any] | None, hangs: bool = False
 ) -> ChangedRequest:
     """Return the pending answer of a detector or a planner, changed, or held back until the fault ends."""
     occurrence.emit_event()
+    change = change or (lambda answer: answer)
     return ChangedRequest(proceed(), change, is_released=lambda: occurrence.is_over or not hangs)
 
 
