@@ -6,34 +6,25 @@ The input recorder, the replay, the test kit and the fault scripts intercept cal
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
+from executive.cell import protocols
 from executive.cell.arm import Arm, Planning
-from executive.cell.protocols import (
-    Behaviours,
-    Camera,
-    Cell,
-    Detector,
-    Ledger,
-    Localizer,
-    Operator,
-    Request,
-    Tool,
-)
+from executive.cell.protocols import Cell
 
 _PROTOCOLS: Mapping[str, type] = {
     "arm": Arm,
     "plan": Planning,
-    "tool": Tool,
-    "camera": Camera,
-    "detector": Detector,
-    "request": Request,
-    "ledger": Ledger,
-    "operator": Operator,
-    "localizer": Localizer,
-    "behaviours": Behaviours,
+    "tool": protocols.Tool,
+    "camera": protocols.Camera,
+    "detector": protocols.Detector,
+    "request": protocols.Request,
+    "ledger": protocols.Ledger,
+    "operator": protocols.Operator,
+    "localizer": protocols.Localizer,
+    "behaviours": protocols.Behaviours,
 }
 """Protocol by role: role of a part of the cell, or of an object that a part returns."""
 _RETURNED_ROLES = {"arm.plan": "plan", "detector.request": "request"}
@@ -55,8 +46,8 @@ class Access:
         detector: Name of the detector for the roles `detector` and `request`, otherwise "".
         member: Name of the attribute or method.
         proceed: Function that performs the access on the part itself and returns the result.
-        arguments: Positional arguments of the call; () for an attribute.
-        keywords: Keyword arguments of the call by name.
+        arguments: Positional arguments of the call, then the values of its keyword arguments; () for an
+            attribute.
     """
 
     role: str
@@ -64,17 +55,11 @@ class Access:
     member: str
     proceed: Callable[[], Any]
     arguments: tuple[Any, ...] = ()
-    keywords: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
     def name(self) -> str:
         """Role and member, for instance `arm.start`."""
         return f"{self.role}.{self.member}"
-
-    @property
-    def all_arguments(self) -> tuple[Any, ...]:
-        """Positional arguments, followed by the values of the keyword arguments."""
-        return (*self.arguments, *self.keywords.values())
 
     @property
     def is_call(self) -> bool:
@@ -129,7 +114,7 @@ class _Proxy:
         def proceed() -> Any:
             return getattr(self._part, member)(*arguments, **keywords)
 
-        access = Access(self._role, self._detector, member, proceed, arguments, keywords)
+        access = Access(self._role, self._detector, member, proceed, (*arguments, *keywords.values()))
         result = self._intercept(access)
         if returned_role := _RETURNED_ROLES.get(access.name):
             return _Proxy(returned_role, self._detector, result, self._intercept)

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from executive.cell.config import ObjectConfig
 from executive.cell.objects import Quotas
-from executive.cell.protocols import Cell, Operator, Routes
+from executive.cell.protocols import Cell, Ledger, Operator, Routes
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array, Pose
 
@@ -86,8 +86,8 @@ class TrueObject:
         return self.X_WO.position
 
 
-class Accounts(Protocol):
-    """Part of the ledger that a run needs at its end and at its resumption."""
+class Accounts(Ledger, Protocol):
+    """Ledger with what a run needs at its end and at its resumption."""
 
     def set_final_states(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the tree succeeded."""
@@ -97,10 +97,6 @@ class Accounts(Protocol):
 
     def count_states(self) -> dict[str, int]:
         """Return the number of items by final state; the key `seen` is the total without phantoms."""
-
-    @property
-    def unknown_labels(self) -> Mapping[str, int]:
-        """For each label that the cell file does not declare: maximum number of its boxes in one frame."""
 
     @property
     def assumption_reasons(self) -> Sequence[str]:
@@ -218,7 +214,7 @@ class CellKind(Protocol):
 
 
 class CellWrapper:
-    """Work cell that forwards each call to another work cell; a subclass overrides some methods.
+    """Work cell that forwards each call to another work cell; a subclass overrides `advance` or `steps`.
 
     Attributes:
         inner: The wrapped work cell.
@@ -230,6 +226,10 @@ class CellWrapper:
         self.inner = inner
         self.cell = inner.cell
         self.accounts = inner.accounts
+        self.log_to = inner.log_to
+        self.visuals = inner.visuals
+        self.audit = inner.audit
+        self.close = inner.close
 
     @property
     def steps(self) -> int:
@@ -241,25 +241,9 @@ class CellWrapper:
         """Control step of the last command to the arm or the tool."""
         return self.inner.last_command_step
 
-    def log_to(self, path: Path) -> None:
-        """Start a log file from which the simulated world can be reconstructed."""
-        self.inner.log_to(path)
-
     def advance(self) -> None:
         """Execute one control step."""
         self.inner.advance()
-
-    def visuals(self) -> Visuals | None:
-        """Return the shapes and poses of the bodies for displays, or None if the cell has no visuals."""
-        return self.inner.visuals()
-
-    def audit(self) -> Mapping[str, int] | None:
-        """Return the number of objects by true place, by `AUDIT_KEYS`; None without ground truth."""
-        return self.inner.audit()
-
-    def close(self) -> None:
-        """Release all resources of the cell."""
-        self.inner.close()
 
 
 def find_innermost_cell(workcell: Workcell) -> Workcell:

@@ -22,11 +22,7 @@ from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
 from executive.ledger.look import AMBIGUITY_FACTOR, LookUpdate, make_look_event
 from executive.ledger.outcomes import Certainty
-from executive.perception.evidence import (
-    compute_weight_log_ratios,
-    describe_weight,
-    find_classes_distinct_by_touch,
-)
+from executive.perception import evidence
 
 BODY_LOOK_COUNT = 5
 """Number of looks after which an object of no item that was not detected again is forgotten. It is less than
@@ -75,7 +71,7 @@ class Tracker:
         self._bodies: list[tuple[Array, int]] = []
         """Objects of no item: position `(3,)` [m], and number of further looks until it is forgotten."""
         self._records = ItemRecords(self.emit)
-        self._certainty = Certainty(self.config, find_classes_distinct_by_touch(self.classes))
+        self._certainty = Certainty(self.config, evidence.find_classes_distinct_by_touch(self.classes))
         self._bin_contents = BinContents(self.config, self.bins, self.routes, self._records, self.quotas)
         self._coverage = Coverage(self.table)
         self._deferral_count = 0
@@ -147,10 +143,10 @@ class Tracker:
     def record_weight(self, item: Item, weight: float, std: float) -> str:
         record = self._records.find(item)
         label_map = {label: other.detected_label for label, other in self.classes.items()}
-        record.belief.add_weighing(compute_weight_log_ratios(weight, std, self.classes), label_map)
+        record.belief.add_weighing(evidence.compute_weight_log_ratios(weight, std, self.classes), label_map)
         contradiction = ""
         if not self._certainty.is_class_certain_by_weight(record):
-            contradiction = describe_weight(weight, record.label, self.classes)
+            contradiction = evidence.describe_weight(weight, record.label, self.classes)
             record.last_contradiction = contradiction
         self._records.emit(record)
         return contradiction

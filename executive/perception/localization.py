@@ -95,9 +95,9 @@ class CellLocalizer:
             return ""
         object_class = self.classes[detection.label]
         size_contradiction = evidence.describe_size_contradiction(detection, position, frame, object_class)
-        if size_contradiction:
-            return size_contradiction
-        return evidence.describe_top_contradiction(detection, position, frame, self.classes)
+        return size_contradiction or evidence.describe_top_contradiction(
+            detection, position, frame, self.classes
+        )
 
     def _find_height(self, detection: Detection, frame: Frame) -> float:
         """Return the height of the centre of a detected object [m].

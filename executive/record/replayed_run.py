@@ -133,7 +133,7 @@ class _Comparison:
             self.result.decisions += 1
             return
         self._has_found_difference = True
-        self.result.unanswered = self.run.workcell.missing_input_message
+        self.result.unanswered = self.run.workcell.replayer.missing_input_message
         # After the last recorded step, the replay only halts its skills.
         self.result.is_complete = decision.tick > self._log.last_tick
         if self._has_recorded_end or any(map(self._is_in_complete_step, filter(None, (recorded, decision)))):
@@ -149,7 +149,7 @@ class _Comparison:
         self.result.is_complete = False
         if self._is_in_complete_step(recorded):
             self.result.recorded = recorded
-            self.result.unanswered = self.run.workcell.missing_input_message
+            self.result.unanswered = self.run.workcell.replayer.missing_input_message
 
     def _is_in_complete_step(self, decision: TimedEvent) -> bool:
         """Return True if the record contains all events of the control step of a decision."""

@@ -7,7 +7,7 @@ import contextlib
 import re
 import zlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import astuple, dataclass, replace
 from fnmatch import fnmatchcase
 from operator import attrgetter
@@ -86,16 +86,14 @@ def decode_frame(value: Any) -> Frame:
     height, width = value["size"]
     if not 0 < height * width <= MAX_PIXELS:
         raise ValueError(f"an image of {height} x {width} pixels")
+    unchanged = {name: value[name] for name in ("id", "camera", "stamp", "change_count")}
     return Frame(
-        id=value["id"],
-        camera=value["camera"],
+        **unchanged,
         image=np.zeros((height, width, 3), np.uint8),
         depth=None,
         matrix=decode_array(value["matrix"]),
         X_WC=decode_pose(value["X_WC"]),
-        stamp=value["stamp"],
         visible=_decode_mask(value["visible"], height, width),
-        change_count=value["change_count"],
     )
 
 
@@ -124,27 +122,20 @@ def encode_answer(answer: Answer) -> dict[str, Any]:
 
 def decode_answer(value: Any) -> Answer:
     """Return the answer that `encode_answer` encoded."""
-    keys = ("confident", "doubtful", "unknown")
-    confident, doubtful, unknown = (tuple(map(decode_detection, value[key])) for key in keys)
-    return Answer(value["detector"], confident, ErrorRates(*value["reliability"]), doubtful, unknown)
+    groups = {key: tuple(map(decode_detection, value[key])) for key in ("confident", "doubtful", "unknown")}
+    return Answer(value["detector"], error_rates=ErrorRates(*value["reliability"]), **groups)
 
 
-def encode_observations(observations: Sequence[Observation]) -> list[Any]:
-    """Return the attributes of each observation as a list."""
-    encoded = []
-    for seen in observations:
-        detection = encode_detection(seen.detection)
-        position = seen.position.tolist()
-        encoded.append([detection, position, seen.std, seen.is_confident, seen.contradiction])
-    return encoded
+def encode_observation(seen: Observation) -> list[Any]:
+    """Return the attributes of an observation as a list."""
+    detection = encode_detection(seen.detection)
+    return [detection, seen.position.tolist(), seen.std, seen.is_confident, seen.contradiction]
 
 
-def decode_observations(value: Any) -> list[Observation]:
-    """Return the observations that `encode_observations` encoded."""
-    return [
-        Observation(decode_detection(detection), decode_array(position), std, is_confident, contradiction)
-        for detection, position, std, is_confident, contradiction in value
-    ]
+def decode_observation(value: Any) -> Observation:
+    """Return the observation that `encode_observation` encoded."""
+    detection, position, std, is_confident, contradiction = value
+    return Observation(decode_detection(detection), decode_array(position), std, is_confident, contradiction)
 
 
 def encode_behaviour_step(step: BehaviourStep) -> dict[str, Any]:
@@ -212,7 +203,10 @@ ARRAY = Codec(np.ndarray.tolist, decode_array)
 POSE = Codec(encode_pose, decode_pose)
 FRAME = Codec(encode_frame, decode_frame)
 ANSWER = Codec(encode_answer, decode_answer)
-OBSERVATIONS = Codec(encode_observations, decode_observations)
+OBSERVATIONS = Codec(
+    lambda observations: list(map(encode_observation, observations)),
+    lambda values: list(map(decode_observation, values)),
+)
 BEHAVIOUR_STEP = Codec(encode_behaviour_step, decode_behaviour_step)
 MOTION = Codec(attrgetter("duration"), RecordedMotion)
 """Codec of planned motions; the other codecs are named after the type that they convert."""
@@ -282,7 +276,7 @@ def find_input_format(access: Access) -> InputFormat:
     if access.name in COMMANDS:
         return InputFormat("command", NONE)
     name, codec = INPUT_FORMATS[access.name]
-    return InputFormat(name.format(*access.all_arguments, detector=access.detector), codec)
+    return InputFormat(name.format(*access.arguments, detector=access.detector), codec)
 
 
 def check_input(name: str, value: JsonValue) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, NamedTuple
 
 from executive import errors
@@ -58,6 +57,8 @@ class InputLog:
         inputs: Recorded values by name of the input, in order; equal consecutive values are recorded once.
         interruptions: Interruptions after which the run was resumed, by `kept_step_count`.
         halt: The last halt, or None.
+        last_tick: Number of the last control step with an event.
+        last_action: Last action of the tool, `open` or `close`; "" without an action.
     """
 
     def __init__(self, events: Iterable[TimedEvent]) -> None:
@@ -66,17 +67,16 @@ class InputLog:
             if isinstance(timed.event, RunResumed):
                 self.events = _select_before(self.events, timed.event.valid_ticks)
             self.events.append(timed)
-        self._incomplete_end_ticks = {
-            timed.tick
-            for timed in self.events
-            if isinstance(timed.event, RunEnded) and timed.event.status == "INCOMPLETE"
-        }
         self.inputs: dict[str, list[RecordedInput]] = defaultdict(list)
         self.interruptions: dict[int, Interruption] = {}
         self.halt: Halt | None = None
+        self.last_tick = 0
+        self.last_action = ""
+        self._incomplete_end_ticks: set[int] = set()
         for timed in self.events:
             tick = timed.tick
             event = timed.event
+            self.last_tick = max(self.last_tick, tick)
             match event:
                 case RunResumed(count, action):
                     restarts_tree = count - 1 in self._incomplete_end_ticks
@@ -85,6 +85,10 @@ class InputLog:
                     self.inputs[name].append(RecordedInput(tick, event))
                 case RunHalted(is_tree_ticked):
                     self.halt = Halt(tick, is_tree_ticked)
+                case ToolCommanded(action):
+                    self.last_action = action
+                case RunEnded(status="INCOMPLETE"):
+                    self._incomplete_end_ticks.add(tick)
 
     @property
     def start_event(self) -> RunStarted | None:
@@ -96,17 +100,6 @@ class InputLog:
         """Duration of a control step [s]."""
         assert self.start_event is not None, "the journal of a replayed run contains its start"
         return self.start_event.step
-
-    @cached_property
-    def last_tick(self) -> int:
-        """Number of the last control step with an event."""
-        return max((timed.tick for timed in self.events), default=0)
-
-    @property
-    def last_action(self) -> str:
-        """Last action of the tool, `open` or `close`; "" without an action."""
-        events = (timed.event for timed in reversed(self.events))
-        return next((event.action for event in events if isinstance(event, ToolCommanded)), "")
 
     def find_lost_value(self) -> str:
         """Return a clause about the first output or present blackboard value that is not in the journal."""
@@ -221,6 +214,7 @@ class ReplayedCell(CellWrapper):
 
     Attributes:
         log: Recorded inputs before the last interruption.
+        replayer: Source of the recorded values.
         last_interruption: Interruption at the end of the log, or None if the run is only replayed.
         pending_interruption: Interruption at this control step; None after `resume`, or without interruption.
         is_live: True if all reads and commands go to the inner cell.
@@ -231,7 +225,7 @@ class ReplayedCell(CellWrapper):
         step_count = None if last_interruption is None else last_interruption.kept_step_count
         self.log = log if step_count is None else log.select_before(step_count)
         self.last_interruption = last_interruption
-        self._replayer = InputReplayer(self.log)
+        self.replayer = InputReplayer(self.log)
         self._has_raised_stop = False
         self.is_live = False
         clock = StepClock(self._read_clock, self.log.control_period)
@@ -243,11 +237,6 @@ class ReplayedCell(CellWrapper):
     def steps(self) -> int:
         """Number of control steps since the run began."""
         return self.inner.steps if self.is_live else self._steps
-
-    @property
-    def missing_input_message(self) -> str:
-        """Message about the first input without a recorded value, or ""."""
-        return self._replayer.missing_input_message
 
     @property
     def has_run_ended(self) -> bool:
@@ -293,7 +282,7 @@ class ReplayedCell(CellWrapper):
 
     def _begin_step(self, step_count: int) -> None:
         self._steps = step_count
-        self._replayer.begin_step(step_count)
+        self.replayer.begin_step(step_count)
 
     def _make_final_interruption(self, step_count: int) -> Interruption | None:
         """Return the interruption after `step_count` control steps, or None."""
@@ -305,14 +294,12 @@ class ReplayedCell(CellWrapper):
         """Return the time on the clock of the cell [s]."""
         if self.is_live:
             return self.inner.cell.clock.now
-        offset: float = self._replayer.read("clock")
+        offset: float = self.replayer.read("clock")
         return self._steps * self.log.control_period + offset
 
     def _handle_access(self, access: Access) -> Any:
         """Return the recorded result of an access to the cell, or the result from the inner cell."""
-        if self.is_live:
-            return access.proceed()
-        return self._replayer.read(*find_input_format(access))
+        return access.proceed() if self.is_live else self.replayer.read(*find_input_format(access))
 
 
 def _make_exception(reading: InputRead) -> BaseException:

@@ -18,17 +18,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from executive.cell.arm import Motion, Planning
+from executive.cell.arm import Motion
 from executive.cell.frame import Answer
-from executive.cell.protocols import Request
 from executive.cell.workcell import Workcell
 from executive.errors import InputError, NoDepth, Unavailable, Unreachable
 from executive.events import Emit, discard_event
+from executive.perception.detectors.requests import ChangedRequest
 from executive.testing.faulty_cell import Effect, FaultyCell, ObjectChoice, Occurrence, ScheduledFault
 from executive.testing.oracle import WorldAccess
 
@@ -254,27 +254,13 @@ def make_detector_effect(name: str, change_answer: AnswerChange | None = None, h
     return Effect(name, interceptors={"request": _change_answer}, arguments=(change_answer, hangs))
 
 
-@dataclass
-class _FaultyAnswer:
-    """A pending answer that the fault `occurrence` changes, or holds back; `Request` or `Planning`."""
-
-    pending: Request | Planning
-    occurrence: Occurrence
-    change_answer: Callable[[Any], Any] | None
-    hangs: bool = False
-
-    @property
-    def ready(self) -> bool:
-        return self.pending.ready and (self.occurrence.is_over or not self.hangs)
-
-    def result(self) -> Any:
-        answer = self.pending.result()
-        return answer if self.change_answer is None else self.change_answer(answer)
-
-
-def _change_answer(proceed: Callable[[], Any], occurrence: Occurrence, *arguments: Any) -> _FaultyAnswer:
+def _change_answer(
+    proceed: Callable[[], Any], occurrence: Occurrence, change: Callable[..., Any] | None, hangs: bool = False
+) -> ChangedRequest:
+    """Return the pending answer of a detector or a planner, changed, or held back until the fault ends."""
     occurrence.emit_event()
-    return _FaultyAnswer(proceed(), occurrence, *arguments)
+    change = change or (lambda answer: answer)
+    return ChangedRequest(proceed(), change, is_released=lambda: occurrence.is_over or not hangs)
 
 
 def _raise_unavailable(answer: Answer) -> Answer:

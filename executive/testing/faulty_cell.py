@@ -179,7 +179,7 @@ class FaultyCell(CellWrapper):
                     proceed = partial(interceptor, proceed, occurrence, *occurrence.effect.arguments)
         result = proceed()
         if access.name == "arm.start":
-            self._motion = (access.all_arguments[0], self.cell.clock.now)
+            self._motion = (access.arguments[0], self.cell.clock.now)
         elif access.name == "arm.stop":
             self._motion = None
         return result

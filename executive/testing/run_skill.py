@@ -119,7 +119,7 @@ def log_commands(cell: Cell, commands: list[str]) -> Cell:
 
     def log_access(access: Access) -> Any:
         if access.name in _LOGGED_CALLS:
-            log(f"{access.detector or access.role}.{access.member}", *access.all_arguments)
+            log(f"{access.detector or access.role}.{access.member}", *access.arguments)
         return access.proceed()
 
     def log_selection(target: Target, bin: str) -> None:

@@ -15,7 +15,7 @@ def test_every_access_goes_through_the_interceptor_and_so_do_those_to_what_a_cal
     seen: list[tuple[str, str, tuple[Any, ...], bool]] = []
 
     def ask(access: Access) -> Any:
-        seen.append((access.name, access.detector, access.all_arguments, access.is_call))
+        seen.append((access.name, access.detector, access.arguments, access.is_call))
         return access.proceed()
 
     cell = intercept(fake.cell, ask, ("arm", "detector"))

@@ -14,13 +14,13 @@ from executive.mission.cell_file import load_cell
 from executive.perception.detectors.envelope import (
     FrameRange,
     Measurement,
-    RatedDetector,
     StoredErrorRates,
     compute_fingerprint,
     compute_frame_statistics,
     find_envelopes,
     find_unmeasured_detectors,
     format_measurements,
+    rate_answer,
     read_measurements,
 )
 from tests.camera_poses import looking_down
@@ -127,10 +127,9 @@ def test_fake_cells_and_fake_detectors_are_not_measured(overhead, missions, tmp_
 @pytest.mark.parametrize(("colour", "doubted"), [(WOOD, False), ((60, 60, 60), True)])
 def test_rates_are_assumed_for_frames_outside_the_measured_ranges(overhead, colour, doubted):
     envelope = RATES.build_error_rates(0.5), WOOD_RANGE
-    request = SimpleNamespace(result=lambda: Answer("embedded", (), ErrorRates(0.5, 0.9, 0.9, 0.9, 9.0)))
-    silent = SimpleNamespace(request=lambda frame, view: request)
-    detector = RatedDetector(silent, envelope, overhead, "embedded")
-    answered = detector.request(make_frame(colour), "table").result().error_rates
+    answer = Answer("embedded", (), ErrorRates(0.5, 0.9, 0.9, 0.9, 9.0))
+    rated = rate_answer(answer, make_frame(colour), "table", envelope=envelope, config=overhead)
+    answered = rated.error_rates
     doubt = answered.assumption_reason
     assert answered == (assume_rates(0.5, doubt) if doubted else RATES.build_error_rates(0.5))
     start = "the workspace differs from all images with which detector embedded was measured: "

@@ -105,7 +105,8 @@ def test_a_fault_of_a_node_is_recorded_with_node_item_and_object() -> None:
 
 
 def test_the_world_of_an_unknown_cell_cannot_be_changed() -> None:
-    strange: Any = SimpleNamespace(cell=FakeCell().cell, accounts=None, advance=lambda: None)
+    members = dict.fromkeys(("accounts", "log_to", "visuals", "audit", "close"))
+    strange: Any = SimpleNamespace(**members, cell=FakeCell().cell, advance=lambda: None)
     with pytest.raises(InputError, match="not a SimpleNamespace"):
         FaultyCell(strange, [after(0.0, effects.object_removed(1))]).advance()
 

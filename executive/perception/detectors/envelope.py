@@ -9,7 +9,8 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -19,12 +20,12 @@ from pydantic import Field, ValidationError
 
 from executive.cell.config import CellConfig
 from executive.cell.device_config import Section
-from executive.cell.frame import ErrorRates, Frame, assume_rates
+from executive.cell.frame import Answer, ErrorRates, Frame, assume_rates
 from executive.cell.protocols import Clock
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, compute_hull_mask
 from executive.perception.detectors.detector_registry import build_detectors, find_detector_kinds
-from executive.perception.detectors.requests import ChangedRequest, ClosableDetector
+from executive.perception.detectors.requests import ChangedDetector, ClosableDetector
 
 MIN_PIXELS = 400
 """Minimum number of visible pixels of the workspace for the computation of statistics."""
@@ -246,38 +247,21 @@ Envelope: TypeAlias = tuple[ErrorRates, FrameRange | None]
 statistics in the measurement, in which the error rates apply; None if unknown or not measured."""
 
 
-@dataclass(frozen=True, eq=False)
-class RatedDetector:
-    """Detector whose answers carry the error rates of its envelope; implements `ClosableDetector`.
+def rate_answer(answer: Answer, frame: Frame, view: str, *, envelope: Envelope, config: CellConfig) -> Answer:
+    """Return an answer with the error rates of the envelope of its detector.
 
-    Attributes:
-        detector: The detector.
-        envelope: Error rates of the detector, and the measured conditions.
-        config: The cell file, which declares the workspace.
-        name: Name of the detector in the cell file.
+    Outside the measured conditions, the answer has assumed error rates; `config` declares the workspace.
     """
-
-    detector: ClosableDetector
-    envelope: Envelope
-    config: CellConfig
-    name: str
-
-    def request(self, frame: Frame, view: str) -> ChangedRequest:
-        """Start the detection; outside the measured conditions, the answer has assumed error rates."""
-        error_rates, frame_range = self.envelope
-        statistics = compute_frame_statistics(frame, self.config) if frame_range else None
-        if frame_range and statistics and (difference := frame_range.describe_difference(statistics)):
-            reason = (
-                f"the workspace differs from all images with which detector {self.name} was measured: "
-                f"{difference}; {describe_measurement_command(self.config)}"
-            )
-            error_rates = assume_rates(error_rates.threshold, reason)
-        request = self.detector.request(frame, view)
-        return ChangedRequest(request, lambda answer: replace(answer, error_rates=error_rates))
-
-    def close(self) -> None:
-        """Close the detector."""
-        self.detector.close()
+    del view
+    error_rates, frame_range = envelope
+    statistics = compute_frame_statistics(frame, config) if frame_range else None
+    if frame_range and statistics and (difference := frame_range.describe_difference(statistics)):
+        reason = (
+            f"the workspace differs from all images with which detector {answer.detector} was measured: "
+            f"{difference}; {describe_measurement_command(config)}"
+        )
+        error_rates = assume_rates(error_rates.threshold, reason)
+    return replace(answer, error_rates=error_rates)
 
 
 def build_rated_detectors(
@@ -298,10 +282,10 @@ def build_rated_detectors(
     camera = next(iter(config.cameras.values()))
     detectors = build_detectors(config.detectors, camera=camera, clock=clock, base=base, seed=seed)
     envelopes = find_envelopes(config, base, folders)
-    return {
-        name: RatedDetector(detector, envelopes[name], config, name) if name in envelopes else detector
-        for name, detector in detectors.items()
-    }
+    for name, envelope in envelopes.items():
+        rate = partial(rate_answer, envelope=envelope, config=config)
+        detectors[name] = ChangedDetector(detectors[name], rate, detectors[name].close)
+    return detectors
 
 
 def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, Envelope]:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -79,16 +80,18 @@ class ChangedRequest:
         request: The original request.
         change_answer: Function that returns the changed answer for the original answer.
         detector: Name of the detector, which is added to error messages; "" to add nothing.
+        is_released: Function that returns False while the answer is held back.
     """
 
     request: Request
     change_answer: Callable[[Answer], Answer]
     detector: str = ""
+    is_released: Callable[[], bool] = lambda: True
 
     @property
     def ready(self) -> bool:
         """True if the answer is available."""
-        return self.request.ready
+        return self.request.ready and self.is_released()
 
     def result(self) -> Answer:
         """Return the changed answer."""
@@ -99,6 +102,28 @@ class ChangedRequest:
                 raise
             raise Unavailable(f"detector {self.detector}: {error}") from error
         return self.change_answer(answer)
+
+
+@dataclass(frozen=True, eq=False)
+class ChangedDetector:
+    """Detector with changed answers; implements `ClosableDetector`.
+
+    Attributes:
+        detector: The detector.
+        change_answer: Function of answer, frame and view that returns the changed answer.
+        close: Function that releases the resources of the detector.
+        name: Name of the detector, which is added to error messages; "" to add nothing.
+    """
+
+    detector: Detector
+    change_answer: Callable[[Answer, Frame, str], Answer]
+    close: Callable[[], None] = lambda: None
+    name: str = ""
+
+    def request(self, frame: Frame, view: str) -> ChangedRequest:
+        """Start the detection."""
+        request = self.detector.request(frame, view)
+        return ChangedRequest(request, lambda answer: self.change_answer(answer, frame, view), self.name)
 
 
 @dataclass(eq=False)
@@ -235,31 +260,10 @@ def _is_valid(detection: Detection, frame: Frame) -> bool:
     return is_box and is_in_image and 0 <= detection.confidence <= 1 and is_printable
 
 
-@dataclass(frozen=True, eq=False)
-class ScreenedDetector:
-    """Detector with screened answers; implements `executive.cell.protocols.Detector`.
-
-    Attributes:
-        detector: The detector.
-        name: Name of the detector in the cell file.
-        label_map: For each class of the cell, the class that the detectors report for it.
-    """
-
-    detector: Detector
-    name: str
-    label_map: Mapping[str, str]
-
-    def request(self, frame: Frame, view: str) -> ChangedRequest:
-        """Start the detection."""
-        request = self.detector.request(frame, view)
-        return ChangedRequest(
-            request, lambda answer: screen_answer(answer, frame, view, self.label_map), self.name
-        )
-
-
 def screen_detectors(
     detectors: Mapping[str, Detector], classes: Mapping[str, ObjectClass]
 ) -> dict[str, Detector]:
     """Return detectors with screened answers, by name; `classes` are the classes of the cell by label."""
     label_map = {label: object_class.detected_label for label, object_class in classes.items()}
-    return {name: ScreenedDetector(detector, name, label_map) for name, detector in detectors.items()}
+    screen = partial(screen_answer, label_map=label_map)
+    return {name: ChangedDetector(detector, screen, name=name) for name, detector in detectors.items()}
