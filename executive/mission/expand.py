@@ -12,7 +12,7 @@ from typing import cast
 
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
 from executive.mission.mission_file import Mission, Quota, Subtree
-from executive.mission.ports import find_control_node_outputs, find_written_variables
+from executive.mission.ports import find_node_wires, find_written_variables
 from executive.plugins import Skills
 from executive.skill import Direction
 from executive.tree.keys import Children, Elements, KeyOwner, KeySection, KeyValue, Part, map_parts
@@ -173,21 +173,14 @@ class _Expander:
 
     def _find_shadowed_names(self, node: Node, values: ValuesByName) -> Iterator[Finding]:
         """Yield an error for every output variable of a node that has the name of a param or argument."""
-
-        def explain(writer: str, name: str) -> str:
-            kind = "a param of the mission" if name in self.params else "an argument of the subtree"
-            return f"{writer} writes ${name}, but {name} is {kind}"
-
-        for _, variable in find_control_node_outputs(node):
-            if variable in values:
-                message = explain(node.type_name, variable)
-                yield make_error(variable.span, "shadowed-param", message, "Rename one of them.")
-        if not isinstance(node, SkillNode) or node.skill not in self.skills:
-            return
-        for name, port in self.skills[node.skill].ports.items():
-            if port.direction is Direction.OUT and name in values and name not in node.settings:
-                hint = f"Let {node.skill} write another variable: {name}: $other."
-                yield make_error(node.span, "shadowed-param", explain(f"{node.skill}.{name}", name), hint)
+        for wire in find_node_wires(node, self.skills, Direction.OUT):
+            # `check_settings` reports an output of a skill that the mission sets to a param or argument.
+            if wire.variable in values and (isinstance(node, ControlNode) or not wire.is_explicit):
+                kind = (
+                    "a param of the mission" if wire.variable in self.params else "an argument of the subtree"
+                )
+                message = f"{wire} writes ${wire.variable}, but {wire.variable} is {kind}"
+                yield make_error(wire.span, "shadowed-param", message, wire.rename_hint)
 
     def _resolve_name(self, reference: Reference, values: ValuesByName, callers: tuple[str, ...]) -> Value:
         """Return the value of a param or argument, or the reference itself if it is a variable."""
