@@ -119,19 +119,18 @@ def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
         if end_state is None or end_state.written_variables is None:
             continue
         written = find_written_variables(use.body, context.skills)
-        returns = (subtree.returns or {}).items()
-        for (name, span), variable in zip(returns, use.written_variables, strict=True):
+        for name, variable in zip(subtree.returns or (), use.written_variables, strict=True):
             if variable not in written:
                 problem = "no node of the subtree writes"
                 names = sorted(full_name.rpartition(".")[2] for full_name in written)
                 hint = suggest_choice(name, names, "Variables that the subtree writes")
             elif variable not in end_state.written_variables:
                 problem = "is not written on every path"
-                hint = f"${name} is written by {_describe_writers(context, variable, span)}."
+                hint = f"${name} is written by {_describe_writers(context, variable, name.span)}."
             else:
                 continue
             message = f'the subtree "{use.name}" returns ${name}, which {problem}'
-            yield make_error(span, "unwritten", message, hint)
+            yield make_error(name.span, "unwritten", message, hint)
 
 
 def _describe_writers(context: CheckContext, variable: str, span: Span) -> str:
