@@ -28,10 +28,11 @@ from executive.mission.yaml_files import (
     YamlMapping,
     YamlNode,
     YamlScalar,
+    YamlSequence,
     find_file_below,
-    flatten,
     has_outside_link,
     is_outside_path,
+    list_scalars,
     parse_yaml,
     read_source,
 )
@@ -180,9 +181,9 @@ class _CellFileReader:
         """
         is_calibration = keys[:1] == ("cameras",) and keys[2:3] == ("calibration",)
         if not isinstance(node, YamlMapping):
-            return flatten(node) if is_calibration else node
+            return _flatten(node) if is_calibration else node
         if is_calibration and (data := node.get("data")):
-            return flatten(data)
+            return _flatten(data)
         entries = []
         # Only the calibration itself, and none of its parts, can name a file.
         for entry in self._insert_file(node).entries if is_calibration and len(keys) == 3 else node.entries:
@@ -212,6 +213,11 @@ class _CellFileReader:
             if entry.key.text in CALIBRATION_KEYS
         ]
         return _inherit_entries(calibration, replace(calibration, entries=tuple(entries)))
+
+
+def _flatten(node: YamlNode) -> YamlNode:
+    """Return a list of lists as the list of their scalars, in order; return other nodes unchanged."""
+    return replace(node, items=tuple(list_scalars(node))) if isinstance(node, YamlSequence) else node
 
 
 def _merge_entry(entry: YamlEntry, base: YamlMapping) -> YamlEntry:

@@ -15,20 +15,14 @@ from executive.tree.specification import Node, SkillNode, Span, SubtreeNode
 
 
 def find_unreachable(context: CheckContext) -> Iterator[Finding]:
-    """For each node, yield a warning for the first child that can never run."""
-    yield from _find_unreachable_below(context.tree, context.flow_analysis)
-
-
-def _find_unreachable_below(node: Node, flow: FlowAnalysis) -> Iterator[Finding]:
-    for child in node.children:
-        if child.path in flow.entry_states:
-            yield from _find_unreachable_below(child, flow)
-        elif isinstance(node, ControlNode) and (reason := node.explain_unreachable()):
-            is_list = child.is_list and not child.label
-            name = "this list" if is_list else child.path_name
-            message = f"{name} can never run: {reason}"
-            yield make_warning(child.span, "unreachable", message)
-            return
+    """For each node that can run, yield a warning for the first child that can never run."""
+    entry_states = context.flow_analysis.entry_states
+    for node in context.control_nodes:
+        unreachable = [child for child in node.children if child.path not in entry_states]
+        if node.path in entry_states and unreachable and (reason := node.explain_unreachable()):
+            child = unreachable[0]
+            name = "this list" if child.is_list and not child.label else child.path_name
+            yield make_warning(child.span, "unreachable", f"{name} can never run: {reason}")
 
 
 def check_tool_states(context: CheckContext) -> Iterator[Finding]:
