@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 from executive.cell.config import CellConfig
 from executive.mission.findings import find_similar_word, suggest_choice
 from executive.mission.mission_file import Mission
-from executive.mission.ports import Wire, find_control_node_inputs, find_wires, find_written_variables
+from executive.mission.ports import Wire, find_node_wires, find_wires, find_written_variables
 from executive.plugins import Skills
-from executive.skill import Direction, Port, Skill
+from executive.skill import Direction, Param, Skill
 from executive.tree.flow import INITIAL_STATE, UNKNOWN_STATE, Flow, FlowState, compute_skill_flow, join_states
 from executive.tree.node import ControlNode, ControlNodes
 from executive.tree.specification import Node, Reference, SkillNode, Span, SubtreeNode
@@ -118,26 +117,6 @@ def find_unhandled_failures(analysis: FlowAnalysis) -> tuple[UnhandledFailure, .
     )
 
 
-class VariableRead(NamedTuple):
-    """A read of a variable by a node.
-
-    Attributes:
-        node: Node that reads the variable.
-        input_name: Name in messages: `Approach.target`, or the keyword of a control node.
-        variable: Name of the variable.
-        span: Position of the variable; position of the skill if the mission names no variable.
-        is_explicit: True if the mission names the variable.
-        is_required: True if the input has no default.
-    """
-
-    node: Node
-    input_name: str
-    variable: str
-    span: Span
-    is_explicit: bool
-    is_required: bool
-
-
 @dataclass(frozen=True)
 class CheckContext:
     """A mission to check, with the installed skills and control nodes, and the cell.
@@ -189,24 +168,9 @@ class CheckContext:
             if isinstance(node, SkillNode) and node.skill in skills
         ]
 
-    def list_reads(self, root: Node) -> Sequence[VariableRead]:
-        """Return every read of a variable by `root` and the nodes below it."""
-        return [read for node in root.walk() for read in self._reads_by_node[node]]
-
-    @cached_property
-    def _reads_by_node(self) -> Mapping[Node, Sequence[VariableRead]]:
-        reads: dict[Node, Sequence[VariableRead]] = {}
-        for node in self.nodes:
-            reads[node] = [
-                VariableRead(node, node.type_name, reference.name, reference.span, True, False)
-                for reference in find_control_node_inputs(node)
-            ] + [
-                VariableRead(
-                    node, str(wire), wire.variable, wire.span, wire.is_explicit, wire.port.is_required
-                )
-                for wire in self.find_wires(node, Direction.IN)
-            ]
-        return reads
+    def list_wires(self, root: Node, direction: Direction) -> Sequence[Wire]:
+        """Return the connections of `root` and of the nodes below it to variables."""
+        return [wire for node in root.walk() for wire in self._wires_by_node[node, direction]]
 
     @cached_property
     def names_in_cell_by_kind(self) -> Mapping[str, list[str]]:
@@ -252,8 +216,8 @@ class CheckContext:
         return f"For the variable, write ${value}." if is_variable else ""
 
     def find_wires(self, node: Node, direction: Direction) -> Sequence[Wire]:
-        """Return the connections of the ports of a node; none if the node is no installed skill."""
-        return self._wires_by_node.get((node, direction), ())
+        """Return the connections of a node to variables."""
+        return self._wires_by_node[node, direction]
 
     @cached_property
     def _wires_by_node(self) -> Mapping[tuple[Node, Direction], Sequence[Wire]]:
@@ -261,11 +225,11 @@ class CheckContext:
         return {
             (node, direction): [
                 wire
-                for wire in find_wires(node, skill, direction)
+                for wire in find_node_wires(node, self.skills, direction)
                 # `check_settings` reports a param with a variable that no node writes.
-                if isinstance(wire.port, Port) or wire.variable in written_variables
+                if not isinstance(wire.port, Param) or wire.variable in written_variables
             ]
-            for node, skill in self.find_installed_skills(self.nodes)
+            for node in self.nodes
             for direction in Direction
         }
 

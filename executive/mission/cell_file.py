@@ -15,30 +15,21 @@ from executive.cell.objects import BIN_THICKNESS
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.mission.findings import Finding, MissionError, make_error, sort_findings
-from executive.mission.validate import (
-    CELL_PREFIX,
-    KeyPath,
-    find_span,
-    make_override_source,
-    override_cell,
-    validate,
-)
+from executive.mission.validate import BASE_KEY, KeyPath, find_span, override_cell, validate
 from executive.mission.yaml_files import (
     YamlEntry,
     YamlMapping,
     YamlNode,
     YamlScalar,
+    YamlSequence,
     find_file_below,
-    flatten,
     has_outside_link,
     is_outside_path,
+    list_scalars,
     parse_yaml,
     read_source,
 )
 from executive.tree.specification import Source, Span
-
-BASE_KEY = "base"
-"""Key with the path of the base file, which supplies the missing top-level keys."""
 
 DETECTORS_KEY = "detectors"
 """Key whose value is merged with the value in the base, detector by detector."""
@@ -109,7 +100,6 @@ def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
     root, override_findings = override_cell(root, overrides)
     root = reader.arrange_matrices(root)
     config, validation_errors = validate(root, CellConfig)
-    override_findings += _find_overridden_base(overrides)
     findings = (*reader.findings, *override_findings, *validation_errors)
     file = CellFile(path, config, source, root, findings)
     if config is None:
@@ -180,9 +170,9 @@ class _CellFileReader:
         """
         is_calibration = keys[:1] == ("cameras",) and keys[2:3] == ("calibration",)
         if not isinstance(node, YamlMapping):
-            return flatten(node) if is_calibration else node
+            return _flatten(node) if is_calibration else node
         if is_calibration and (data := node.get("data")):
-            return flatten(data)
+            return _flatten(data)
         entries = []
         # Only the calibration itself, and none of its parts, can name a file.
         for entry in self._insert_file(node).entries if is_calibration and len(keys) == 3 else node.entries:
@@ -212,6 +202,11 @@ class _CellFileReader:
             if entry.key.text in CALIBRATION_KEYS
         ]
         return _inherit_entries(calibration, replace(calibration, entries=tuple(entries)))
+
+
+def _flatten(node: YamlNode) -> YamlNode:
+    """Return a list of lists as the list of their scalars, in order; return other nodes unchanged."""
+    return replace(node, items=tuple(list_scalars(node))) if isinstance(node, YamlSequence) else node
 
 
 def _merge_entry(entry: YamlEntry, base: YamlMapping) -> YamlEntry:
@@ -249,14 +244,6 @@ def _inherit_entries(mapping: YamlMapping, base: YamlMapping, excluded: tuple[st
     keys = {*mapping.keys, *excluded}
     base_entries = (entry for entry in base.entries if entry.key.text not in keys)
     return replace(mapping, entries=(*mapping.entries, *base_entries))
-
-
-def _find_overridden_base(overrides: Mapping[str, str]) -> Iterator[Finding]:
-    """Yield an error if an override changes the base, which only the cell file may set."""
-    key = f"{CELL_PREFIX}{BASE_KEY}"
-    if key in overrides:
-        span = make_override_source(key, overrides[key]).make_span(1, 1, len(key))
-        yield make_error(span, "unknown-key", "--set cannot change the base of a cell; edit the cell file")
 
 
 def _find_unknown_poses(file: CellFile, config: CellConfig) -> Iterator[Finding]:

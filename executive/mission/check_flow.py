@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations
-from typing import TypeAlias
 
-from executive.mission.analysis import CheckContext, FlowAnalysis, VariableRead
+from executive.mission.analysis import CheckContext, FlowAnalysis
 from executive.mission.findings import Finding, make_error, make_warning
-from executive.mission.ports import find_control_node_outputs
+from executive.mission.ports import Wire
 from executive.skill import EMPTY, HOLDING, Direction
 from executive.tree.flow import PossibleToolState
 from executive.tree.node import ControlNode
@@ -16,20 +15,14 @@ from executive.tree.specification import Node, SkillNode, Span, SubtreeNode
 
 
 def find_unreachable(context: CheckContext) -> Iterator[Finding]:
-    """For each node, yield a warning for the first child that can never run."""
-    yield from _find_unreachable_below(context.tree, context.flow_analysis)
-
-
-def _find_unreachable_below(node: Node, flow: FlowAnalysis) -> Iterator[Finding]:
-    for child in node.children:
-        if child.path in flow.entry_states:
-            yield from _find_unreachable_below(child, flow)
-        elif isinstance(node, ControlNode) and (reason := node.explain_unreachable()):
-            is_list = child.is_list and not child.label
-            name = "this list" if is_list else child.path_name
-            message = f"{name} can never run: {reason}"
-            yield make_warning(child.span, "unreachable", message)
-            return
+    """For each node that can run, yield a warning for the first child that can never run."""
+    entry_states = context.flow_analysis.entry_states
+    for node in context.control_nodes:
+        unreachable = [child for child in node.children if child.path not in entry_states]
+        if node.path in entry_states and unreachable and (reason := node.explain_unreachable()):
+            child = unreachable[0]
+            name = "this list" if child.is_list and not child.label else child.path_name
+            yield make_warning(child.span, "unreachable", f"{name} can never run: {reason}")
 
 
 def check_tool_states(context: CheckContext) -> Iterator[Finding]:
@@ -69,10 +62,6 @@ def _explain_tool_state(flow: FlowAnalysis, tool: PossibleToolState, span: Span)
     return f"The tool {state} since {name} in {cause.span.describe_place(span.source)}{after}."
 
 
-_VariableWrite: TypeAlias = tuple[str, Span, str]
-"""Name of a node that writes a variable, position of the variable, and a hint to rename it."""
-
-
 def find_shared_resources(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every two concurrent branches that use the same part of the cell."""
     for branches in _list_concurrent_branches(context):
@@ -99,14 +88,14 @@ def find_shared_variables(context: CheckContext) -> Iterator[Finding]:
     for branches in _list_concurrent_branches(context):
         writes_by_branch = [_find_first_writes(context, branch) for branch in branches]
         for writes, later_writes in combinations(writes_by_branch, 2):
-            for variable, (later_name, span, hint) in later_writes.items():
-                if variable in writes:
-                    name, first_span, _ = writes[variable]
+            for variable, later_wire in later_writes.items():
+                if wire := writes.get(variable):
+                    place = wire.span.describe_place(later_wire.span.source)
                     message = (
-                        f"{later_name} writes ${variable}, and so does {name} in "
-                        f"{first_span.describe_place(span.source)}, in another branch of the same parallel"
+                        f"{later_wire.node.type_name} writes ${variable}, and so does {wire.node.type_name} "
+                        f"in {place}, in another branch of the same parallel"
                     )
-                    yield make_error(span, "shared-variable", message, hint)
+                    yield make_error(later_wire.span, "shared-variable", message, later_wire.rename_hint)
 
 
 def find_read_races(context: CheckContext) -> Iterator[Finding]:
@@ -122,13 +111,13 @@ def find_read_races(context: CheckContext) -> Iterator[Finding]:
             racing_variables = writes[writing_index].keys() - writes[reading_index].keys()
             for read in reads[reading_index]:
                 if read.node is not safe_node and read.variable in racing_variables:
-                    writing_name, write_span, hint = writes[writing_index][read.variable]
-                    place = write_span.describe_place(read.span.source)
+                    write = writes[writing_index][read.variable]
+                    place = write.span.describe_place(read.span.source)
                     message = (
-                        f"{read.input_name} reads ${read.variable}, while {writing_name} in {place} "
+                        f"{read} reads ${read.variable}, while {write.node.type_name} in {place} "
                         "may write it, in another branch of the same parallel"
                     )
-                    yield make_error(read.span, "shared-variable", message, hint)
+                    yield make_error(read.span, "shared-variable", message, write.rename_hint)
 
 
 def _list_concurrent_branches(context: CheckContext) -> Iterator[Sequence[Node]]:
@@ -146,9 +135,9 @@ def _find_first_leaf(node: Node) -> Node:
     return _find_first_leaf(first_child) if first_child else node
 
 
-def _find_reads(context: CheckContext, branch: Node) -> Iterator[VariableRead]:
+def _find_reads(context: CheckContext, branch: Node) -> Iterator[Wire]:
     """Yield the reads below `branch`, except those that `find_unwritten_inputs` reports."""
-    for read in context.list_reads(branch):
+    for read in context.list_wires(branch, Direction.IN):
         state = context.flow_analysis.entry_states.get(read.node.path)
         if state and not (read.is_required and state.may_be_unwritten(read.variable)):
             yield read
@@ -168,14 +157,9 @@ def _find_resource_users(context: CheckContext, branch: Node) -> dict[str, Skill
     return users
 
 
-def _find_first_writes(context: CheckContext, branch: Node) -> dict[str, _VariableWrite]:
+def _find_first_writes(context: CheckContext, branch: Node) -> dict[str, Wire]:
     """Return the first write of each variable below `branch`, by variable."""
-    writes: dict[str, _VariableWrite] = {}
-    for node in branch.walk():
-        for key, variable in find_control_node_outputs(node):
-            hint = f"Let {node.type_name} write another variable: {key.name}: other."
-            writes.setdefault(variable, (node.type_name, variable.span, hint))
-        for wire in context.find_wires(node, Direction.OUT):
-            hint = f"Let {wire.skill} write another variable: {wire.port.name}: $other."
-            writes.setdefault(wire.variable, (wire.skill, wire.span, hint))
+    writes: dict[str, Wire] = {}
+    for wire in context.list_wires(branch, Direction.OUT):
+        writes.setdefault(wire.variable, wire)
     return writes

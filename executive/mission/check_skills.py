@@ -20,7 +20,7 @@ from executive.mission.findings import Finding, make_error, make_warning, sugges
 from executive.mission.mission_file import Mission
 from executive.mission.ports import find_literals, find_problem
 from executive.skill import HOLDING, Direction, Param, Port, Skill
-from executive.tree.specification import Constant, LocatedName, Reference, SkillNode, Span
+from executive.tree.specification import Constant, Reference, SkillNode, Span
 
 
 def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
@@ -110,8 +110,8 @@ def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:
     A skill counts as weighing if the tool holds an object before and after it, and an output names a bin.
     """
     objects = {} if context.cell is None else context.cell.objects
-    routes = {route.label: route for route in context.mission.routes}
-    bins = {label: {bin.name for bin in route.bins} for label, route in routes.items()}
+    routes: dict[str, set[str]] = {label: set(bins) for label, bins in context.mission.routes.items()}
+    spans: dict[str, Span] = {label: label.span for label in context.mission.routes}
     weighing_skills = [name for name, skill in context.skills.items() if _is_weighing(skill)]
     skills = (skill for _, skill in context.find_installed_skills(context.nodes))
     is_weighed = any(map(_is_weighing, skills))
@@ -123,13 +123,13 @@ def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:
             message = (
                 f"{label} looks like {detected}, which has no route, so no object of either class is selected"
             )
-            yield make_error(routes[label].label_span, "unweighed", message, f"Add a route for {detected}.")
-        elif detected in routes and bins.get(label) != bins[detected] and not is_weighed:
+            yield make_error(spans[label], "unweighed", message, f"Add a route for {detected}.")
+        elif detected in routes and routes.get(label) != routes[detected] and not is_weighed:
             message = (
                 f"{label} looks like {detected}, their routes differ, and no node weighs the held object"
             )
             hint = f"Before the transport, insert {' or '.join(weighing_skills)}."
-            yield make_error(routes.get(label, routes[detected]).label_span, "unweighed", message, hint)
+            yield make_error(spans.get(label, spans[detected]), "unweighed", message, hint)
 
 
 def _is_weighing(skill: type[Skill]) -> bool:
@@ -173,7 +173,7 @@ def _find_used_detectors(context: CheckContext) -> set[str]:
 
 def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Span]]:
     """Yield every class in the routes and in the settings of skills, with its position."""
-    yield from ((route.label, route.label_span) for route in context.mission.routes)
+    yield from ((label, label.span) for label in context.mission.routes)
     for node, skill in context.find_installed_skills(context.nodes):
         for name, value in find_literals(node):
             declaration = skill.params.get(name) or skill.ports.get(name)
@@ -191,36 +191,34 @@ def check_names(context: CheckContext) -> Iterator[Finding]:
         return
     routes = context.mission.routes
     quotas = context.mission.quotas
-    labels = [LocatedName(route.label, route.label_span) for route in routes]
-    labels += [quota.label for quota in quotas if quota.label is not None]
-    bins = [bin for route in routes for bin in route.bins] + [quota.bin for quota in quotas]
+    labels = [*routes, *(label for _, label in quotas if label is not None)]
+    bins = [bin for route in routes.values() for bin in route] + [bin for bin, _ in quotas]
     for kind, plural, names in (("class", "Classes", labels), ("bin", "Bins", bins)):
         allowed_names = context.names_in_cell_by_kind[kind]
         for name in names:
-            if name.name not in allowed_names:
-                hint = suggest_choice(name.name, allowed_names, f"{plural} of the cell")
-                yield make_error(name.span, f"unknown-{kind}", f'the cell has no {kind} "{name.name}"', hint)
+            if name not in allowed_names:
+                hint = suggest_choice(name, allowed_names, f"{plural} of the cell")
+                yield make_error(name.span, f"unknown-{kind}", f'the cell has no {kind} "{name}"', hint)
 
 
 def check_quotas(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for each invalid quota or quota without a route, and a warning for too few slots."""
-    for quota in context.mission.quotas:
-        bin = quota.bin
-        label = quota.label
-        limit = quota.limit
-        yield from check_constant(context, str(quota), _LIMIT, limit)
-        if context.cell is None or bin.name not in context.cell.bins:
+    for (bin, label), limit in context.mission.quotas.items():
+        name = f"the quota of {bin} for {label}" if label else f"the quota of {bin}"
+        yield from check_constant(context, name, _LIMIT, limit)
+        if context.cell is None or bin not in context.cell.bins:
             continue
-        routes = [route for route in context.mission.routes if label is None or route.label == label.name]
-        routed_bins = list(dict.fromkeys(routed_bin.name for route in routes for routed_bin in route.bins))
-        if bin.name not in routed_bins and (label is None or label.name in context.cell.objects):
-            classes = f"the class {label.name}" if label else "any class"
-            message = f"no route assigns {classes} to {bin.name}, so the quota has no effect"
-            hint = suggest_choice(bin.name, routed_bins, f"Bins in the routes of {classes}")
+        routes = context.mission.routes.items()
+        routed_bins = [routed for route, bins in routes if label in (None, route) for routed in bins]
+        if bin not in routed_bins and (label is None or label in context.cell.objects):
+            classes = f"the class {label}" if label else "any class"
+            message = f"no route assigns {classes} to {bin}, so the quota has no effect"
+            choices = dict.fromkeys(routed_bins)
+            hint = suggest_choice(bin, choices, f"Bins in the routes of {classes}")
             yield make_error((label or bin).span, "no-route", message, hint)
-        slot_count = math.prod(context.cell.bins[bin.name].slots)
+        slot_count = math.prod(context.cell.bins[bin].slots)
         if isinstance(limit, Constant) and isinstance(limit.value, int) and limit.value > slot_count:
-            message = f"the quota exceeds the {slot_count} slots of {bin.name}, so objects would be stacked"
+            message = f"the quota exceeds the {slot_count} slots of {bin}, so objects would be stacked"
             hint = f"Lower the quota to {slot_count} or less, or add slots to the bin in the cell file."
             yield make_warning(limit.span, "large-quota", message + limit.origin_note, hint)
 
@@ -235,7 +233,7 @@ def check_weights(
     only classes with a declared mass are checked.
     """
     force = config.tool.force
-    for label in sorted({route.label for route in mission.routes} & config.objects.keys()):
+    for label in sorted(mission.routes.keys() & config.objects.keys()):
         section = config.objects[label]
         key = "mass" if section.mass is not None else "urdf" if section.urdf else "mesh"
         span = cell.find_span(("objects", label, key))
@@ -261,7 +259,7 @@ def check_slots(cell: CellFile, config: CellConfig, mission: Mission) -> Iterato
     """Yield an error for each class and bin of a route if walls or objects beside a slot block transits."""
     # `list_obstacles` represents each object in a bin by a cylinder for the largest class.
     obstacle_radius = max(section.radius for section in config.objects.values()) + MAX_ROLL_DISTANCE
-    for label, name in [(route.label, bin.name) for route in mission.routes for bin in route.bins]:
+    for label, name in [(label, name) for label, bins in mission.routes.items() for name in bins]:
         bin = config.bins.get(name)
         section = config.objects.get(label)
         if bin is None or section is None:

@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from executive.cell.objects import Item
-from executive.mission.analysis import CheckContext, VariableRead
+from executive.mission.analysis import CheckContext
 from executive.mission.check_skills import find_unknown_names
 from executive.mission.findings import Finding, describe_value, make_error, make_warning, suggest_choice
 from executive.mission.ports import (
     Wire,
     describe_type,
-    find_control_node_outputs,
     find_element_type,
     find_fields,
     find_literals,
@@ -21,10 +20,10 @@ from executive.mission.ports import (
     find_written_variables,
     is_assignable,
 )
-from executive.skill import Direction, Param
-from executive.tree.keys import KeyValue
+from executive.skill import Direction, Param, Port
+from executive.tree.keys import Key
 from executive.tree.node import ControlNode
-from executive.tree.specification import Constant, Node, Reference, SkillNode, Span, SubtreeNode
+from executive.tree.specification import Constant, Node, Reference, SkillNode, Span, SubtreeNode, Value
 
 
 def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
@@ -38,7 +37,7 @@ def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
         else:
             problem = "no node writes"
             hint = _make_unwritten_hint(context, read)
-        message = f"{read.input_name} reads ${name_in_file}, which {problem}"
+        message = f"{read} reads ${name_in_file}, which {problem}"
         yield make_error(read.span, "unwritten", message, hint)
 
 
@@ -47,7 +46,7 @@ def find_unwritten_library_inputs(context: CheckContext) -> Iterator[Finding]:
     inputs_by_use: dict[str, dict[str, str]] = {}
     for read in _find_unwritten_reads(context, in_libraries=True):
         path = context.library_uses_by_path[read.node.path].path
-        inputs_by_use.setdefault(path, {}).setdefault(read.variable, read.input_name)
+        inputs_by_use.setdefault(path, {}).setdefault(read.variable, str(read))
     uses = {use.path: use for use in context.library_uses_by_path.values()}
     for path, inputs in inputs_by_use.items():
         use = uses[path]
@@ -59,11 +58,11 @@ def find_unwritten_library_inputs(context: CheckContext) -> Iterator[Finding]:
         yield make_error(use.span, "unwritten", message, " ".join(hints))
 
 
-def _find_unwritten_reads(context: CheckContext, in_libraries: bool) -> Iterator[VariableRead]:
+def _find_unwritten_reads(context: CheckContext, in_libraries: bool) -> Iterator[Wire]:
     """Yield the reads of possibly unwritten variables, either in libraries or in the mission file."""
     mission_source = context.tree.span.source
     uses = context.library_uses_by_path
-    for read in context.list_reads(context.tree):
+    for read in context.list_wires(context.tree, Direction.IN):
         state = context.flow_analysis.entry_states.get(read.node.path)
         if state and state.may_be_unwritten(read.variable) and (read.is_explicit or read.is_required):
             is_in_library = read.node.path in uses and read.span.source is not mission_source
@@ -73,17 +72,15 @@ def _find_unwritten_reads(context: CheckContext, in_libraries: bool) -> Iterator
 
 def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
     """Yield a warning for every variable that the mission assigns to an output by name, but no node reads."""
-    read_variables = {read.variable for read in context.list_reads(context.tree)}
+    read_variables = {read.variable for read in context.list_wires(context.tree, Direction.IN)}
     for node in context.tree.walk():
-        for _, variable in find_control_node_outputs(node):
-            if variable not in read_variables | set(context.mission.params):
-                message = f"no node in this {node.type_name} reads ${variable}"
-                hint = f"Write ${variable} where a node needs the value."
-                yield make_warning(variable.span, "unread", message, hint)
         for wire in context.find_wires(node, Direction.OUT):
-            if wire.is_explicit and wire.variable not in read_variables:
+            # A control node that overwrites a param is an error, which the expansion reports.
+            if wire.is_explicit and wire.variable not in read_variables | set(context.mission.params):
                 message = f"{wire} writes ${wire.variable}, which no node reads"
-                yield make_warning(wire.span, "unread", message)
+                is_loop_variable = isinstance(wire.port, Key)
+                hint = f"Write ${wire.variable} where a node needs the value." if is_loop_variable else ""
+                yield make_warning(wire.span, "unread", message, hint)
         if not isinstance(node, SubtreeNode):
             continue
         for setting in node.returns.values():
@@ -95,19 +92,19 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
 
 def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every loop variable that another node writes: the loop deletes it when it ends."""
-    wires = [wire for node in context.tree.walk() for wire in context.find_wires(node, Direction.OUT)]
-    skill_writes = {wire.variable: (str(wire), wire.span) for wire in wires}
+    wires = context.list_wires(context.tree, Direction.OUT)
+    skill_wires = {wire.variable: wire for wire in wires if isinstance(wire.node, SkillNode)}
 
-    def check_node_and_children(node: Node, loop_writes: Mapping[str, tuple[str, Span]]) -> Iterator[Finding]:
-        for _, variable in find_control_node_outputs(node):
-            if write := skill_writes.get(variable, loop_writes.get(variable)):
-                name, span = write
-                place = span.describe_place(variable.span.source)
-                message = f"{node.type_name} writes ${variable}, and so does {name} in {place}"
-                yield make_error(variable.span, "shadowed-variable", message, "Rename the loop variable.")
-            loop_writes = {**loop_writes, variable: (f"another {node.type_name}", variable.span)}
+    def check_node_and_children(node: Node, loop_wires: Mapping[str, Wire]) -> Iterator[Finding]:
+        for wire in context.find_wires(node, Direction.OUT) if isinstance(node, ControlNode) else ():
+            if other := skill_wires.get(wire.variable, loop_wires.get(wire.variable)):
+                name = f"another {other}" if isinstance(other.node, ControlNode) else str(other)
+                place = other.span.describe_place(wire.span.source)
+                message = f"{wire} writes ${wire.variable}, and so does {name} in {place}"
+                yield make_error(wire.span, "shadowed-variable", message, "Rename the loop variable.")
+            loop_wires = {**loop_wires, wire.variable: wire}
         for child in node.children:
-            yield from check_node_and_children(child, loop_writes)
+            yield from check_node_and_children(child, loop_wires)
 
     yield from check_node_and_children(context.tree, {})
 
@@ -122,31 +119,30 @@ def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
         if end_state is None or end_state.written_variables is None:
             continue
         written = find_written_variables(use.body, context.skills)
-        returns = (subtree.returns or {}).items()
-        for (name, span), variable in zip(returns, use.written_variables, strict=True):
+        for name, variable in zip(subtree.returns or (), use.written_variables, strict=True):
             if variable not in written:
                 problem = "no node of the subtree writes"
                 names = sorted(full_name.rpartition(".")[2] for full_name in written)
                 hint = suggest_choice(name, names, "Variables that the subtree writes")
             elif variable not in end_state.written_variables:
                 problem = "is not written on every path"
-                hint = f"${name} is written by {_describe_writers(context, variable, span)}."
+                hint = f"${name} is written by {_describe_writers(context, variable, name.span)}."
             else:
                 continue
             message = f'the subtree "{use.name}" returns ${name}, which {problem}'
-            yield make_error(span, "unwritten", message, hint)
+            yield make_error(name.span, "unwritten", message, hint)
 
 
 def _describe_writers(context: CheckContext, variable: str, span: Span) -> str:
     """Return the skills that write a variable, for a message at `span`: `Grasp in line 3`."""
-    wires = [(node, wire) for node in context.nodes for wire in context.find_wires(node, Direction.OUT)]
-    nodes = [(node.span, wire.skill) for node, wire in wires if wire.variable == variable]
-    nodes.sort(key=lambda node: node[0].line)
-    writers = dict.fromkeys(f"{skill} in {place.describe_place(span.source)}" for place, skill in nodes)
+    wires = [wire for node in context.nodes for wire in context.find_wires(node, Direction.OUT)]
+    nodes = [wire.node for wire in wires if wire.variable == variable and isinstance(wire.node, SkillNode)]
+    nodes.sort(key=lambda node: node.span.line)
+    writers = dict.fromkeys(f"{node.skill} in {node.span.describe_place(span.source)}" for node in nodes)
     return " and ".join(writers) or context.list_skills_with_output(variable) or "a loop, in its body only"
 
 
-def _make_unwritten_hint(context: CheckContext, read: VariableRead) -> str:
+def _make_unwritten_hint(context: CheckContext, read: Wire) -> str:
     """Return a hint for the read of a variable that no node of the tree writes."""
     variable = read.variable
     local_names = [name for name in context.written_variables if name.endswith(f".{variable}")]
@@ -156,7 +152,7 @@ def _make_unwritten_hint(context: CheckContext, read: VariableRead) -> str:
     if skills := context.list_skills_with_output(variable):
         return f"Skills that write ${variable}: {skills}."
     if not read.is_explicit:
-        return f"Set {read.input_name}."
+        return f"Set {read}."
     global_names = sorted(f"${name}" for name in context.written_variables if "." not in name)
     return suggest_choice(f"${variable}", global_names, "Variables that are written")
 
@@ -191,33 +187,34 @@ WritersByVariable = Mapping[str, Sequence[Writer]]
 def check_port_types(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every input that does not accept all possible values of its variable."""
     skill_writers: dict[str, list[Writer]] = {}
-    for node in context.tree.walk():
-        for wire in context.find_wires(node, Direction.OUT):
-            writer = Writer(str(wire), node.span, wire.port.type, wire.port.refers_to)
+    for wire in context.list_wires(context.tree, Direction.OUT):
+        if not isinstance(wire.port, Key):
+            writer = Writer(str(wire), wire.node.span, wire.port.type, wire.port.refers_to)
             skill_writers.setdefault(wire.variable, []).append(writer)
 
     def check_node_and_children(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
-        for key, variable in find_control_node_outputs(node):
-            all_writers = {**skill_writers, **loop_writers}
-            elements = node.settings.get(key.list_key, ()) if isinstance(node, ControlNode) else ()
-            list_writers = _find_list_writers(node, elements, all_writers)
-            if isinstance(elements, Reference):
-                yield from _check_field(node.type_name, elements, all_writers.get(elements.name, ()))
-                yield from _check_lists(f"{node.type_name}.{key.list_key}", elements, list_writers)
-            loop_writers = {**loop_writers, variable: [*_make_element_writers(node, list_writers)]}
+        all_writers = {**skill_writers, **loop_writers}
         for wire in context.find_wires(node, Direction.IN):
-            writers = loop_writers.get(wire.variable, skill_writers.get(wire.variable, ()))
-            yield from _check_field(str(wire), wire.reference, writers)
-            for writer in _select_field(writers, wire.field):
-                yield from _check_connection(context, wire, writer)
-                yield from _check_compared_constants(context, node, wire, writer)
+            writers = list(_select_field(all_writers.get(wire.variable, ()), wire.field))
+            yield from _check_field(str(wire), wire.reference, all_writers.get(wire.variable, ()))
+            if isinstance(wire.port, Key):
+                yield from _check_lists(wire, writers)
+                continue
+            for writer in writers:
+                yield from _check_connection(context, wire, wire.port, writer)
+                yield from _check_compared_constants(context, wire, wire.port, writer)
+        for wire in context.find_wires(node, Direction.OUT):
+            if isinstance(node, ControlNode) and isinstance(wire.port, Key):
+                elements = node.settings.get(wire.port.list_key)
+                list_writers = _find_list_writers(node, elements, all_writers)
+                loop_writers = {**loop_writers, wire.variable: [*_make_element_writers(node, list_writers)]}
         for child in node.children:
             yield from check_node_and_children(child, loop_writers)
 
     yield from check_node_and_children(context.tree, {})
 
 
-def _find_list_writers(node: Node, elements: KeyValue, writers: WritersByVariable) -> list[Writer]:
+def _find_list_writers(node: Node, elements: Value | None, writers: WritersByVariable) -> list[Writer]:
     """Return the writers of a list; a node with a constant list counts as the writer of the list."""
     if isinstance(elements, Reference):
         return list(_select_field(writers.get(elements.name, ()), elements.field))
@@ -228,8 +225,10 @@ def _find_list_writers(node: Node, elements: KeyValue, writers: WritersByVariabl
     return [Writer(node.type_name, node.span, list[Any], "", (elements,))]
 
 
-def _check_lists(name: str, reference: Reference, list_writers: Iterable[Writer]) -> Iterator[Finding]:
-    """Yield an error for each writer of `reference` that writes no list, but the key `name` needs a list."""
+def _check_lists(wire: Wire, list_writers: Iterable[Writer]) -> Iterator[Finding]:
+    """Yield an error for each writer that writes no list, but a control node iterates over the variable."""
+    name = f"{wire}.{wire.port.name}"
+    reference = wire.reference
     for writer in list_writers:
         for constant in writer.constants or ():
             if not isinstance(constant.value, list):
@@ -282,10 +281,11 @@ def _select_field(writers: Iterable[Writer], field: str) -> Iterator[Writer]:
             yield replace(writer, type=field_type, refers_to=refers_to)
 
 
-def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iterator[Finding]:
-    """Yield an error for each value or type of a writer that does not fit the input `wire`."""
-    port = wire.port
-    choices = (wire.port.choices or ()) if isinstance(wire.port, Param) else ()
+def _check_connection(
+    context: CheckContext, wire: Wire, port: Port | Param, writer: Writer
+) -> Iterator[Finding]:
+    """Yield an error for each value or type of a writer that does not fit the input `port` of `wire`."""
+    choices = (port.choices or ()) if isinstance(port, Param) else ()
     port_type = describe_values(port.type, port.refers_to)
     if choices and not port.refers_to:
         port_type = " or ".join(map(str, choices))
@@ -296,7 +296,7 @@ def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iter
             hint = f"{wire} reads ${wire.variable} in {wire.span.describe_place(constant.span.source)}."
             yield make_error(constant.span, "port-type", message, hint)
         else:
-            yield from find_unknown_names(context, wire.skill, port, constant)
+            yield from find_unknown_names(context, wire.node.type_name, port, constant)
     if writer.constants is not None:
         return
     is_type_accepted = is_assignable(writer.type, port.type)
@@ -310,22 +310,24 @@ def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iter
 
 
 def _check_compared_constants(
-    context: CheckContext, node: Node, wire: Wire, writer: Writer
+    context: CheckContext, wire: Wire, port: Port | Param, writer: Writer
 ) -> Iterator[Finding]:
-    """Yield an error for each constant that is compared with `wire`, if `writer` can never write it."""
-    literals = find_literals(node) if isinstance(node, SkillNode) and writer.constants is None else ()
-    for name, value in literals:
-        port = context.skills[wire.skill].ports.get(name)
+    """Yield an error for each constant that is compared with `port`, if `writer` can never write it."""
+    node = wire.node
+    if not isinstance(node, SkillNode) or writer.constants is not None:
+        return
+    for name, value in find_literals(node):
+        compared = context.skills[node.skill].ports.get(name)
         # `check_settings` reports a constant of the wrong type.
-        if port is None or port.compared_with != wire.port.name or find_problem(value.value, port):
+        if compared is None or compared.compared_with != port.name or find_problem(value.value, compared):
             continue
         # A field such as `$item.bin` is "" if it names no bin; `find_unknown_names` accepts the default.
-        expected = replace(port, type=writer.type, refers_to=writer.refers_to, default="")
-        yield from find_unknown_names(context, wire.skill, expected, value)
+        expected = replace(compared, type=writer.type, refers_to=writer.refers_to, default="")
+        yield from find_unknown_names(context, node.skill, expected, value)
         if not is_assignable(type(value.value), expected.type):
             kind = describe_values(expected.type, expected.refers_to)
             message = f"{wire.reference} is {kind} and never equals {describe_value(value.value)}"
-            hint = f"{wire.skill} compares {wire.reference} with this constant."
+            hint = f"{node.skill} compares {wire.reference} with this constant."
             yield make_error(value.span, "port-type", message, hint)
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
-from executive.mission.mission_file import Mission, Quota, Subtree
-from executive.mission.ports import find_control_node_outputs, find_written_variables
+from executive.mission.mission_file import Mission, QuotaKey, Subtree
+from executive.mission.ports import find_node_wires, find_written_variables
 from executive.plugins import Skills
 from executive.skill import Direction
 from executive.tree.keys import Children, Elements, KeyOwner, KeySection, KeyValue, Part, map_parts
@@ -54,7 +54,7 @@ class ExpandedMission:
         findings: Errors and warnings about subtrees, params and arguments.
     """
 
-    quotas: tuple[Quota, ...]
+    quotas: Mapping[QuotaKey, Value]
     tree: Node | None
     unused_subtrees: tuple[Node, ...]
     findings: tuple[Finding, ...]
@@ -66,7 +66,7 @@ def expand(mission: Mission, skills: Skills, predefined_lists: PredefinedLists) 
     `predefined_lists` contains the names in each list; a list without an entry, such as `items`, remains.
     """
     expander = _Expander(mission, skills, predefined_lists)
-    quotas = tuple(expander.expand_quota(quota) for quota in mission.quotas)
+    quotas = {key: expander.expand_value(limit) for key, limit in mission.quotas.items()}
     tree = None if mission.tree is None else expander.expand_tree(mission.tree, expander.params)
     unused_subtrees = []
     subtree_nodes = [node for subtree in mission.subtrees.values() for node in subtree.body.walk()]
@@ -77,10 +77,10 @@ def expand(mission: Mission, skills: Skills, predefined_lists: PredefinedLists) 
             continue
         if subtree.name not in names_used_in_subtrees:
             message = f'the subtree "{subtree.name}" is never used'
-            expander.findings.append(make_warning(subtree.span, "unused-tree", message))
+            expander.findings.append(make_warning(subtree.name.span, "unused-tree", message))
         arguments = subtree.arguments.items()
-        defaults = {name: argument.default for name, argument in arguments if argument.default is not None}
-        if len(defaults) == len(arguments):
+        defaults: dict[str, Value] = {name: value for name, value in arguments if value is not None}
+        if len(defaults) == len(subtree.arguments):
             body = expander.expand_tree(subtree.body, {**expander.params, **defaults})
             unused_subtrees += [body] if body else []
     expander.findings += expander.find_unused_names()
@@ -112,12 +112,9 @@ class _Expander:
         self._outermost_span: Span | None = None
         self._use_counts: Counter[str] = Counter()
 
-    def expand_quota(self, quota: Quota) -> Quota:
-        """Return the quota with the value of a param in place of its name."""
-        limit = quota.limit
-        if isinstance(limit, Reference):
-            limit = self._resolve_name(limit, self.params, ())
-        return replace(quota, limit=limit)
+    def expand_value(self, value: Value) -> Value:
+        """Return a value with the value of a param in place of its name."""
+        return self._resolve_name(value, self.params, ()) if isinstance(value, Reference) else value
 
     def expand_tree(self, tree: Node, values: ValuesByName) -> Node | None:
         """Return the expanded tree, or None if the expanded tree is too large."""
@@ -128,17 +125,17 @@ class _Expander:
 
     def find_unused_names(self) -> Iterator[Finding]:
         """Yield a finding for every param without reference, and every unused argument of a used subtree."""
-        for name, param in self.mission.params.items() if self.mission.tree else ():
+        for name in self.mission.params if self.mission.tree else ():
             # References in nodes that are not expanded, for example after an error, are only in the text.
-            if ("", name) not in self._referenced_names and f"${name}" not in param.span.source.text:
-                yield make_warning(param.span, "unused-param", f'the param "{name}" is never used')
+            if ("", name) not in self._referenced_names and f"${name}" not in name.span.source.text:
+                yield make_warning(name.span, "unused-param", f'the param "{name}" is never used')
         for subtree in self.mission.subtrees.values():
             if isinstance(subtree.body, InvalidNode) or not self._use_counts[subtree.name]:
                 continue
-            for name, argument in subtree.arguments.items():
+            for name in subtree.arguments:
                 if (subtree.name, name) not in self._referenced_names:
                     message = f'the subtree "{subtree.name}" never uses its argument "{name}"'
-                    yield make_error(argument.span, "unused-argument", message)
+                    yield make_error(name.span, "unused-argument", message)
 
     def _expand_node(self, node: Node, values: ValuesByName, callers: tuple[str, ...], depth: int) -> Node:
         """Return the expanded node; `callers` are the subtrees that contain the node, the outermost first."""
@@ -173,21 +170,14 @@ class _Expander:
 
     def _find_shadowed_names(self, node: Node, values: ValuesByName) -> Iterator[Finding]:
         """Yield an error for every output variable of a node that has the name of a param or argument."""
-
-        def explain(writer: str, name: str) -> str:
-            kind = "a param of the mission" if name in self.params else "an argument of the subtree"
-            return f"{writer} writes ${name}, but {name} is {kind}"
-
-        for _, variable in find_control_node_outputs(node):
-            if variable in values:
-                message = explain(node.type_name, variable)
-                yield make_error(variable.span, "shadowed-param", message, "Rename one of them.")
-        if not isinstance(node, SkillNode) or node.skill not in self.skills:
-            return
-        for name, port in self.skills[node.skill].ports.items():
-            if port.direction is Direction.OUT and name in values and name not in node.settings:
-                hint = f"Let {node.skill} write another variable: {name}: $other."
-                yield make_error(node.span, "shadowed-param", explain(f"{node.skill}.{name}", name), hint)
+        for wire in find_node_wires(node, self.skills, Direction.OUT):
+            # `check_settings` reports an output of a skill that the mission sets to a param or argument.
+            if wire.variable in values and (isinstance(node, ControlNode) or not wire.is_explicit):
+                kind = (
+                    "a param of the mission" if wire.variable in self.params else "an argument of the subtree"
+                )
+                message = f"{wire} writes ${wire.variable}, but {wire.variable} is {kind}"
+                yield make_error(wire.span, "shadowed-param", message, wire.rename_hint)
 
     def _resolve_name(self, reference: Reference, values: ValuesByName, callers: tuple[str, ...]) -> Value:
         """Return the value of a param or argument, or the reference itself if it is a variable."""
@@ -270,8 +260,8 @@ class _Expander:
 
     def _map_returned_variables(self, use: SubtreeNode, subtree: Subtree) -> dict[str, str]:
         """Return the variable of the caller for each name in `returns` of the subtree."""
-        returned_names = subtree.returns or {}
-        variables = {name: name for name in returned_names}
+        returned_names = subtree.returns or ()
+        variables: dict[str, str] = {name: name for name in returned_names}
         for name, setting in use.returns.items():
             if name not in returned_names:
                 hint = suggest_choice(name, returned_names, "Returned variables")
@@ -292,8 +282,8 @@ class _Expander:
                 message = f'the subtree "{subtree.name}" has no argument "{name}"'
                 self._add_error(setting.name_span, "unknown-argument", message, hint)
         values: dict[str, Value] = {}
-        for name, argument in subtree.arguments.items():
-            value = use.arguments[name].value if name in use.arguments else argument.default
+        for name, default in subtree.arguments.items():
+            value = use.arguments[name].value if name in use.arguments else default
             values[name] = value or InvalidValue(use.span)
             if value is None:
                 message = f'the subtree "{subtree.name}" needs the argument "{name}"'

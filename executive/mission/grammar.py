@@ -20,6 +20,7 @@ from executive.tree.specification import (
     Child,
     Constant,
     InvalidValue,
+    LocatedName,
     Reason,
     Reference,
     Setting,
@@ -257,21 +258,21 @@ class MappingReader:
             return node.items
         return () if node is None else (node,)
 
-    def iterate_entries(self, key: str) -> Iterator[tuple[str, Span, YamlNode]]:
-        """Yield name, position of the name, and value of each entry below `key`."""
+    def iterate_entries(self, key: str) -> Iterator[tuple[LocatedName, YamlNode]]:
+        """Yield name and value of each entry below `key`."""
         node = self.get(key)
         if isinstance(node, YamlMapping):
             for entry in node.entries:
-                yield entry.key.text, entry.key.span, entry.value
+                yield LocatedName(entry.key.text, entry.key.span), entry.value
         elif node is not None and not is_empty(node):
             message = f"{self._describe_key(key)} must be a mapping, not {node.description}"
             self.add_error(node.span, "wrong-type", message)
 
-    def check_name(self, name: str, span: Span, kind: str, hint: str = "") -> None:
+    def check_name(self, name: LocatedName, kind: str, hint: str = "") -> None:
         """Add an error if `name` is not a valid name; `kind` is the kind of name, such as `a param`."""
         if not NAME_PATTERN.fullmatch(name):
             hint = hint or 'Use letters, digits and "_", and begin with no digit.'
-            self.add_error(span, "bad-name", f'"{name}" is no valid name of {kind}', hint)
+            self.add_error(name.span, "bad-name", f'"{name}" is no valid name of {kind}', hint)
 
     def add_error(self, span: Span, code: str, message: str, hint: str = "") -> None:
         """Add an error to the findings."""

@@ -114,13 +114,13 @@ def read_mission(
     parser = NodeParser(findings, skills, node_classes)
     mission = parse_mission(root, overrides, parser)
     subtrees = dict(mission.subtrees)
-    texts = {file.name: _add_library(file, path.parent, parser, subtrees) for file in mission.libraries}
+    texts = {str(file): _add_library(file, path.parent, parser, subtrees) for file in mission.libraries}
     libraries = {name: text for name, text in texts.items() if text is not None}
     mission = replace(mission, subtrees=subtrees, is_complete=len(libraries) == len(texts))
     cell = recorded_cell
-    if cell is None and mission.cell.name:
+    if cell is None and mission.cell:
         try:
-            cell = read_cell(find_file_below(path.parent, mission.cell.name), overrides)
+            cell = read_cell(find_file_below(path.parent, mission.cell), overrides)
             findings += cell.findings
         except InputError as error:
             parser.add_error(mission.cell.span, "no-cell", str(error))
@@ -132,7 +132,7 @@ def _add_library(
 ) -> str | None:
     """Add the subtrees of a library to `subtrees`; return the text of the library, or None after an error."""
     try:
-        source = read_source(find_file_below(folder, reference.name))
+        source = read_source(find_file_below(folder, reference))
     except InputError as error:
         parser.add_error(reference.span, "no-library", str(error))
         return None
@@ -147,11 +147,11 @@ def _add_library(
         # The position is in the mission file: the subtree of this name, or the path of the library.
         if first_subtree.library:
             span = reference.span
-            other_span = first_subtree.span
+            other_span = first_subtree.name.span
             hint = "Delete one of the libraries from the list."
         else:
-            span = first_subtree.span
-            other_span = subtree.span
+            span = first_subtree.name.span
+            other_span = subtree.name.span
             hint = "Rename one of them."
         message = f'there are two subtrees "{name}"; the other is in {other_span.describe_place(span.source)}'
         parser.add_error(span, "duplicate-tree", message, hint)
@@ -195,20 +195,20 @@ class LoadedMission:
     @property
     def params(self) -> dict[str, JsonValue]:
         """Values of the mission's params, with overrides."""
-        return {name: cast("Constant", param.value).value for name, param in self.mission.params.items()}
+        return {str(name): cast("Constant", param.value).value for name, param in self.mission.params.items()}
 
     @property
     def routes(self) -> dict[str, tuple[str, ...]]:
         """Names of the permitted bins by class."""
-        return {route.label: tuple(bin.name for bin in route.bins) for route in self.mission.routes}
+        return {str(label): tuple(map(str, bins)) for label, bins in self.mission.routes.items()}
 
     @property
     def quotas(self) -> Quotas:
         """Maximum numbers of objects in the bins."""
-        quotas = self.mission.quotas
-        keys = [(quota.bin.name, quota.label.name if quota.label else None) for quota in quotas]
-        limits = [cast("int", cast("Constant", quota.limit).value) for quota in quotas]
-        return dict(zip(keys, limits, strict=True))
+        return {
+            (str(bin), label and str(label)): cast("int", cast("Constant", limit).value)
+            for (bin, label), limit in self.mission.quotas.items()
+        }
 
 
 def load_mission(
@@ -282,7 +282,7 @@ def _make_predefined_lists(mission: Mission, config: CellConfig) -> dict[str, Se
     return {
         "poses": next(iter(config.cameras.values())).scan_poses,
         "bins": list(config.bins),
-        "classes": [route.label for route in mission.routes],
+        "classes": list(map(str, mission.routes)),
     }
 
 

@@ -19,6 +19,7 @@ from executive.mission.grammar import (
     SubtreeKeys,
     is_empty,
     make_literal,
+    read_settings,
     read_value,
 )
 from executive.mission.node_parser import NodeParser
@@ -26,15 +27,7 @@ from executive.mission.ports import ValueProblem, convert_setting, convert_value
 from executive.mission.validate import CELL_PREFIX, make_override_source, parse_override
 from executive.mission.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.skill import Param, param
-from executive.tree.specification import Constant, InvalidValue, LocatedName, Node, Span, Value
-
-
-@dataclass(frozen=True)
-class Argument:
-    """An argument of a subtree, and the position of its name; without default, the argument is mandatory."""
-
-    span: Span
-    default: Value | None
+from executive.tree.specification import Constant, InvalidValue, LocatedName, Node, Value
 
 
 @dataclass(frozen=True)
@@ -42,19 +35,17 @@ class Subtree:
     """A named tree under `trees`.
 
     Attributes:
-        span: Position of the name.
         doc: Purpose of the subtree, or "".
-        arguments: Arguments by name.
-        returns: Positions of the variables that are not local, by name; None: no variable is local.
+        arguments: Defaults of the arguments by name; None for a mandatory argument.
+        returns: Variables that are not local; None: no variable is local.
         body: Root node of the subtree.
         library: Name of the library that defines the subtree; "" if the mission file defines it.
     """
 
-    name: str
-    span: Span
+    name: LocatedName
     doc: str
-    arguments: Mapping[str, Argument]
-    returns: Mapping[str, Span] | None
+    arguments: Mapping[LocatedName, Value | None]
+    returns: tuple[LocatedName, ...] | None
     body: Node
     library: str = ""
 
@@ -64,35 +55,16 @@ class MissionParam:
     """A constant of the mission.
 
     Attributes:
-        span: Position of the name.
         value: Value in this run: the value of `--set`, otherwise the default; or an invalid value.
         declaration: Type, bounds and choices; the type is `Any` if it is unknown.
     """
 
-    span: Span
     value: Constant | InvalidValue
     declaration: Param
 
 
-@dataclass(frozen=True)
-class Route:
-    """Class of objects, the span of the class in the text, and the bins that may receive the objects."""
-
-    label: str
-    label_span: Span
-    bins: tuple[LocatedName, ...]
-
-
-@dataclass(frozen=True)
-class Quota:
-    """Maximum number of objects of a class in a bin; of all classes if `label` is None."""
-
-    bin: LocatedName
-    label: LocatedName | None
-    limit: Value
-
-    def __str__(self) -> str:
-        return f"the quota of {self.bin.name}" + (f" for {self.label.name}" if self.label else "")
+QuotaKey = tuple[LocatedName, LocatedName | None]
+"""Bin and class of a quota; None for all classes."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +76,8 @@ class Mission:
         cell: Path of the cell file, relative to the folder of the mission.
         libraries: Paths of the library files, relative to the folder of the mission.
         params: Constants by name, with the values of `--set`.
-        quotas: Maximum numbers of objects in the bins.
+        routes: Bins that may receive the objects of a class, by class.
+        quotas: Maximum numbers of objects in a bin, of one class or of all.
         tree: Root node of the tree; None if the key is missing.
         subtrees: Subtrees of the mission and of its libraries, by name.
         is_complete: False if a library could not be read, so that `subtrees` may lack subtrees.
@@ -114,9 +87,9 @@ class Mission:
     description: str
     cell: LocatedName
     libraries: tuple[LocatedName, ...] = ()
-    params: Mapping[str, MissionParam] = field(default_factory=dict)
-    routes: tuple[Route, ...] = ()
-    quotas: tuple[Quota, ...] = ()
+    params: Mapping[LocatedName, MissionParam] = field(default_factory=dict)
+    routes: Mapping[LocatedName, tuple[LocatedName, ...]] = field(default_factory=dict)
+    quotas: Mapping[QuotaKey, Value] = field(default_factory=dict)
     tree: Node | None = None
     subtrees: Mapping[str, Subtree] = field(default_factory=dict)
     is_complete: bool = True
@@ -126,28 +99,30 @@ PARAM_TYPES = {"text": str, "integer": int, "number": float, "boolean": bool, "l
 """Python types of params, by their names in a mission."""
 
 
-def parse_params(reader: MappingReader, overrides: Mapping[str, str]) -> dict[str, MissionParam]:
+def parse_params(reader: MappingReader, overrides: Mapping[str, str]) -> dict[LocatedName, MissionParam]:
     """Return the params of a mission file by name, with the values of the overrides."""
-    params: dict[str, MissionParam] = {}
-    for name, span, node in reader.iterate_entries("params"):
-        reader.check_name(name, span, "a param")
+    params: dict[LocatedName, MissionParam] = {}
+    for name, node in reader.iterate_entries("params"):
+        reader.check_name(name, "a param")
         if isinstance(node, YamlMapping):
             keys = ParamKeys.get_keys()
-            param_reader = MappingReader(f'the param "{name}"', span, node, keys, reader.findings)
+            param_reader = MappingReader(f'the param "{name}"', name.span, node, keys, reader.findings)
             params[name] = _read_declaration(name, param_reader, name in overrides)
         else:
             value = make_literal(node)
-            params[name] = MissionParam(span, value, replace(param(), type=_infer_type(value.value)))
-    for name, text in overrides.items():
-        if name in params:
-            override, findings = parse_override(name, text, is_text=params[name].declaration.type is str)
+            params[name] = MissionParam(value, replace(param(), type=_infer_type(value.value)))
+    for name, mission_param in params.items():
+        if name in overrides:
+            is_text = mission_param.declaration.type is str
+            override, findings = parse_override(name, overrides[name], is_text)
             reader.findings += findings
             if override:
-                params[name] = _replace_value(name, params[name], make_literal(override), reader)
-        elif not name.startswith(CELL_PREFIX):
-            span = make_override_source(name, text).make_span(1, 1, max(1, len(name)))
-            hint = suggest_choice(name, params, "Params of the mission")
-            reader.add_error(span, "unknown-param", f'the mission has no param "{name}"', hint)
+                params[name] = _replace_value(name, mission_param, make_literal(override), reader)
+    for key, text in overrides.items():
+        if key not in params and not key.startswith(CELL_PREFIX):
+            span = make_override_source(key, text).make_span(1, 1, max(1, len(key)))
+            hint = suggest_choice(key, params, "Params of the mission")
+            reader.add_error(span, "unknown-param", f'the mission has no param "{key}"', hint)
     return params
 
 
@@ -163,7 +138,7 @@ def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> 
     )
     default_type = _infer_type(None if default is None else default.python_value)
     declaration = replace(declaration, type=_read_type(reader) or default_type)
-    without_value = MissionParam(reader.span, InvalidValue(reader.span), declaration)
+    without_value = MissionParam(InvalidValue(reader.span), declaration)
     problem = f"{name} cannot have any value"
     if declaration.choices == ():
         reader.add_error(reader.get_value_span("choices"), "empty-list", f"{problem}: choices is empty")
@@ -232,7 +207,7 @@ def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodePars
         ),
         params=parse_params(reader, overrides),
         routes=_read_routes(reader),
-        quotas=tuple(_read_quotas(reader)),
+        quotas=_read_quotas(reader),
         tree=None if tree is None else parser.read_node(tree, reader.get_key_span("tree")),
         subtrees=_read_subtrees(reader, parser),
     )
@@ -249,33 +224,33 @@ def _read_name(reader: MappingReader) -> str:
 
 def _read_cell(reader: MappingReader) -> LocatedName:
     cell = LocatedName(reader.read_text("cell"), reader.get_value_span("cell"))
-    if isinstance(reader.get("cell"), YamlScalar) and not cell.name:
+    if isinstance(reader.get("cell"), YamlScalar) and not cell:
         reader.add_error(cell.span, "bad-name", "cell must be the path of a cell file")
     return cell
 
 
-def _read_routes(reader: MappingReader) -> tuple[Route, ...]:
-    routes = []
-    for label, span, node in reader.iterate_entries("routes"):
+def _read_routes(reader: MappingReader) -> dict[LocatedName, tuple[LocatedName, ...]]:
+    routes = {}
+    for label, node in reader.iterate_entries("routes"):
         items = node.items if isinstance(node, YamlSequence) else (node,)
         if not items:
             reader.add_error(node.span, "empty-list", "a route needs at least one bin")
-        bins = _read_names(reader, items, "a route must be a bin or a list of bins")
-        routes.append(Route(label, span, bins))
-    return tuple(routes)
+        routes[label] = _read_names(reader, items, "a route must be a bin or a list of bins")
+    return routes
 
 
-def _read_quotas(reader: MappingReader) -> Iterator[Quota]:
-    """Yield the quotas below `quotas`: a limit for each bin, or a mapping of classes to limits."""
-    for bin_name, span, node in reader.iterate_entries("quotas"):
-        bin = LocatedName(bin_name, span)
-        limits: list[tuple[LocatedName | None, YamlNode]] = [(None, node)]
-        if isinstance(node, YamlMapping):
-            limits = [(LocatedName(entry.key.text, entry.key.span), entry.value) for entry in node.entries]
-            if not limits:
-                reader.add_error(node.span, "empty-list", f"the quota of {bin_name} names no class")
-        for label, value in limits:
-            yield Quota(bin, label, read_value(value, reader.findings))
+def _read_quotas(reader: MappingReader) -> dict[QuotaKey, Value]:
+    """Return the quotas below `quotas`: a limit for each bin, or a mapping of classes to limits."""
+    quotas: dict[QuotaKey, Value] = {}
+    for bin, node in reader.iterate_entries("quotas"):
+        if not isinstance(node, YamlMapping):
+            quotas[bin, None] = read_value(node, reader.findings)
+        elif not node.entries:
+            reader.add_error(node.span, "empty-list", f"the quota of {bin} names no class")
+        else:
+            labels = read_settings(node, "quotas", reader.findings).items()
+            quotas |= {(bin, LocatedName(label, limit.name_span)): limit.value for label, limit in labels}
+    return quotas
 
 
 def _read_names(reader: MappingReader, items: Iterable[YamlNode], rule: str) -> tuple[LocatedName, ...]:
@@ -299,25 +274,24 @@ def parse_library(root: YamlNode, parser: NodeParser) -> dict[str, Subtree]:
 def _read_subtrees(reader: MappingReader, parser: NodeParser, library: str = "") -> dict[str, Subtree]:
     """Return the subtrees below `trees`; `library` is the name of their library, "" for the mission file."""
     subtrees: dict[str, Subtree] = {}
-    for name, span, node in reader.iterate_entries("trees"):
-        reader.check_name(name, span, "a subtree")
+    for name, node in reader.iterate_entries("trees"):
+        reader.check_name(name, "a subtree")
         if isinstance(node, YamlMapping) and set(SubtreeKeys.get_keys()) & set(node.keys):
-            has_body = node.get("do") is not None
-            if not has_body:
-                parser.add_error(span, "missing-key", f'the subtree "{name}" needs the key "do"')
-            subtree_parser = parser if has_body else parser.make_silent_parser()
-            subtrees[name] = _parse_subtree(name, span, node, subtree_parser, library)
+            subtrees[name] = _parse_subtree(name, node, parser, library)
         else:
-            subtrees[name] = Subtree(name, span, "", {}, None, parser.read_node(node, span), library)
+            subtrees[name] = Subtree(name, "", {}, None, parser.read_node(node, name.span), library)
     return subtrees
 
 
-def _parse_subtree(name: str, span: Span, node: YamlMapping, parser: NodeParser, library: str) -> Subtree:
-    """Return the subtree of a mapping with subtree keys; `span` is the position of the name."""
-    reader = MappingReader(f'the subtree "{name}"', span, node, SubtreeKeys.get_keys(), parser.findings)
+def _parse_subtree(name: LocatedName, node: YamlMapping, parser: NodeParser, library: str) -> Subtree:
+    """Return the subtree of a mapping with subtree keys."""
+    if node.get("do") is None:
+        parser.add_error(name.span, "missing-key", f'the subtree "{name}" needs the key "do"')
+        parser = parser.make_silent_parser()
+    keys = SubtreeKeys.get_keys()
+    reader = MappingReader(f'the subtree "{name}"', name.span, node, keys, parser.findings)
     return Subtree(
         name,
-        span,
         doc=reader.read_text("doc"),
         arguments=_read_arguments(reader),
         returns=_read_returns(reader),
@@ -326,44 +300,44 @@ def _parse_subtree(name: str, span: Span, node: YamlMapping, parser: NodeParser,
     )
 
 
-def _read_arguments(reader: MappingReader) -> dict[str, Argument]:
+def _read_arguments(reader: MappingReader) -> dict[LocatedName, Value | None]:
     """Return the arguments below `args`, which is a list of names, or a mapping of names to defaults."""
-    arguments: dict[str, Argument] = {}
+    arguments: dict[LocatedName, Value | None] = {}
     hint = "Write the name without $; in the subtree, $name is the value."
-    for argument_name, span, value in _iterate_arguments(reader):
-        reader.check_name(argument_name, span, "an argument", hint)
-        name = argument_name.removeprefix("$")
+    for written_name, value in _iterate_arguments(reader):
+        reader.check_name(written_name, "an argument", hint)
+        name = LocatedName(written_name.removeprefix("$"), written_name.span)
         if name in arguments:
-            first_line = arguments[name].span.line
+            first_line = next(argument for argument in arguments if argument == name).span.line
             message = f'the argument "{name}" occurs twice; the first is in line {first_line}'
-            reader.add_error(span, "duplicate-key", message)
-        arguments[name] = Argument(span, None if is_empty(value) else read_value(value, reader.findings))
+            reader.add_error(name.span, "duplicate-key", message)
+        arguments[name] = None if is_empty(value) else read_value(value, reader.findings)
     return arguments
 
 
-def _iterate_arguments(reader: MappingReader) -> Iterator[tuple[str, Span, YamlNode]]:
-    """Yield name, position of the name, and default of each argument; without a default, an empty scalar."""
+def _iterate_arguments(reader: MappingReader) -> Iterator[tuple[LocatedName, YamlNode]]:
+    """Yield name and default of each argument; without a default, an empty scalar."""
     if not isinstance(reader.get("args"), YamlSequence):
         yield from reader.iterate_entries("args")
         return
     for item in reader.list_items("args"):
         if isinstance(item, YamlScalar):
-            yield item.text, item.span, YamlScalar(item.span, None, "")
+            yield LocatedName(item.text, item.span), YamlScalar(item.span, None, "")
         else:
             message = "a list of arguments contains names only; for defaults, write a mapping"
             reader.add_error(item.span, "wrong-type", message)
 
 
-def _read_returns(reader: MappingReader) -> dict[str, Span] | None:
-    """Return the names below `returns` with their positions, or None if the key is missing."""
+def _read_returns(reader: MappingReader) -> tuple[LocatedName, ...] | None:
+    """Return the names below `returns`, or None if the key is missing."""
     if reader.get("returns") is None:
         return None
-    spans: dict[str, Span] = {}
+    names = []
     for item in reader.list_items("returns"):
         name = item.text.removeprefix("$") if isinstance(item, YamlScalar) else ""
         if NAME_PATTERN.fullmatch(name):
-            spans[name] = item.span
+            names.append(LocatedName(name, item.span))
         else:
             message = "returns must be a list of names of variables, for example [targets]"
             reader.add_error(item.span, "bad-name", message)
-    return spans
+    return tuple(dict.fromkeys(names))

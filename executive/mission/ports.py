@@ -196,19 +196,19 @@ def _get_adapter(declared_type: object) -> TypeAdapter[object]:
 
 @dataclass(frozen=True)
 class Wire:
-    """Connection of a port to a variable.
+    """Connection of a node to a variable that the node reads or writes.
 
     Attributes:
-        skill: Name of the skill.
-        port: Port of the skill, or param whose value a variable gives.
+        node: Skill or control node.
+        port: Port of the skill, param whose value a variable gives, or key of the control node.
         variable: Name of the variable.
         span: Position of the variable, or of the skill if the mission does not name the variable.
         is_explicit: True if the mission names the variable; otherwise, the variable has the port's name.
         field: Field of the variable that an input reads; "" for the whole value.
     """
 
-    skill: str
-    port: Port | Param
+    node: Node
+    port: Port | Param | Key
     variable: str
     span: Span
     is_explicit: bool
@@ -219,8 +219,20 @@ class Wire:
         """The variable and the field that an input reads."""
         return Reference(self.variable, self.span, self.field)
 
+    @property
+    def is_required(self) -> bool:
+        """True for an input of a skill that has no default."""
+        return not isinstance(self.port, Key) and self.port.is_required
+
+    @property
+    def rename_hint(self) -> str:
+        """Advice to write another variable."""
+        other = "other" if isinstance(self.port, Key) else "$other"
+        return f"Let {self.node.type_name} write another variable: {self.port.name}: {other}."
+
     def __str__(self) -> str:
-        return f"{self.skill}.{self.port.name}"
+        name = self.node.type_name
+        return name if isinstance(self.port, Key) else f"{name}.{self.port.name}"
 
 
 def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Sequence[Wire]:
@@ -237,14 +249,27 @@ def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Seq
         setting = node.settings.get(declaration.name)
         value = setting.value if setting else None
         if isinstance(value, Reference):
-            wires.append(Wire(node.skill, declaration, value.name, value.span, True, value.field))
+            wires.append(Wire(node, declaration, value.name, value.span, True, value.field))
         # `check_settings` reports a constant for an output.
         elif isinstance(declaration, Port) and (
             (direction is Direction.OUT and isinstance(value, Constant))
             or (value is None and declaration.name not in skill.one_of)
         ):
             variable = node.variables_by_port.get(declaration.name, declaration.name)
-            wires.append(Wire(node.skill, declaration, variable, node.span, is_explicit=False))
+            wires.append(Wire(node, declaration, variable, node.span, is_explicit=False))
+    return wires
+
+
+def find_node_wires(node: Node, skills: Mapping[str, type[Skill]], direction: Direction) -> Sequence[Wire]:
+    """Return the connections of a skill or control node; none for a skill that is not installed."""
+    if isinstance(node, SkillNode):
+        return find_wires(node, skills[node.skill], direction) if node.skill in skills else ()
+    wires: list[Wire] = []
+    for key, value in node.list_values() if isinstance(node, ControlNode) else ():
+        if direction is Direction.OUT and isinstance(value, VariableName):
+            wires.append(Wire(node, key, value, value.span, is_explicit=True))
+        elif direction is Direction.IN and key.value_type == Elements and isinstance(value, Reference):
+            wires.append(Wire(node, key, value.name, value.span, True, value.field))
     return wires
 
 
@@ -254,23 +279,6 @@ def find_literals(node: SkillNode) -> Sequence[tuple[str, Constant]]:
     return [(name, value) for name, value in values if isinstance(value, Constant)]
 
 
-def find_control_node_outputs(node: Node) -> Sequence[tuple[Key, VariableName]]:
-    """Return each key of a control node that names an output variable, and the variable."""
-    values = node.list_values() if isinstance(node, ControlNode) else ()
-    return [(key, value) for key, value in values if isinstance(value, VariableName)]
-
-
-def find_control_node_inputs(node: Node) -> Sequence[Reference]:
-    """Return the variables that a control node reads as lists of elements."""
-    values = node.list_values() if isinstance(node, ControlNode) else ()
-    return [value for key, value in values if key.value_type == Elements and isinstance(value, Reference)]
-
-
 def find_written_variables(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
     """Return the variables that the nodes of a tree may write."""
-    variables: set[str] = set()
-    for node in root.walk():
-        variables |= {variable for _, variable in find_control_node_outputs(node)}
-        if isinstance(node, SkillNode) and node.skill in skills:
-            variables |= {wire.variable for wire in find_wires(node, skills[node.skill], Direction.OUT)}
-    return variables
+    return {wire.variable for node in root.walk() for wire in find_node_wires(node, skills, Direction.OUT)}

@@ -26,6 +26,8 @@ from executive.tree.specification import Source, Span
 
 CELL_PREFIX = "cell."
 """Prefix of the keys of overrides for the cell."""
+BASE_KEY = "base"
+"""Key of a cell file with the path of the base file, which supplies the missing top-level keys."""
 
 
 def make_override_source(key: str, value: str) -> Source:
@@ -52,6 +54,10 @@ def override_cell(root: YamlNode, overrides: Mapping[str, str]) -> tuple[YamlNod
         node, override_findings = parse_override(key, value)
         findings += override_findings
         path = key.removeprefix(CELL_PREFIX).split(".")
+        if path == [BASE_KEY]:
+            span = make_override_source(key, value).make_span(1, 1, len(key))
+            message = "--set cannot change the base of a cell; edit the cell file"
+            findings.append(make_error(span, "unknown-key", message))
         if node is not None:
             root = _replace_value(root, path, node, findings)
     return root, findings

@@ -9,7 +9,7 @@ import math
 import os.path
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 import yaml
@@ -152,8 +152,7 @@ _DEPTH_MESSAGE = f"lists and mappings are nested more than {_MAX_DEPTH} levels d
 _FAST_LOADER: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """Parser of libyaml, which takes a quarter of the time; the Python parser if PyYAML lacks libyaml."""
 _LIBYAML_DIFFERENCE = re.compile(r"[^\n\x20-\x7e\xa1-\u1fff]|[?]|---|:\s*[,}\]]")
-"""Text for which libyaml and the Python parser may disagree on a value or its position: tabs and other
-special characters, question marks, document markers, and keys without a value in brackets."""
+"""Text that libyaml may read differently: special characters, `?`, `---`, and empty keys in brackets."""
 _LINE_LENGTH = 1000
 """Length of a span [characters] that reaches the end of the line."""
 
@@ -251,11 +250,6 @@ def list_children(node: YamlNode) -> tuple[YamlNode, ...]:
     return node.items if isinstance(node, YamlSequence) else ()
 
 
-def flatten(node: YamlNode) -> YamlNode:
-    """Return a list of lists as the list of their scalars, in order; return other nodes unchanged."""
-    return replace(node, items=tuple(list_scalars(node))) if isinstance(node, YamlSequence) else node
-
-
 def parse_yaml(source: Source, text: str | None = None) -> tuple[YamlNode | None, list[Finding]]:
     """Return the root node, or None if an error prevents a complete tree, and the findings.
 
@@ -341,7 +335,12 @@ class _Composer:
 
     def _read_value(self, event: yaml.Event, depth: int) -> YamlNode:
         if isinstance(event, yaml.ScalarEvent):
-            return self._read_scalar(event)
+            text = event.value
+            span = self._make_span(event)
+            if _SURROGATE.search(text):
+                self._add_error(span, "yaml", "a surrogate (U+D800 to U+DFFF) is no character")
+                text = _SURROGATE.sub("?", text)
+            return YamlScalar(span, convert_scalar(text) if event.implicit[0] else text, text)
         if depth >= _MAX_DEPTH:
             raise self._add_fatal_error(self._make_span(event, 1), "too-deep", _DEPTH_MESSAGE)
         if isinstance(event, yaml.SequenceStartEvent):
@@ -350,14 +349,6 @@ class _Composer:
                 items.append(self._read_node(item_event, depth + 1))
             return YamlSequence(self._make_span(event, 1), tuple(items))
         return self._read_mapping(event, depth)
-
-    def _read_scalar(self, event: yaml.ScalarEvent) -> YamlScalar:
-        text = event.value
-        span = self._make_span(event)
-        if _SURROGATE.search(text):
-            self._add_error(span, "yaml", "a surrogate (U+D800 to U+DFFF) is no character")
-            text = _SURROGATE.sub("?", text)
-        return YamlScalar(span, convert_scalar(text) if event.implicit[0] else text, text)
 
     def _read_mapping(self, event: yaml.Event, depth: int) -> YamlMapping:
         entries: dict[str, YamlEntry] = {}
@@ -445,15 +436,12 @@ def convert_scalar(text: str) -> ScalarValue:
     if text[0] not in "+-.0123456789" or len(text) > _MAX_NUMBER_LENGTH:
         return text
     if _INTEGER.fullmatch(text):
-        return _convert_large_integer(int(text))
-    if _PREFIXED_INTEGER.fullmatch(text):
-        return _convert_large_integer(int(text, base=0))
-    if _FLOAT.fullmatch(text):
+        number = int(text)
+    elif _PREFIXED_INTEGER.fullmatch(text):
+        number = int(text, base=0)
+    elif _FLOAT.fullmatch(text):
         return float(text)
-    return float(text.replace(".", "")) if _INFINITE.fullmatch(text) else text
-
-
-def _convert_large_integer(number: int) -> int | float:
-    """Return an integer of at most 64 bits unchanged, and a larger integer as a float, for JSON readers."""
-    # Unlike the conversion of an integer, that of a text returns infinity for numbers that are too large.
+    else:
+        return float(text.replace(".", "")) if _INFINITE.fullmatch(text) else text
+    # A larger integer becomes a float, for JSON readers; the conversion of a text returns infinity if needed.
     return number if -(2**63) <= number < 2**63 else float(str(number))

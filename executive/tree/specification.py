@@ -151,12 +151,16 @@ class InvalidValue:
 Value = Constant | Reference | InvalidValue
 
 
-@dataclass(frozen=True)
-class LocatedName:
-    """A name and its position: a bin in a route, or the path of a library."""
+class LocatedName(str):
+    """A name in a mission file with its position, for example a bin in a route, or the path of a library."""
 
-    name: str
     span: Span
+
+    def __new__(cls, name: str, span: Span = NOWHERE) -> LocatedName:
+        """Return the name with its position."""
+        located_name = super().__new__(cls, name)
+        located_name.span = span
+        return located_name
 
 
 class VariableName(str):

@@ -64,7 +64,7 @@ class _Exporter:
     def export(self) -> Element:
         """Return the root element of the file."""
         root = Element("root", BTCPP_format="4", main_tree_to_execute=self._main_id)
-        values = {name: param.value for name, param in self._mission.params.items()}
+        values: dict[str, Value] = {name: param.value for name, param in self._mission.params.items()}
         assert self._mission.tree is not None
         body = _replace_params(self._mission.tree, values)
         self._add_tree(root, self._main_id, self._mission.description, body)
@@ -102,20 +102,21 @@ class _Exporter:
     def _add_subtree_reference(self, parent: Element, node: SubtreeNode) -> Element:
         subtree = self._mission.subtrees[node.name]
         ports = []
-        values = {}
+        values: dict[str, str] = {}
         if not self._use_counts[node.name]:
             self._used_subtrees.append(subtree)
         self._use_counts[node.name] += 1
-        for name, argument in subtree.arguments.items():
-            default = _format(argument.default) if argument.default else ""
+        for name, value in subtree.arguments.items():
+            default = _format(value) if value else ""
             ports.append(Port(name, None, Direction.IN, default, "", ""))
             values[name] = _format(node.arguments[name].value) if name in node.arguments else default
         if subtree.returns is not None:
             # Local variables get unique names, because `_autoremap` shares all variables that are no ports.
             prefix = f"{node.name}-{self._use_counts[node.name]}."
-            for name in sorted(self._find_written_variables(subtree.body)):
-                ports.append(Port(name, None, Direction.OUT, ..., "", ""))
-                values[name] = _format_pointer(name if name in subtree.returns else prefix + name)
+            for variable in sorted(self._find_written_variables(subtree.body)):
+                ports.append(Port(variable, None, Direction.OUT, ..., "", ""))
+                is_returned = variable in subtree.returns
+                values[variable] = _format_pointer(variable if is_returned else prefix + variable)
         values |= {name: _format(setting.value) for name, setting in node.returns.items()}
         element = self._add_element(parent, "SubTree", self._tree_ids[node.name], ports, values)
         element.set("_autoremap", "true")

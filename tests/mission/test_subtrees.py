@@ -9,7 +9,7 @@ import pytest
 
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
-from executive.mission.ports import find_control_node_outputs, find_wires
+from executive.mission.ports import find_node_wires, find_wires
 from executive.skill import Direction, Skill
 from executive.tree.specification import SkillNode
 
@@ -84,8 +84,8 @@ def test_a_loop_in_a_closed_subtree_has_a_variable_of_its_own(load: Load) -> Non
         "    returns: [held]\n"
         "    do: [Look, {for_each: {each: kind, in: [cube], do: {Pick: {only: $kind}}}}]\n"
     )
-    names = [variable for node in loaded.tree.walk() for _, variable in find_control_node_outputs(node)]
-    assert names == ["get.kind"]
+    wires = [wire for node in loaded.tree.walk() for wire in find_node_wires(node, {}, Direction.OUT)]
+    assert [wire.variable for wire in wires] == ["get.kind"]
 
 
 def library(name: str, text: str) -> None:
