@@ -19,9 +19,9 @@ from executive.cell.json_values import round_values
 from executive.events import DetectedObject, FrameSearched
 from executive.geometry import Array
 from executive.ledger.belief import ITEM_AREA_FRACTION, Belief, make_viewpoint_key
+from executive.ledger.certainty import MIN_EXISTENCE_PROBABILITY, Certainty
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, ItemRecords, State
-from executive.ledger.outcomes import MIN_EXISTENCE_PROBABILITY, Certainty
 
 MAX_STANDARD_DEVIATIONS = 3.5
 """Number of standard deviations within which two measurements of a position agree with probability 0.999."""

@@ -16,12 +16,11 @@ from executive.cell.protocols import Presence, Routes
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
-from executive.ledger import outcomes
 from executive.ledger.bin_contents import BinContents, find_probable_bin
+from executive.ledger.certainty import FINAL_STATES, Certainty, discard_moved_items, find_final_state
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
 from executive.ledger.look import AMBIGUITY_FACTOR, LookUpdate, make_look_event
-from executive.ledger.outcomes import Certainty
 from executive.perception import evidence
 
 BODY_LOOK_COUNT = 5
@@ -227,7 +226,7 @@ class Tracker:
         dropped_items = [record for record in dropped if not record.was_taken_away]
         for record in self._records:
             self._settle_undeclared(record)
-            final_state = outcomes.find_final_state(
+            final_state = find_final_state(
                 record, self._certainty, skip_reason=self._explain_skipped_item(record),
                 is_completed=completed, has_touched_item=has_touched_item,
             )  # fmt: skip
@@ -237,7 +236,7 @@ class Tracker:
             if final_state is not None:
                 record.set_state(*final_state)
                 self._records.emit(record)
-        self._records.emit(*outcomes.discard_moved_items(self.records, dropped_items))
+        self._records.emit(*discard_moved_items(self.records, dropped_items))
 
     def discard_rejected_and_skipped(self) -> None:
         self._failed_picks.clear()
@@ -247,7 +246,7 @@ class Tracker:
 
     def count_states(self) -> dict[str, int]:
         counts = Counter(record.state for record in self._records)
-        totals = {state.value: counts[state] for state in (*outcomes.FINAL_STATES, State.PHANTOM)}
+        totals = {state.value: counts[state] for state in (*FINAL_STATES, State.PHANTOM)}
         return {"seen": counts.total() - counts[State.PHANTOM], **totals}
 
     def list_items(self) -> Sequence[ItemChanged]:

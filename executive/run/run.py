@@ -27,7 +27,7 @@ from executive.events import (
     TimedEvent,
     ToolCommanded,
 )
-from executive.ledger.outcomes import is_balanced
+from executive.ledger.certainty import is_balanced
 from executive.manipulation.motions import make_transport_task
 from executive.manipulation.tool_goals import (
     make_approach,

@@ -26,7 +26,7 @@ from executive.cells.sim.arm import SimArm
 from executive.errors import ExecutiveError
 from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent
 from executive.geometry import Array
-from executive.ledger.outcomes import is_balanced
+from executive.ledger.certainty import is_balanced
 from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.record.journal import Journal, Trace, read_journal

@@ -9,7 +9,7 @@ from ledger_bench import EYE, Bench
 
 from executive.cell.objects import ObjectClass
 from executive.events import FrameSearched, ItemChanged
-from executive.ledger.outcomes import MIN_UNCERTAIN_LOOKS_TO_REJECT, Certainty
+from executive.ledger.certainty import MIN_UNCERTAIN_LOOKS_TO_REJECT, Certainty
 
 THERE = ("cube", 0.5, 0.0)
 UNSURE = ("rejected", "it has no confident detection")
