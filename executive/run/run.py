@@ -194,8 +194,7 @@ class Run:
             # The arm brakes before this event is emitted, because a full disk must not prevent the braking.
             problems += _catch_problems(lambda: self.emit(FaultRaised(loop_end.traceback)))
         has_succeeded = loop_end.status == "SUCCESS"
-        problems += _catch_problems(self._store_held_item)
-        problems += _catch_problems(self._store_table_state)
+        problems += _catch_problems(self._store_final_state)
         problems += _catch_problems(lambda: _finalize_items(self.workcell.accounts, has_succeeded))
         if problems and loop_end.status == "FAULT":
             loop_end = replace(loop_end, message="; ".join([loop_end.message, *problems]))
@@ -247,13 +246,12 @@ class Run:
             loop_end = _LoopEnd("FAULT", "fault", problems[0])
         return loop_end
 
-    def _store_held_item(self) -> None:
-        if self.cell.tool.holding:
-            self._held_item = self.cell.ledger.find_held_item() or "something"
-
-    def _store_table_state(self) -> None:
+    def _store_final_state(self) -> None:
+        """Store the state of the table from the ledger, then the state of the tool, whose sensor may fail."""
         ledger = self.cell.ledger
         self._is_table_empty = ledger.is_table_empty() and not ledger.unknown_labels
+        if self.cell.tool.holding:
+            self._held_item = ledger.find_held_item() or "something"
 
 
 def _catch_problems(action: Callable[[], None]) -> list[str]:

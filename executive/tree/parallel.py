@@ -100,21 +100,17 @@ class Parallel(ControlNode):
         for index, flow in enumerate(flows if can_fail else ()):
             others = [*ends[:index], *ends[index + 1 :]]
             failures |= {cause: _with_siblings(state, end, others) for cause, end in flow.failures.items()}
-        return Flow(self._compute_success_state(flows, state), failures, halted)
-
-    def _compute_success_state(self, flows: Sequence[Flow], state: FlowState) -> FlowState | None:
-        """Return the state after enough children have succeeded; None if too few children can succeed."""
         successes = [flow.success for flow in flows if flow.success is not None]
         success = join_states(successes)
         if success is None or len(successes) < self.required_count:
-            return None
-        if self.required_count < len(flows):
-            ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
-        else:
-            ends = [end.tool_states for end in successes]
+            return Flow(None, failures, halted)
+        success_ends = halted_ends
+        if self.required_count == len(flows):
+            success_ends = [end.tool_states for end in successes]
             names = (name for end in successes for name in end.written_variables or ())
             success = success.with_variables(names)
-        return success.with_tool_states(combine_tool_states(state.tool_states, ends))
+        success = success.with_tool_states(combine_tool_states(state.tool_states, success_ends))
+        return Flow(success, failures, halted)
 
     @property
     def concurrent_children(self) -> Children:
