@@ -287,11 +287,6 @@ class NodeBehaviour(TreeNode):
             return failure
         return Failure("failed", behaviour.feedback_message, behaviour.name, self.path)
 
-    def fail(self, failure: Failure) -> Status:
-        """End with a failure: set `failure` with the label of this node, and return FAILURE."""
-        self.failure = failure.with_label(self.label)
-        return Status.FAILURE
-
     def fail_with_reason(self, reason: str, message: str) -> Status:
         """End with a failure of this node, with one of the declared `reasons`, and return FAILURE."""
         return self.fail(Failure(reason, message, self.node.keyword, self.path))
@@ -314,8 +309,7 @@ class NodeBehaviour(TreeNode):
     def tick_once(self) -> None:
         """Start the node, or continue the node by one tick."""
         if self.status is not Status.RUNNING:
-            self.failure = None
-            self.status = Status.RUNNING
+            self._begin()
             self.emit(NodeStarted(self.path))
             self.start()
         status = self.step()

@@ -78,6 +78,7 @@ class TreeNode(Behaviour):
         path: Unique path from the root of the tree.
         label: Label of the node in the mission, or "".
         blackboard: Variables of the run.
+        failure: The failure while the status is FAILURE; else None. `feedback_message` contains its text.
         subtree_names: Names of the subtrees with this node as root, the outermost first.
     """
 
@@ -88,18 +89,20 @@ class TreeNode(Behaviour):
         self.path = context.path
         self.label = context.label
         self.blackboard = context.blackboard
-        self._failure: Failure | None = None
+        self.failure: Failure | None = None
         self._emit_without_parent = context.emit
 
-    @property
-    def failure(self) -> Failure | None:
-        """The failure while the status is FAILURE; else None. `feedback_message` contains its text."""
-        return self._failure
+    def _begin(self) -> None:
+        """Set the status RUNNING, and remove the failure of the previous activation."""
+        self.failure = None
+        self.feedback_message = ""
+        self.status = Status.RUNNING
 
-    @failure.setter
-    def failure(self, failure: Failure | None) -> None:
-        self._failure = failure
-        self.feedback_message = f"{failure}: {failure.message}" if failure else ""
+    def fail(self, failure: Failure) -> Status:
+        """End with a failure: set `failure` with the label of this node, and return FAILURE."""
+        self.failure = failure.with_label(self.label)
+        self.feedback_message = f"{failure}: {failure.message}"
+        return Status.FAILURE
 
     def emit(self, event: Event) -> None:
         """Emit an event of this node or of a node below, through all ancestors."""
@@ -284,9 +287,8 @@ class SkillLeaf(TreeNode):
             run = self._start() if self._run is None else self._run
             has_succeeded = run.step()
         except SkillFailed as error:
-            self.failure = Failure(error.reason, error.message, self.skill_name, self.path)
-            self.failure = self.failure.with_label(self.label)
-            self._end(Status.FAILURE, error.reason, error.message)
+            status = self.fail(Failure(error.reason, error.message, self.skill_name, self.path))
+            self._end(status, error.reason, error.message)
         except Exception as error:
             message = str(error) if isinstance(error, Fault) else f"{type(error).__name__}: {error}"
             raise self._end_with_fault(message) from error
@@ -314,8 +316,7 @@ class SkillLeaf(TreeNode):
         self._end(new_status)
 
     def _start(self) -> SkillRun:
-        self.failure = None
-        self.status = Status.RUNNING
+        self._begin()
         inputs = self._read_inputs()
         self._item = self._find_item(inputs)
         self.emit(NodeStarted(self.path, self.skill_name, self._item))

@@ -93,7 +93,7 @@ class _Exporter:
         values = {name: _format_pointer(name) for name in skill.ports}
         values |= {name: _format(setting.value) for name, setting in node.settings.items()}
         kind = "Condition" if skill.is_condition else "Action"
-        declarations = (*skill.params.values(), *skill.ports.values())
+        declarations: tuple[Param | Port, ...] = (*skill.params.values(), *skill.ports.values())
         return self._add_element(parent, kind, node.skill, declarations, values)
 
     def _add_subtree_reference(self, parent: Element, node: SubtreeNode) -> Element:
