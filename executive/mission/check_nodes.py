@@ -272,6 +272,6 @@ def _find_named_nodes(flow: FlowAnalysis, name: Reason, matching: list[PossibleF
     """Return the nodes whose failures `name` denotes; none for a label, because labels are unambiguous."""
     if any(name.source in failure.labels for failure in matching):
         return []
-    denoted = [flow.nodes[failure.origin] for failure in matching if failure.must_match([name])]
+    denoted = [flow.nodes[failure.path] for failure in matching if failure.matches([name])]
     nodes_by_span = {node.span: node for node in denoted}
     return sorted(nodes_by_span.values(), key=lambda node: (node.span.line, node.span.col))

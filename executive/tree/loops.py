@@ -202,7 +202,7 @@ class Repeat(ControlNode):
         # A counter may have reached its limit before the first iteration.
         last_ends = (None if self.times is None else body.success, entry if self.limits else None)
         success = join_states((*expected_ends, *last_ends))
-        failures = {cause: end for cause, end in body.failures.items() if not cause.must_match(reasons)}
+        failures = {cause: end for cause, end in body.failures.items() if not cause.matches(reasons)}
         return Flow(success, failures, join_states((body.halted, entry)))
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:

@@ -285,11 +285,11 @@ class NodeBehaviour(TreeNode):
         failure = getattr(behaviour, "failure", None)
         if isinstance(failure, Failure):
             return failure
-        return Failure("failed", behaviour.feedback_message, behaviour.name, self.path)
+        return Failure(behaviour.name, "failed", self.path, message=behaviour.feedback_message)
 
     def fail_with_reason(self, reason: str, message: str) -> Status:
         """End with a failure of this node, with one of the declared `reasons`, and return FAILURE."""
-        return self.fail(Failure(reason, message, self.node.keyword, self.path))
+        return self.fail(Failure(self.node.keyword, reason, self.path, message=message))
 
     def report_choice(self, choice: str, cause: Failure | None = None) -> None:
         """Emit an event with a decision of the node, and with the failure that caused the decision."""

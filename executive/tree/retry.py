@@ -234,14 +234,14 @@ class TryCatch(ControlNode):
             caught_ends = {
                 failure: end.with_handled_failure(failure)
                 for failure, end in body.failures.items()
-                if failure.may_match(handler.on) and not failure.must_match(earlier_reasons)
+                if failure.may_match(handler.on) and not failure.matches(earlier_reasons)
             }
             earlier_reasons += handler.on
             entry = join_states(caught_ends.values())
             if entry is None:
                 continue
             for failure in caught_ends:
-                if failure.must_match(handler.on):
+                if failure.matches(handler.on):
                     failures.pop(failure, None)
             flow = get_flow(handler.do, entry)
             success = join_states((success, flow.success))
@@ -257,8 +257,8 @@ class TryCatch(ControlNode):
         earlier_reasons: list[Reason] = []
         for reason in [reason for handler in self.catch for reason in handler.on]:
             caught = [failure for failure in failures if failure.may_match([reason])]
-            if caught and all(failure.must_match(earlier_reasons) for failure in caught):
-                earlier_reason = next(name for name in earlier_reasons if caught[0].must_match([name]))
+            if caught and all(failure.matches(earlier_reasons) for failure in caught):
+                earlier_reason = next(name for name in earlier_reasons if caught[0].matches([name]))
                 place = earlier_reason.span.describe_place(reason.span.source)
                 message = f"{reason} is caught already, as {earlier_reason} in {place}"
                 yield NodeFinding(reason, "unreachable", message, is_warning=True)

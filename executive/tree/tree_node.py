@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import UserDict
-from collections.abc import Generator, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Generator, Iterator, Mapping
+from dataclasses import dataclass, field
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -16,38 +16,18 @@ from executive.cell.protocols import Cell, Clock, Ledger
 from executive.errors import Fault
 from executive.events import Emit, Event, NodeEnded, NodeStarted, discard_event
 from executive.skill import Direction, Skill, SkillFailed, get_attribute_name
-from executive.tree.specification import Reason
+from executive.tree.flow import PossibleFailure
 
 
 @dataclass(frozen=True)
-class Failure:
-    """A failure with a declared reason, which nodes pass on to their parents.
+class Failure(PossibleFailure):
+    """A failure that nodes pass on to their parents; `reason` is one of the declared reasons of its source.
 
     Attributes:
-        reason: One of the declared reasons of the skill or of the control node.
         message: One sentence with the measured values that explain the failure.
-        source: Name of the skill, or the keyword of the control node, that failed.
-        path: Path of the node that failed.
-        labels: Labels of the failed node and of the ancestors that passed the failure on.
     """
 
-    reason: str
-    message: str
-    source: str
-    path: str
-    labels: tuple[str, ...] = ()
-
-    def __str__(self) -> str:
-        return f"{self.source}.{self.reason}"
-
-    def matches(self, reasons: Iterable[Reason]) -> bool:
-        """Return True if one of `reasons` denotes this failure."""
-        sources = (self.source, *self.labels)
-        return any(reason.reason == self.reason and reason.source in sources for reason in reasons)
-
-    def with_label(self, label: str) -> Failure:
-        """Return the failure with one more label, of a node that passed the failure on; "" adds no label."""
-        return replace(self, labels=(*self.labels, label)) if label else self
+    message: str = field(kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -287,7 +267,7 @@ class SkillLeaf(TreeNode):
             run = self._start() if self._run is None else self._run
             has_succeeded = run.step()
         except SkillFailed as error:
-            status = self.fail(Failure(error.reason, error.message, self.skill_name, self.path))
+            status = self.fail(Failure(self.skill_name, error.reason, self.path, message=error.message))
             self._end(status, error.reason, error.message)
         except Exception as error:
             message = str(error) if isinstance(error, Fault) else f"{type(error).__name__}: {error}"
