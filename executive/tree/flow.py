@@ -269,25 +269,3 @@ def join_states(states: Iterable[FlowState | None]) -> FlowState | None:
     """Return the join of the states that can occur; None stands for a state that cannot occur."""
     possible_states = [state for state in states if state is not None]
     return reduce(FlowState.join, possible_states) if possible_states else None
-
-
-def find_end_tool_states(flow: Flow, entry: FlowState, can_be_halted: bool) -> ToolStates:
-    """Return the possible tool states after a branch from `entry`, also after halts if `can_be_halted`."""
-    halt_states = (flow.halted, entry) if can_be_halted else ()
-    return (join_states((flow.success, *flow.failures.values(), *halt_states)) or entry).tool_states
-
-
-def combine_tool_states(entry: ToolStates, branch_ends: Iterable[ToolStates]) -> ToolStates:
-    """Return the possible tool states after parallel branches, of which at most one uses the tool.
-
-    `entry` contains the states before the branches; `branch_ends` contains the states after each branch.
-    """
-    changed_ends = [states for states in branch_ends if _remove_history(states) != _remove_history(entry)]
-    if any(states is None for states in changed_ends):
-        return None
-    return frozenset(state for states in changed_ends for state in states or ()) if changed_ends else entry
-
-
-def _remove_history(tool_states: ToolStates) -> frozenset[tuple[ToolState, str]] | None:
-    """Return the possible states of the tool and their causes, without handled failures and motions."""
-    return None if tool_states is None else frozenset((state.state, state.cause) for state in tool_states)

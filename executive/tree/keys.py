@@ -230,11 +230,6 @@ class KeyOwner(Specification):
         """Return True if the keyword of a node may stand alone, without a value."""
         return cls.shorthand_key is not None and not cls.shorthand_key.is_required
 
-    def is_written_as_constant(self, key_name: str) -> bool:
-        """Return True if the mission has a constant at a key, not a param or an argument."""
-        value = self.settings.get(key_name)
-        return isinstance(value, Constant) and not value.origin
-
     def list_values(self) -> Sequence[tuple[Key, KeyValue]]:
         """Return every key that has a value, and the value, in the order of the declarations."""
         values: list[tuple[Key, KeyValue]] = []

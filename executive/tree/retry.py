@@ -11,7 +11,7 @@ from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point,
 from executive.tree.keys import KeySection, Reasons, key
 from executive.tree.loops import GeneratorBehaviour, NodeRun
 from executive.tree.node import Advice, ControlNode, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
-from executive.tree.specification import Child, Node, Reason, format_reasons
+from executive.tree.specification import Child, Constant, Node, Reason, format_reasons
 
 _GIVE_UP = "give up: the recovery failed"
 """Choice that a retry reports after a failure of its recovery."""
@@ -99,7 +99,8 @@ class Retry(ControlNode):
             hint = "Put a look or a motion into `do` or `recover`, or wait with `backoff`."
             yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
         # A param with the value 1 is no mistake, because the param may have another value in another run.
-        if self.attempts == 1 and self.is_written_as_constant("attempts"):
+        attempts = self.settings.get("attempts")
+        if self.attempts == 1 and isinstance(attempts, Constant) and not attempts.origin:
             message = "a retry with 1 attempt never runs its body again"
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
