@@ -10,18 +10,7 @@ from dataclasses import replace
 from enum import Enum
 from functools import cache, partial
 from types import NoneType, UnionType
-from typing import (
-    Any,
-    ClassVar,
-    Literal,
-    Optional,
-    TypeGuard,
-    Union,
-    cast,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import Any, ClassVar, Literal, TypeGuard, Union, cast, get_args, get_origin, get_type_hints
 from weakref import WeakKeyDictionary
 
 from py_trees.behaviour import Behaviour
@@ -320,7 +309,7 @@ def _make_port(name: str, direction: Direction, declared: PortInformation) -> Po
     default: object = ... if declared.required else None
     if direction is Direction.IN and declared.has_default:
         default = declared.default_value
-    port_type = Optional[declared.data_type] if default is None else declared.data_type  # noqa: UP045
+    port_type = Union[declared.data_type, None] if default is None else declared.data_type  # noqa: UP007
     return Port(name, port_type, direction, default, "", declared.description)
 
 

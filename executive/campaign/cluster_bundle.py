@@ -26,11 +26,11 @@ import executive
 from executive import plugins
 from executive.campaign.jobs import SweepJob
 from executive.campaign.results import RunRecord
-from executive.errors import InputError
+from executive.errors import InputError, explain_os_errors
 from executive.mission.yaml_files import find_mission, get_shipped_folder
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.detectors.envelope import MEASUREMENT_SUFFIX
-from executive.record.run_directory import convert_os_errors, make_unique_folder
+from executive.record.run_directory import FOLDER_ADVICE, make_unique_folder
 from executive.tree.node import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
 
 if TYPE_CHECKING:
@@ -220,7 +220,7 @@ def unpack_run(returned: ReturnedRun) -> RunRecord:
     path = Path(run.run_directory.replace(returned.root, ""))
     if run.run_directory:
         folder = path
-        with convert_os_errors(f'write the run directory "{folder}"'):
+        with explain_os_errors(InputError, f'cannot write the run directory "{folder}"', FOLDER_ADVICE):
             folder.parent.mkdir(parents=True, exist_ok=True)
             # Runs of two workers may have the same name.
             path = make_unique_folder(folder.parent, folder.name)

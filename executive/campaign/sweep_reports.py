@@ -24,9 +24,9 @@ from executive.campaign.sweep_summary import (
     SweepResults,
     VariantSummary,
 )
-from executive.errors import InputError
+from executive.errors import InputError, explain_os_errors
 from executive.record.result import Audit
-from executive.record.run_directory import RunDirectory, convert_os_errors, write_atomically
+from executive.record.run_directory import RunDirectory, write_atomically
 from executive.view.report import try_write_report
 from executive.view.terminal import describe_end
 from executive.view.text import render_template
@@ -193,7 +193,8 @@ def write_page(
         link=lambda run_directory: _make_link(run_directory, folder),
         describe_variant=describe_variant,
     )
-    with convert_os_errors(f'write the page "{path}"', "free some space, or make the folder writable"):
+    advice = "free some space, or make the folder writable"
+    with explain_os_errors(InputError, f'cannot write the page "{path}"', advice):
         write_atomically(path, page)
     return path
 
@@ -290,7 +291,8 @@ def write_junit(path: Path, sweep: SweepResults) -> None:
     Raises:
         InputError: The file cannot be written.
     """
-    with convert_os_errors(f'write the report "{path}"', "name another file with --junit FILE"):
+    advice = "name another file with --junit FILE"
+    with explain_os_errors(InputError, f'cannot write the report "{path}"', advice):
         write_atomically(path, format_junit(sweep))
 
 

@@ -109,10 +109,10 @@ class UnhandledFailure:
 def find_unhandled_failures(analysis: FlowAnalysis) -> tuple[UnhandledFailure, ...]:
     """Return the failures that can end the mission, in the order of the tree."""
     order = {path: index for index, path in enumerate(analysis.nodes)}
-    failures = sorted(analysis.root_flow.failures, key=lambda end: (order[end.origin], end.reason))
-    spans = [analysis.nodes[failure.origin].span for failure in failures]
+    failures = sorted(analysis.root_flow.failures, key=lambda end: (order[end.path], end.reason))
+    spans = [analysis.nodes[failure.path].span for failure in failures]
     return tuple(
-        UnhandledFailure(failure.source, failure.reason, failure.origin, span.source.path, span.line)
+        UnhandledFailure(failure.source, failure.reason, failure.path, span.source.path, span.line)
         for failure, span in zip(failures, spans, strict=True)
     )
 

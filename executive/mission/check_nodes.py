@@ -20,7 +20,7 @@ from executive.mission.findings import (
 from executive.mission.ports import ValueProblem, convert_constant
 from executive.skill import Skill, list_condition_violations
 from executive.tree.flow import UNKNOWN_NAME, Flow, FlowState, PossibleFailure
-from executive.tree.keys import PREDEFINED_LISTS, Key, KeySection, KeyValue, list_nodes
+from executive.tree.keys import PREDEFINED_LISTS, KeySection, KeyValue, list_nodes
 from executive.tree.node import ControlNode, NodeFinding
 from executive.tree.specification import Constant, Node, Reason, Reference, SkillNode, Span, SubtreeNode
 
@@ -209,17 +209,17 @@ def _find_names_with_bodies(node: Node) -> Iterator[tuple[Reason, str, Node]]:
     """Yield every failure name of a node, the keyword of the node, and the child that may fail."""
     if not isinstance(node, ControlNode):
         return
-    for key, name in _find_failure_names(node):
-        for body in node.list_children(key.failing_nodes_key):
+    for name in _find_failure_names(node):
+        for body in node.list_children("do"):
             yield name, node.keyword, body
 
 
-def _find_failure_names(owner: ControlNode | KeySection) -> Iterator[tuple[Key, Reason]]:
+def _find_failure_names(owner: ControlNode | KeySection) -> Iterator[Reason]:
     """Yield the names of failures in the keys of a node and of its sections."""
-    for key, value in owner.list_values():
+    for _, value in owner.list_values():
         for item in value if isinstance(value, tuple) else (value,):
             if isinstance(item, Reason):
-                yield key, item
+                yield item
             elif isinstance(item, KeySection):
                 yield from _find_failure_names(item)
 
@@ -272,6 +272,6 @@ def _find_named_nodes(flow: FlowAnalysis, name: Reason, matching: list[PossibleF
     """Return the nodes whose failures `name` denotes; none for a label, because labels are unambiguous."""
     if any(name.source in failure.labels for failure in matching):
         return []
-    denoted = [flow.nodes[failure.origin] for failure in matching if failure.must_match([name])]
+    denoted = [flow.nodes[failure.path] for failure in matching if failure.matches([name])]
     nodes_by_span = {node.span: node for node in denoted}
     return sorted(nodes_by_span.values(), key=lambda node: (node.span.line, node.span.col))

@@ -153,7 +153,12 @@ class Journal:
             return
         line = encode_event(timed)
         try:
-            self._write(self._fd, line)
+            # The file is written without a buffer, so that it contains all lines if the process crashes.
+            unwritten = line
+            while unwritten:
+                # If the disk is nearly full, the system may write only a part of the line.
+                unwritten = unwritten[os.write(self._fd, unwritten) :]
+            self._file_size += len(line)
             event = timed.event
             is_placement = isinstance(event, events.ItemChanged) and event.state == "placed"
             if is_placement or isinstance(event, events.ToolCommanded | RunEnded):
@@ -186,14 +191,6 @@ class Journal:
             with contextlib.suppress(OSError):
                 os.close(self._fd)
             self._fd = None
-
-    def _write(self, fd: int, line: bytes) -> None:
-        """Write a line without a buffer, so that the file contains all lines if the process crashes."""
-        unwritten = line
-        while unwritten:
-            # If the disk is nearly full, the system may write only a part of the line.
-            unwritten = unwritten[os.write(fd, unwritten) :]
-        self._file_size += len(line)
 
     def _sync(self, fd: int) -> None:
         """Sync the file to the disk, and raise an OSError if another program changed the file."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
 from datetime import datetime
 from pathlib import Path
 
@@ -21,6 +20,8 @@ from executive.mission.outline import OutlineNode
 from executive.skill import Skill
 from executive.tree.specification import Source
 
+FOLDER_ADVICE = "name another folder with --runs DIR"
+"""Advice if a run directory cannot be made or written."""
 LATEST_LINK = "latest"
 """Name of the link to the last run directory."""
 SCENE_FILE = "scene.yaml"
@@ -67,7 +68,7 @@ class RunDirectory:
         Raises:
             InputError: A file cannot be written; each existing file is complete.
         """
-        with convert_os_errors(f'write to the run directory "{self.path}"'):
+        with explain_os_errors(InputError, f'cannot write to the run directory "{self.path}"', FOLDER_ADVICE):
             # The inputs are written after the libraries, so that no library replaces them.
             for relative_path, text in libraries.items():
                 path = self.path / relative_path
@@ -93,16 +94,9 @@ def make_dated_folder(runs: Path, name: str, start_time: datetime) -> Path:
         InputError: The folder cannot be made.
     """
     day = runs / start_time.strftime("%Y-%m-%d")
-    with convert_os_errors(f'make a run directory below "{runs}"'):
+    with explain_os_errors(InputError, f'cannot make a run directory below "{runs}"', FOLDER_ADVICE):
         day.mkdir(parents=True, exist_ok=True)
         return make_unique_folder(day, f"{start_time.strftime('%H-%M-%S')}_{name}")
-
-
-def convert_os_errors(
-    action: str, advice: str = "name another folder with --runs DIR"
-) -> AbstractContextManager[None]:
-    """Convert an OSError in the `with` block to an InputError with the failed action and advice."""
-    return explain_os_errors(InputError, f"cannot {action}", advice)
 
 
 def find_run(name: str, runs: Path) -> Path:

@@ -10,22 +10,17 @@ from dataclasses import dataclass, replace
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
+from executive import events
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, StepClock
 from executive.cell.workcell import Accounts, Workcell
 from executive.errors import ExecutiveError, Fault, Stopped
 from executive.events import (
     Event,
-    FaultRaised,
-    FrameSearched,
-    MotionPlanned,
     Observer,
     RunEnded,
-    RunHalted,
     RunStarted,
-    TargetSelected,
     TimedEvent,
-    ToolCommanded,
 )
 from executive.ledger.certainty import is_balanced
 from executive.manipulation.motions import make_transport_task
@@ -192,10 +187,9 @@ class Run:
             problems = halt(self.root) + _catch_problems(lambda: brake_arm(self.cell, self.advance))
         if loop_end.traceback:
             # The arm brakes before this event is emitted, because a full disk must not prevent the braking.
-            problems += _catch_problems(lambda: self.emit(FaultRaised(loop_end.traceback)))
+            problems += _catch_problems(lambda: self.emit(events.FaultRaised(loop_end.traceback)))
         has_succeeded = loop_end.status == "SUCCESS"
-        problems += _catch_problems(self._store_held_item)
-        problems += _catch_problems(self._store_table_state)
+        problems += _catch_problems(self._store_final_state)
         problems += _catch_problems(lambda: _finalize_items(self.workcell.accounts, has_succeeded))
         if problems and loop_end.status == "FAULT":
             loop_end = replace(loop_end, message="; ".join([loop_end.message, *problems]))
@@ -242,18 +236,17 @@ class Run:
             message = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
             node = error.node if isinstance(error, Fault) else ""
             loop_end = _LoopEnd("FAULT", "fault", message, node, traceback.format_exc())
-        problems = _catch_problems(lambda: self.emit(RunHalted(is_tree_ticked)))
+        problems = _catch_problems(lambda: self.emit(events.RunHalted(is_tree_ticked)))
         if problems and loop_end.status != "FAULT":
             loop_end = _LoopEnd("FAULT", "fault", problems[0])
         return loop_end
 
-    def _store_held_item(self) -> None:
-        if self.cell.tool.holding:
-            self._held_item = self.cell.ledger.find_held_item() or "something"
-
-    def _store_table_state(self) -> None:
+    def _store_final_state(self) -> None:
+        """Store the state of the table from the ledger, then the state of the tool, whose sensor may fail."""
         ledger = self.cell.ledger
         self._is_table_empty = ledger.is_table_empty() and not ledger.unknown_labels
+        if self.cell.tool.holding:
+            self._held_item = ledger.find_held_item() or "something"
 
 
 def _catch_problems(action: Callable[[], None]) -> list[str]:
@@ -344,14 +337,14 @@ class LookaheadPlanner:
     def on_event(self, timed: TimedEvent) -> None:
         """Update the expected motions from an event of the run."""
         event = timed.event
-        if isinstance(event, TargetSelected):
+        if isinstance(event, events.TargetSelected):
             # The selection of an item or a bin that does not exist is ignored.
             items = {target.item for target in self._cell.ledger.find_targets()}
             exists = event.bin in self._cell.bins and event.item in items
             self._item_and_bin = (event.item, event.bin) if exists else None
-        elif isinstance(event, ToolCommanded):
+        elif isinstance(event, events.ToolCommanded):
             self._grip_tick = timed.tick if event.action == "close" else None
-        elif isinstance(event, FrameSearched | MotionPlanned):
+        elif isinstance(event, events.FrameSearched | events.MotionPlanned):
             self._change_tick = timed.tick
 
     def plan_next_motion(self, tick: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import ClassVar
 
 from py_trees.common import Status
 
@@ -23,6 +24,7 @@ class Invert(ControlNode):
     keyword = "invert"
     reasons = ("inverted",)
     symbol = "¬"
+    counterpart: ClassVar[Counterpart] = Counterpart("Inverter")
 
     do: Child = key(shorthand=True, doc="Body.")
 
@@ -32,11 +34,6 @@ class Invert(ControlNode):
         inverted = PossibleFailure(self.keyword, "inverted", self.path)
         failures = {} if flow.success is None else {inverted: flow.success}
         return Flow(join_states(flow.failures.values()), failures, flow.halted)
-
-    @property
-    def counterpart(self) -> Counterpart | None:
-        """`Inverter` of BehaviorTree.CPP."""
-        return Counterpart("Inverter")
 
     class Behaviour(NodeBehaviour):
         """Runs the node."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 from executive.skill import ANY, EMPTY, HALT, HOLDING, Skill, ToolState
 from executive.tree.specification import Node, Reason, SkillNode
@@ -146,11 +146,11 @@ class PossibleFailure(Reason):
     """A failure that a node may pass on; `source` is the failing skill or the keyword of a control node.
 
     Attributes:
-        origin: Path of the node that fails.
+        path: Path of the node that fails.
         labels: Labels of the failing node and of the ancestors that passed the failure on.
     """
 
-    origin: str
+    path: str
     labels: frozenset[str] = frozenset()
 
     def may_match(self, reasons: Iterable[Reason]) -> bool:
@@ -161,10 +161,18 @@ class PossibleFailure(Reason):
             for reason in reasons
         )
 
-    def must_match(self, reasons: Iterable[Reason]) -> bool:
+    def matches(self, reasons: Iterable[Reason]) -> bool:
         """Return True if one of `reasons` certainly denotes the failure."""
         sources = {self.source, *self.labels}
         return any(reason.reason == self.reason and reason.source in sources for reason in reasons)
+
+    def with_label(self: FailureT, label: str) -> FailureT:
+        """Return the failure with one more label, of a node that passed the failure on; "" adds no label."""
+        return replace(self, labels=self.labels | {label}) if label else self
+
+
+FailureT = TypeVar("FailureT", bound=PossibleFailure)
+"""Class of a failure."""
 
 
 @dataclass(frozen=True)
@@ -206,7 +214,7 @@ class Flow:
             return self
         failures: dict[PossibleFailure, FlowState] = {}
         for failure, state in self.failures.items():
-            labelled_failure = replace(failure, labels=failure.labels | {label})
+            labelled_failure = failure.with_label(label)
             failures[labelled_failure] = state.join(failures.get(labelled_failure, state))
         return replace(self, failures=failures)
 
@@ -261,25 +269,3 @@ def join_states(states: Iterable[FlowState | None]) -> FlowState | None:
     """Return the join of the states that can occur; None stands for a state that cannot occur."""
     possible_states = [state for state in states if state is not None]
     return reduce(FlowState.join, possible_states) if possible_states else None
-
-
-def find_end_tool_states(flow: Flow, entry: FlowState, can_be_halted: bool) -> ToolStates:
-    """Return the possible tool states after a branch from `entry`, also after halts if `can_be_halted`."""
-    halt_states = (flow.halted, entry) if can_be_halted else ()
-    return (join_states((flow.success, *flow.failures.values(), *halt_states)) or entry).tool_states
-
-
-def combine_tool_states(entry: ToolStates, branch_ends: Iterable[ToolStates]) -> ToolStates:
-    """Return the possible tool states after parallel branches, of which at most one uses the tool.
-
-    `entry` contains the states before the branches; `branch_ends` contains the states after each branch.
-    """
-    changed_ends = [states for states in branch_ends if _remove_history(states) != _remove_history(entry)]
-    if any(states is None for states in changed_ends):
-        return None
-    return frozenset(state for states in changed_ends for state in states or ()) if changed_ends else entry
-
-
-def _remove_history(tool_states: ToolStates) -> frozenset[tuple[ToolState, str]] | None:
-    """Return the possible states of the tool and their causes, without handled failures and motions."""
-    return None if tool_states is None else frozenset((state.state, state.cause) for state in tool_states)

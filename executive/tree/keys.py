@@ -52,7 +52,6 @@ class Key:
         shorthand: True if the key may be omitted and its value written directly under the keyword.
         sibling: True if the key is a sibling of the keyword in the mission file: `catch` next to `try`.
         in_path: True if the paths of the nodes under the key contain the key.
-        failing_nodes_key: For a list of reasons: key with the nodes whose failures the reasons denote.
         list_key: For a loop variable: key of the list of its values; otherwise "".
         requires_conditions: True if each node under the key must be a condition.
         name: Name of the key in the mission file.
@@ -66,7 +65,6 @@ class Key:
     shorthand: bool = False
     sibling: bool = False
     in_path: bool = True
-    failing_nodes_key: str = "do"
     list_key: str = ""
     requires_conditions: bool = False
     name: str = ""
@@ -231,11 +229,6 @@ class KeyOwner(Specification):
     def is_value_optional(cls) -> bool:
         """Return True if the keyword of a node may stand alone, without a value."""
         return cls.shorthand_key is not None and not cls.shorthand_key.is_required
-
-    def is_written_as_constant(self, key_name: str) -> bool:
-        """Return True if the mission has a constant at a key, not a param or an argument."""
-        value = self.settings.get(key_name)
-        return isinstance(value, Constant) and not value.origin
 
     def list_values(self) -> Sequence[tuple[Key, KeyValue]]:
         """Return every key that has a value, and the value, in the order of the declarations."""

@@ -23,9 +23,8 @@ from executive.tree.node import (
 from executive.tree.specification import Child, Node, Reason, VariableName, format_reasons
 from executive.tree.tree_node import Failure
 
-NodeRun: TypeAlias = Generator[None, Status | None, Failure | None]
-"""Generator that returns a failure, or None for success. A `yield` ends the tick. If a child is running, the
-generator continues after the end of the child, and the value of the `yield` is the status of the child."""
+NodeRun: TypeAlias = Generator[None, None, Failure | None]
+"""Generator that returns a failure, or None for success. A `yield` ends the tick."""
 
 
 class GeneratorBehaviour(NodeBehaviour):
@@ -40,19 +39,11 @@ class GeneratorBehaviour(NodeBehaviour):
         """Begin a new generator."""
         self._run = self.run()
         self._has_tick_passed = False
-        self._running_child: Node | None = None
 
     def step(self) -> Status:
-        """Tick the running child, if any; unless it is still running, continue the generator."""
-        child = self._running_child
-        child_status = None
-        if child is not None:
-            child_status = self.tick_child(child)
-            if child_status is Status.RUNNING:
-                return child_status
-            self._running_child = None
+        """Continue the generator."""
         try:
-            self._run.send(child_status)
+            next(self._run)
         except StopIteration as end:
             failure = cast("Failure | None", end.value)
             return Status.SUCCESS if failure is None else self.fail(failure)
@@ -69,10 +60,8 @@ class GeneratorBehaviour(NodeBehaviour):
 
     def run_child(self, child: Node) -> NodeRun:
         """Tick a child once per tick until its end, and return its failure; None after success."""
-        status: Status | None = self.tick_child(child)
-        if status is Status.RUNNING:
-            self._running_child = child
-            status = yield
+        while (status := self.tick_child(child)) is Status.RUNNING:
+            yield
         return self.get_failure(child) if status is Status.FAILURE else None
 
     def end_iteration(self) -> NodeRun:
@@ -213,7 +202,7 @@ class Repeat(ControlNode):
         # A counter may have reached its limit before the first iteration.
         last_ends = (None if self.times is None else body.success, entry if self.limits else None)
         success = join_states((*expected_ends, *last_ends))
-        failures = {cause: end for cause, end in body.failures.items() if not cause.must_match(reasons)}
+        failures = {cause: end for cause, end in body.failures.items() if not cause.matches(reasons)}
         return Flow(success, failures, join_states((body.halted, entry)))
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:

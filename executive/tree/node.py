@@ -237,6 +237,8 @@ class NodeBehaviour(TreeNode):
         self.clock = context.clock
         self.ledger = context.ledger
         self.children = list(self.behaviour_by_child.values())
+        self._visited_nodes: list[Behaviour] | None = None
+        """Nodes that were ticked in this tick, for visitors of py_trees; None in a tick without visitors."""
         for child in self.children:
             child.parent = self
 
@@ -258,14 +260,14 @@ class NodeBehaviour(TreeNode):
     def tick_child(self, child: Node) -> Status:
         """Tick a child and return its status."""
         behaviour = self.behaviour_by_child[child]
-        behaviour.tick_once()
+        if self._visited_nodes is None:
+            behaviour.tick_once()
+        else:
+            self._visited_nodes.extend(behaviour.tick())
         status = behaviour.status
         if status is Status.INVALID:
-            raise self._make_status_fault(behaviour)
+            raise Fault(f"{behaviour.name} was ticked but has no status", self.path)
         return status
-
-    def _make_status_fault(self, child: Behaviour) -> Fault:
-        return Fault(f"{child.name} was ticked but has no status", self.path)
 
     def halt_children(self, children: Iterable[Node]) -> None:
         """Halt the children and all running nodes below the children, one child after the other.
@@ -283,16 +285,11 @@ class NodeBehaviour(TreeNode):
         failure = getattr(behaviour, "failure", None)
         if isinstance(failure, Failure):
             return failure
-        return Failure("failed", behaviour.feedback_message, behaviour.name, self.path)
-
-    def fail(self, failure: Failure) -> Status:
-        """End with a failure: set `failure` with the label of this node, and return FAILURE."""
-        self.failure = failure.with_label(self.label)
-        return Status.FAILURE
+        return Failure(behaviour.name, "failed", self.path, message=behaviour.feedback_message)
 
     def fail_with_reason(self, reason: str, message: str) -> Status:
         """End with a failure of this node, with one of the declared `reasons`, and return FAILURE."""
-        return self.fail(Failure(reason, message, self.node.keyword, self.path))
+        return self.fail(Failure(self.node.keyword, reason, self.path, message=message))
 
     def report_choice(self, choice: str, cause: Failure | None = None) -> None:
         """Emit an event with a decision of the node, and with the failure that caused the decision."""
@@ -301,29 +298,18 @@ class NodeBehaviour(TreeNode):
 
     def tick(self) -> Iterator[Behaviour]:
         """Continue by one tick, then yield the ticked nodes for visitors of py_trees, children first."""
-        visited_nodes: list[Behaviour] = []
-
-        def tick_and_visit(child: Node) -> Status:
-            behaviour = self.behaviour_by_child[child]
-            visited_nodes.extend(behaviour.tick())
-            if behaviour.status is Status.INVALID:
-                raise self._make_status_fault(behaviour)
-            return behaviour.status
-
-        # An attribute of the instance hides the method, so that a tick without visitors has no extra cost.
-        self.tick_child = tick_and_visit  # type: ignore[method-assign]
+        visited_nodes = self._visited_nodes = []
         try:
             self.tick_once()
         finally:
-            del self.tick_child
+            self._visited_nodes = None
         yield from visited_nodes
         yield self
 
     def tick_once(self) -> None:
         """Start the node, or continue the node by one tick."""
         if self.status is not Status.RUNNING:
-            self.failure = None
-            self.status = Status.RUNNING
+            self._begin()
             self.emit(NodeStarted(self.path))
             self.start()
         status = self.step()

@@ -8,15 +8,8 @@ from typing import Annotated, Literal
 from py_trees.common import Status
 from pydantic import Field
 
-from executive.tree.flow import (
-    Flow,
-    FlowFunction,
-    FlowState,
-    ToolStates,
-    combine_tool_states,
-    find_end_tool_states,
-    join_states,
-)
+from executive.skill import ToolState
+from executive.tree.flow import Flow, FlowFunction, FlowState, ToolStates, join_states
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode, Counterpart, NodeBehaviour, PropagatedFailure
 from executive.tree.tree_node import Failure
@@ -100,21 +93,17 @@ class Parallel(ControlNode):
         for index, flow in enumerate(flows if can_fail else ()):
             others = [*ends[:index], *ends[index + 1 :]]
             failures |= {cause: _with_siblings(state, end, others) for cause, end in flow.failures.items()}
-        return Flow(self._compute_success_state(flows, state), failures, halted)
-
-    def _compute_success_state(self, flows: Sequence[Flow], state: FlowState) -> FlowState | None:
-        """Return the state after enough children have succeeded; None if too few children can succeed."""
         successes = [flow.success for flow in flows if flow.success is not None]
         success = join_states(successes)
         if success is None or len(successes) < self.required_count:
-            return None
-        if self.required_count < len(flows):
-            ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
-        else:
-            ends = [end.tool_states for end in successes]
+            return Flow(None, failures, halted)
+        success_ends = halted_ends
+        if self.required_count == len(flows):
+            success_ends = [end.tool_states for end in successes]
             names = (name for end in successes for name in end.written_variables or ())
             success = success.with_variables(names)
-        return success.with_tool_states(combine_tool_states(state.tool_states, ends))
+        success = success.with_tool_states(combine_tool_states(state.tool_states, success_ends))
+        return Flow(success, failures, halted)
 
     @property
     def concurrent_children(self) -> Children:
@@ -210,3 +199,25 @@ class Parallel(ControlNode):
 def _with_siblings(entry: FlowState, end: FlowState, others: Iterable[ToolStates]) -> FlowState:
     """Return the state `end` after one child, with the tool states `others` after its siblings."""
     return end.with_tool_states(combine_tool_states(entry.tool_states, [end.tool_states, *others]))
+
+
+def find_end_tool_states(flow: Flow, entry: FlowState, can_be_halted: bool) -> ToolStates:
+    """Return the possible tool states after a branch from `entry`, also after halts if `can_be_halted`."""
+    halt_states = (flow.halted, entry) if can_be_halted else ()
+    return (join_states((flow.success, *flow.failures.values(), *halt_states)) or entry).tool_states
+
+
+def combine_tool_states(entry: ToolStates, branch_ends: Iterable[ToolStates]) -> ToolStates:
+    """Return the possible tool states after parallel branches, of which at most one uses the tool.
+
+    `entry` contains the states before the branches; `branch_ends` contains the states after each branch.
+    """
+    changed_ends = [states for states in branch_ends if _remove_history(states) != _remove_history(entry)]
+    if any(states is None for states in changed_ends):
+        return None
+    return frozenset(state for states in changed_ends for state in states or ()) if changed_ends else entry
+
+
+def _remove_history(tool_states: ToolStates) -> frozenset[tuple[ToolState, str]] | None:
+    """Return the possible states of the tool and their causes, without handled failures and motions."""
+    return None if tool_states is None else frozenset((state.state, state.cause) for state in tool_states)

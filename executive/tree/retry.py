@@ -11,7 +11,7 @@ from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point,
 from executive.tree.keys import KeySection, Reasons, key
 from executive.tree.loops import GeneratorBehaviour, NodeRun
 from executive.tree.node import Advice, ControlNode, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
-from executive.tree.specification import Child, Node, Reason, format_reasons
+from executive.tree.specification import Child, Constant, Node, Reason, format_reasons
 
 _GIVE_UP = "give up: the recovery failed"
 """Choice that a retry reports after a failure of its recovery."""
@@ -99,7 +99,8 @@ class Retry(ControlNode):
             hint = "Put a look or a motion into `do` or `recover`, or wait with `backoff`."
             yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
         # A param with the value 1 is no mistake, because the param may have another value in another run.
-        if self.attempts == 1 and self.is_written_as_constant("attempts"):
+        attempts = self.settings.get("attempts")
+        if self.attempts == 1 and isinstance(attempts, Constant) and not attempts.origin:
             message = "a retry with 1 attempt never runs its body again"
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
@@ -234,14 +235,14 @@ class TryCatch(ControlNode):
             caught_ends = {
                 failure: end.with_handled_failure(failure)
                 for failure, end in body.failures.items()
-                if failure.may_match(handler.on) and not failure.must_match(earlier_reasons)
+                if failure.may_match(handler.on) and not failure.matches(earlier_reasons)
             }
             earlier_reasons += handler.on
             entry = join_states(caught_ends.values())
             if entry is None:
                 continue
             for failure in caught_ends:
-                if failure.must_match(handler.on):
+                if failure.matches(handler.on):
                     failures.pop(failure, None)
             flow = get_flow(handler.do, entry)
             success = join_states((success, flow.success))
@@ -257,8 +258,8 @@ class TryCatch(ControlNode):
         earlier_reasons: list[Reason] = []
         for reason in [reason for handler in self.catch for reason in handler.on]:
             caught = [failure for failure in failures if failure.may_match([reason])]
-            if caught and all(failure.must_match(earlier_reasons) for failure in caught):
-                earlier_reason = next(name for name in earlier_reasons if caught[0].must_match([name]))
+            if caught and all(failure.matches(earlier_reasons) for failure in caught):
+                earlier_reason = next(name for name in earlier_reasons if caught[0].matches([name]))
                 place = earlier_reason.span.describe_place(reason.span.source)
                 message = f"{reason} is caught already, as {earlier_reason} in {place}"
                 yield NodeFinding(reason, "unreachable", message, is_warning=True)

@@ -5,10 +5,9 @@ Without memory, and in a guard, every tick runs children again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import ClassVar
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.errors import Fault
@@ -25,7 +24,6 @@ from executive.tree.node import (
     PropagatedFailure,
 )
 from executive.tree.specification import Child, Node
-from executive.tree.tree_node import NodeContext
 
 _COMPARED_ATTRIBUTES = ("node", "status", "reason", "choice", "item", "outputs")
 """Attributes of events by which two runs of a child are compared; the numbers in messages may differ."""
@@ -38,17 +36,12 @@ class ReactiveBehaviour(NodeBehaviour):
     Without this rule, a condition that is checked at every tick would fill the journal with equal events.
     """
 
-    def __init__(
-        self, context: NodeContext, node: ControlNode, build_child: Callable[[Node], Behaviour]
-    ) -> None:
-        super().__init__(context, node, build_child)
-        self._held_events: list[Event] | None = None
-        """Events of the child that `tick_again` ticks; None outside of `tick_again`."""
-        self._last_results: dict[Node, list[tuple[object, ...]]] = {}
+    _held_events: list[Event] | None = None
+    """Events of the child that `tick_again` ticks; None outside of `tick_again`."""
 
     def start(self) -> None:
         """Forget all previous results, so that the first run of each child emits events."""
-        self._last_results = {}
+        self._last_results: dict[Node, list[tuple[object, ...]]] = {}
 
     def emit(self, event: Event) -> None:
         """Emit an event of this node or of a node below; hold the events of a child that runs again."""
@@ -316,6 +309,7 @@ class Guard(ControlNode):
     keyword = "guard"
     reasons = ("broken",)
     symbol = "◉"
+    counterpart: ClassVar[Counterpart] = Counterpart("ReactiveSequence")
 
     holds: Child = key(requires_conditions=True, doc="Condition that must succeed at every tick.")
     do: Child = key(doc="Body.")
@@ -366,11 +360,6 @@ class Guard(ControlNode):
     def explain(self, failure: PropagatedFailure) -> str:
         """Return why the guard passed on a failure of its body."""
         return "handles no failures of its body"
-
-    @property
-    def counterpart(self) -> Counterpart | None:
-        """`ReactiveSequence` of BehaviorTree.CPP."""
-        return Counterpart("ReactiveSequence")
 
     class Behaviour(ReactiveBehaviour):
         """Runs the node."""

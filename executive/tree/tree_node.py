@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import UserDict
-from collections.abc import Generator, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Generator, Iterator, Mapping
+from dataclasses import dataclass, field
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -16,38 +16,18 @@ from executive.cell.protocols import Cell, Clock, Ledger
 from executive.errors import Fault
 from executive.events import Emit, Event, NodeEnded, NodeStarted, discard_event
 from executive.skill import Direction, Skill, SkillFailed, get_attribute_name
-from executive.tree.specification import Reason
+from executive.tree.flow import PossibleFailure
 
 
 @dataclass(frozen=True)
-class Failure:
-    """A failure with a declared reason, which nodes pass on to their parents.
+class Failure(PossibleFailure):
+    """A failure that nodes pass on to their parents; `reason` is one of the declared reasons of its source.
 
     Attributes:
-        reason: One of the declared reasons of the skill or of the control node.
         message: One sentence with the measured values that explain the failure.
-        source: Name of the skill, or the keyword of the control node, that failed.
-        path: Path of the node that failed.
-        labels: Labels of the failed node and of the ancestors that passed the failure on.
     """
 
-    reason: str
-    message: str
-    source: str
-    path: str
-    labels: tuple[str, ...] = ()
-
-    def __str__(self) -> str:
-        return f"{self.source}.{self.reason}"
-
-    def matches(self, reasons: Iterable[Reason]) -> bool:
-        """Return True if one of `reasons` denotes this failure."""
-        sources = (self.source, *self.labels)
-        return any(reason.reason == self.reason and reason.source in sources for reason in reasons)
-
-    def with_label(self, label: str) -> Failure:
-        """Return the failure with one more label, of a node that passed the failure on; "" adds no label."""
-        return replace(self, labels=(*self.labels, label)) if label else self
+    message: str = field(kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -78,6 +58,7 @@ class TreeNode(Behaviour):
         path: Unique path from the root of the tree.
         label: Label of the node in the mission, or "".
         blackboard: Variables of the run.
+        failure: The failure while the status is FAILURE; else None. `feedback_message` contains its text.
         subtree_names: Names of the subtrees with this node as root, the outermost first.
     """
 
@@ -88,18 +69,20 @@ class TreeNode(Behaviour):
         self.path = context.path
         self.label = context.label
         self.blackboard = context.blackboard
-        self._failure: Failure | None = None
+        self.failure: Failure | None = None
         self._emit_without_parent = context.emit
 
-    @property
-    def failure(self) -> Failure | None:
-        """The failure while the status is FAILURE; else None. `feedback_message` contains its text."""
-        return self._failure
+    def _begin(self) -> None:
+        """Set the status RUNNING, and remove the failure of the previous activation."""
+        self.failure = None
+        self.feedback_message = ""
+        self.status = Status.RUNNING
 
-    @failure.setter
-    def failure(self, failure: Failure | None) -> None:
-        self._failure = failure
-        self.feedback_message = f"{failure}: {failure.message}" if failure else ""
+    def fail(self, failure: Failure) -> Status:
+        """End with a failure: set `failure` with the label of this node, and return FAILURE."""
+        self.failure = failure.with_label(self.label)
+        self.feedback_message = f"{failure}: {failure.message}"
+        return Status.FAILURE
 
     def emit(self, event: Event) -> None:
         """Emit an event of this node or of a node below, through all ancestors."""
@@ -284,9 +267,8 @@ class SkillLeaf(TreeNode):
             run = self._start() if self._run is None else self._run
             has_succeeded = run.step()
         except SkillFailed as error:
-            self.failure = Failure(error.reason, error.message, self.skill_name, self.path)
-            self.failure = self.failure.with_label(self.label)
-            self._end(Status.FAILURE, error.reason, error.message)
+            status = self.fail(Failure(self.skill_name, error.reason, self.path, message=error.message))
+            self._end(status, error.reason, error.message)
         except Exception as error:
             message = str(error) if isinstance(error, Fault) else f"{type(error).__name__}: {error}"
             raise self._end_with_fault(message) from error
@@ -314,8 +296,7 @@ class SkillLeaf(TreeNode):
         self._end(new_status)
 
     def _start(self) -> SkillRun:
-        self.failure = None
-        self.status = Status.RUNNING
+        self._begin()
         inputs = self._read_inputs()
         self._item = self._find_item(inputs)
         self.emit(NodeStarted(self.path, self.skill_name, self._item))

@@ -36,9 +36,6 @@ _REGISTERED_NAMES = frozenset(Path(__file__).with_name("btcpp_names.txt").read_t
 _TYPE_NAMES: Mapping[object, str] = {bool: "bool", int: "int", float: "double", str: "std::string"}
 """Names of types in C++."""
 
-_Declaration = Param | Port | Key
-"""Declaration of a port in the file: a param or port of a skill, a key, or a `Port` for an argument."""
-
 
 def format_btcpp(mission: Mission, skills: Mapping[str, type[Skill]]) -> str:
     """Return the XML of a mission, which must have no errors; values replace references to its params."""
@@ -96,7 +93,7 @@ class _Exporter:
         values = {name: _format_pointer(name) for name in skill.ports}
         values |= {name: _format(setting.value) for name, setting in node.settings.items()}
         kind = "Condition" if skill.is_condition else "Action"
-        declarations: tuple[_Declaration, ...] = (*skill.params.values(), *skill.ports.values())
+        declarations: tuple[Param | Port, ...] = (*skill.params.values(), *skill.ports.values())
         return self._add_element(parent, kind, node.skill, declarations, values)
 
     def _add_subtree_reference(self, parent: Element, node: SubtreeNode) -> Element:
@@ -147,8 +144,8 @@ class _Exporter:
     def _add_custom_node(self, parent: Element, name: str, part: KeyOwner) -> Element:
         """Add a custom node for `part`, which is a control node, or a section that contains nodes."""
         keys = part.keys.values()
-        ports = [key for key in keys if not key.has_nodes]
-        values = {key.name: _format(value) for key, value in part.list_values() if key in ports}
+        ports = [_make_port(key) for key in keys if not key.has_nodes]
+        values = {key.name: _format(value) for key, value in part.list_values() if not key.has_nodes}
         kinds = [(key.value_type, key.is_required) for key in keys if key.has_nodes]
         kind = "Decorator" if kinds == [(Child, True)] else "Control"
         element = self._add_element(parent, kind, name, ports, values)
@@ -165,7 +162,7 @@ class _Exporter:
         return element
 
     def _add_element(
-        self, parent: Element, kind: str, name: str, ports: Iterable[_Declaration], values: Mapping[str, str]
+        self, parent: Element, kind: str, name: str, ports: Iterable[Param | Port], values: Mapping[str, str]
     ) -> Element:
         """Add a node with the values of its ports, and the model of the node if it is missing."""
         is_subtree = kind == "SubTree"
@@ -207,21 +204,19 @@ def _format(value: KeyValue) -> str:
     raise TypeError(f"{value} cannot be written as the value of a port")
 
 
-def _make_port_model(port: _Declaration) -> Element:
-    if isinstance(port, Key):
-        value_type = port.value_type
-        default = None if port.is_required else port.field.default
-        doc = port.field.description
-        is_output = port.value_type is VariableName
-    else:
-        value_type = port.type
-        default = port.default
-        doc = port.doc
-        is_output = getattr(port, "direction", None) is Direction.OUT
+def _make_port(key: Key) -> Port:
+    """Return the port of a custom node for a key."""
+    direction = Direction.OUT if key.value_type is VariableName else Direction.IN
+    default = ... if key.is_required else key.field.default
+    return Port(key.name, key.value_type, direction, default, "", key.field.description or "")
+
+
+def _make_port_model(port: Param | Port) -> Element:
+    is_output = isinstance(port, Port) and port.direction is Direction.OUT
     model = Element("output_port" if is_output else "input_port", name=_escape(port.name))
-    attributes = {"type": _TYPE_NAMES.get(value_type), "default": _format_constant(default)}
+    attributes = {"type": _TYPE_NAMES.get(port.type), "default": _format_constant(port.default)}
     model.attrib |= {name: text for name, text in attributes.items() if text}
-    model.text = doc
+    model.text = port.doc
     return model
 
 

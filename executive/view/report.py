@@ -20,7 +20,7 @@ from urllib.parse import quote
 import yaml
 from markupsafe import Markup
 
-from executive.errors import ExecutiveError
+from executive.errors import ExecutiveError, InputError, explain_os_errors
 from executive.mission.outline import OutlineNode
 from executive.mission.yaml_files import get_shipped_folder
 from executive.perception.evidence import describe_unknown_labels
@@ -28,7 +28,7 @@ from executive.record.diagnosis import list_labelled_sentences, make_resume_comm
 from executive.record.journal import find_run_end, find_run_start, read_journal
 from executive.record.picture_recorder import PALETTE, split_picture_name
 from executive.record.result import is_resumable, list_requests, read_result
-from executive.record.run_directory import RunDirectory, convert_os_errors, read_tree, write_atomically
+from executive.record.run_directory import RunDirectory, read_tree, write_atomically
 from executive.record.timeline import Activation, Timeline, find_last_failure, format_counts, group_by_node
 from executive.view.svg import NodeResult, make_svg
 from executive.view.terminal import describe_place_on_table, format_repeat_command
@@ -142,7 +142,7 @@ def write_report(path: Path) -> Path:
     file = RunDirectory(path).report
     page = render_report(ReportData(path))
     advice = "copy the run directory to a writable folder, and write the report of the copy"
-    with convert_os_errors(f'write the report "{file}"', advice):
+    with explain_os_errors(InputError, f'cannot write the report "{file}"', advice):
         write_atomically(file, page)
     return file
 
@@ -357,13 +357,12 @@ def draw_lanes(timeline: Timeline, nodes: Sequence[OutlineNode]) -> str:
             name_x = _LEVEL_INDENT * node.depth
             axis_x = max(axis_x, name_x + estimate_text_width(name, _NAME_SIZE) + _NAME_MARGIN)
             lanes.append((node, name, name_x, [_make_bar(node, group) for group in groups]))
-    tick_times = _choose_tick_times(end_time, scale)
     return render_template(
         "timeline.svg",
         axis_x=axis_x,
         axis_length=axis_length,
         scale=scale,
-        tick_times=tick_times,
+        tick_times=_choose_tick_times(end_time, scale),
         lanes=lanes,
     )
 

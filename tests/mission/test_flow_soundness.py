@@ -282,7 +282,7 @@ def test_what_happens_was_foreseen(tree: Tree, seed: int) -> None:
             assert state is not None, "the checker says that this cannot succeed"
         else:
             failure = root.failure
-            ends = {(f.source, f.reason, f.origin): after for f, after in flow.root_flow.failures.items()}
+            ends = {(f.source, f.reason, f.path): after for f, after in flow.root_flow.failures.items()}
             key = failure.source, failure.reason, failure.path
             assert key in ends, f"the checker has not foreseen {key}"
             assert str(failure) in [

@@ -39,7 +39,7 @@ class Leaf(Behaviour):
             return Status.SUCCESS
         if step == "!":
             raise RuntimeError("broken")
-        self.failure = Failure(step, f"{step} happened", self.name, self.path)
+        self.failure = Failure(self.name, step, self.path, message=f"{step} happened")
         return Status.FAILURE
 
     def terminate(self, new_status: Status) -> None:

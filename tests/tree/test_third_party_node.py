@@ -25,11 +25,10 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.skill import Seconds
-from executive.tree.flow import (
-    Flow, FlowFunction, FlowState, combine_tool_states, find_end_tool_states, join_states
-)
+from executive.tree.flow import Flow, FlowFunction, FlowState, join_states
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode, NodeBehaviour, PropagatedFailure
+from executive.tree.parallel import combine_tool_states, find_end_tool_states
 
 
 class Race(ControlNode):
