@@ -6,9 +6,9 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
+from executive.tree.blackboard import NodeContext
 from executive.tree.node import ControlNode
 from executive.tree.specification import Node
-from executive.tree.tree_node import NodeContext
 
 
 class Given(Node):

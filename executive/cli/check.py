@@ -118,7 +118,7 @@ def tree_command(
         from executive.mission.outline import make_outline
         from executive.plugins import load_skills
         from executive.record.run_directory import format_tree
-        from executive.tree.tree_node import Blackboard
+        from executive.tree.blackboard import Blackboard
         from executive.view.btcpp import format_btcpp
         from executive.view.svg import make_svg
         from executive.view.text import draw_text, fold_subtrees

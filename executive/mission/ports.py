@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import json
 import math
-import types
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, NoReturn, Union, cast, get_args, get_origin, get_type_hints
@@ -16,7 +15,7 @@ from executive.behaviours import find_mission_type
 from executive.cell.objects import KnownItem, RefersTo
 from executive.mission.findings import describe_validation_error, describe_value, suggest_word
 from executive.skill import Direction, Param, Port, Skill
-from executive.tree.keys import Elements, Key
+from executive.tree.keys import Elements, Key, is_union
 from executive.tree.node import ControlNode
 from executive.tree.specification import Constant, Node, Reference, SkillNode, Span, VariableName
 
@@ -88,11 +87,6 @@ def describe_type(declared_type: object) -> str:
             return "a list"
         return f"a list of {describe_type(element_type).removeprefix('a ')}"
     return getattr(declared_type, "__name__", str(declared_type))
-
-
-def is_union(declared_type: object) -> bool:
-    """Return True if a type is a union of types."""
-    return get_origin(declared_type) in (Union, types.UnionType)
 
 
 def _get_class(declared_type: object) -> type:

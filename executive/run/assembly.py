@@ -22,7 +22,8 @@ from executive.replay.replayed_cell import InputLog, Interruption, ReplayedCell
 from executive.run.operator import ScriptedOperator, TerminalOperator
 from executive.run.run import LookaheadPlanner, Run, brake_arm
 from executive.skill import Skill
-from executive.tree.tree_node import Blackboard, SkillLeaf, halt
+from executive.tree.blackboard import Blackboard
+from executive.tree.tree_node import SkillLeaf, halt
 
 
 @dataclass(frozen=True)

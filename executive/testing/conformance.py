@@ -25,11 +25,12 @@ from executive.cell.workcell import CellOptions
 from executive.cells.fake import SHIPPED_ROUTES, FakeCell
 from executive.cells.without_hardware import SilentOperator
 from executive.manipulation.motions import capture_and_detect, complete, localize_and_observe
-from executive.mission.ports import describe_type, find_element_type, is_assignable, is_union
+from executive.mission.ports import describe_type, find_element_type, is_assignable
 from executive.skill import ANY, EMPTY, HALT, HOLDING, Direction, Param, Port, Skill
 from executive.testing import faults
 from executive.testing.faulty_cell import FaultyCell, ScheduledFault
 from executive.testing.run_skill import SkillResult, run_skill
+from executive.tree.keys import is_union
 
 MAX_TICKS = int(60.0 / STEP)
 """Maximum duration of a skill [control steps]; no skill needs as long on the fake cell."""

@@ -110,7 +110,7 @@ class Key:
         constraints = [mark for mark in self.field.metadata if not isinstance(mark, Key)]
         if max_value is not None:
             constraints.append(Field(le=max_value))
-        members = get_args(self.value_type) if _is_union(self.value_type) else (self.value_type,)
+        members = get_args(self.value_type) if is_union(self.value_type) else (self.value_type,)
         bounded = [
             # A bound applies to numbers only, not to the words of a `Literal`.
             member if get_origin(member) is Literal or not constraints else Annotated[(member, *constraints)]
@@ -310,7 +310,7 @@ def _are_identical(values: Iterable[object], others: Iterable[object]) -> bool:
 
 def _find_type(annotation: object) -> object:
     """Return the type of a key for the annotation of its field, which lacks the marks of `Annotated`."""
-    if _is_union(annotation) and types.NoneType in get_args(annotation):
+    if is_union(annotation) and types.NoneType in get_args(annotation):
         annotation = Union[tuple(one for one in get_args(annotation) if one is not types.NoneType)]  # noqa: UP007
     if annotation is Node:
         return Child
@@ -321,8 +321,9 @@ def list_member_types(declared_type: object) -> Sequence[object]:
     """Return the types of the elements of a tuple type, of the members of a union, or the type itself."""
     if get_origin(declared_type) is tuple:
         return list_member_types(get_args(declared_type)[0])
-    return get_args(declared_type) if _is_union(declared_type) else (declared_type,)
+    return get_args(declared_type) if is_union(declared_type) else (declared_type,)
 
 
-def _is_union(declared_type: object) -> bool:
+def is_union(declared_type: object) -> bool:
+    """Return True if a type is a union of types."""
     return get_origin(declared_type) in (Union, types.UnionType)

@@ -10,6 +10,7 @@ from py_trees.common import Status
 from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.skill import ANY, EMPTY, HOLDING
+from executive.tree.blackboard import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.keys import Elements, KeySection, key
 from executive.tree.node import (
@@ -21,7 +22,6 @@ from executive.tree.node import (
     PropagatedFailure,
 )
 from executive.tree.specification import Child, Node, Reason, VariableName, format_reasons
-from executive.tree.tree_node import Failure
 
 NodeRun: TypeAlias = Generator[None, None, Failure | None]
 """Generator that returns a failure, or None for success. A `yield` ends the tick."""

@@ -20,10 +20,11 @@ from executive.errors import Fault, InputError
 from executive.events import BranchChosen, NodeEnded, NodeStarted
 from executive.plugins import PluginEntry, list_entries
 from executive.skill import Skill
+from executive.tree.blackboard import Failure, NodeContext
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.keys import KeyOwner
 from executive.tree.specification import Node, Reason
-from executive.tree.tree_node import Failure, NodeContext, TreeNode, halt
+from executive.tree.tree_node import TreeNode, halt
 
 
 @dataclass(frozen=True)

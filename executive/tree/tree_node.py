@@ -1,8 +1,7 @@
-"""Base class of all nodes of a tree, the leaf that runs a skill, failures, the blackboard, and halting."""
+"""Base class of all nodes of a tree, the leaf that runs a skill, and halting."""
 
 from __future__ import annotations
 
-from collections import UserDict
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -12,43 +11,11 @@ from pydantic import JsonValue
 
 from executive.cell.json_values import to_json_or_type_name
 from executive.cell.objects import Target
-from executive.cell.protocols import Cell, Clock, Ledger
+from executive.cell.protocols import Cell
 from executive.errors import Fault
-from executive.events import Emit, Event, NodeEnded, NodeStarted, discard_event
+from executive.events import Event, NodeEnded, NodeStarted
 from executive.skill import Direction, Skill, SkillFailed, get_attribute_name
-from executive.tree.flow import PossibleFailure
-
-
-@dataclass(frozen=True)
-class Failure(PossibleFailure):
-    """A failure that nodes pass on to their parents; `reason` is one of the declared reasons of its source.
-
-    Attributes:
-        message: One sentence with the measured values that explain the failure.
-    """
-
-    message: str = field(kw_only=True)
-
-
-@dataclass(frozen=True)
-class NodeContext:
-    """Path and label of a node, and the parts of the run that the node uses.
-
-    Attributes:
-        path: Unique path from the root of the tree.
-        clock: Clock of the run.
-        ledger: Ledger of the run.
-        blackboard: Variables of the run.
-        label: Label of the node in the mission, or "".
-        emit: Function that emits the events of the node.
-    """
-
-    path: str
-    clock: Clock
-    ledger: Ledger
-    blackboard: Blackboard
-    label: str = ""
-    emit: Emit = discard_event
+from executive.tree.blackboard import Failure, NodeContext
 
 
 class TreeNode(Behaviour):
@@ -113,18 +80,6 @@ def halt(root: Behaviour) -> list[str]:
                 # A node whose clean-up failed counts as ended: no node is halted twice.
                 node.status = Status.INVALID
     return problems
-
-
-class Blackboard(UserDict[str, object]):
-    """The variables of one run by name; a skill reads inputs at its start and writes outputs on success.
-
-    Every run has its own blackboard, so that one process can execute several missions. All subtrees share
-    the blackboard. Arguments of subtrees are no variables: values replace them before the tree is built.
-    """
-
-    def describe_missing(self, variable: str) -> str:
-        """Return a text about a variable that a node reads too early, for the end of a sentence."""
-        return f"${variable}, which no node has written yet; written so far: {', '.join(self) or 'nothing'}"
 
 
 class SkillRun:

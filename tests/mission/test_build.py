@@ -14,7 +14,7 @@ from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission
 from executive.mission.outline import make_outline
 from executive.skill import Skill
-from executive.tree.tree_node import Blackboard
+from executive.tree.blackboard import Blackboard
 
 HEAD = "mission: m\ncell: cells/small.yaml\n"
 

@@ -10,6 +10,7 @@ from typing import Any
 from hand_set_clock import Clock
 
 from executive.events import Emit, discard_event
+from executive.tree.blackboard import Blackboard, NodeContext
 from executive.tree.decorators import Invert, Succeed, Timeout
 from executive.tree.loops import CounterLimits, ForEach, Repeat, While
 from executive.tree.parallel import Parallel
@@ -17,7 +18,6 @@ from executive.tree.retry import Backoff, Catch, Retry, TryCatch
 from executive.tree.sequences import Fallback
 from executive.tree.sequences import Sequence as SequenceNode
 from executive.tree.specification import Reason, VariableName
-from executive.tree.tree_node import Blackboard, NodeContext
 from tests.node_behaviours import build, specify
 
 Names = Iterable[tuple[str, str]]

@@ -12,7 +12,7 @@ from py_trees.common import Status
 from scripted_leaf import Leaf
 
 from executive.events import Event
-from executive.tree.tree_node import Blackboard, NodeContext
+from executive.tree.blackboard import Blackboard, NodeContext
 
 LEDGER: Any = None
 """The nodes of these tests read no items."""

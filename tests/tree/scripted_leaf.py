@@ -5,7 +5,7 @@ from __future__ import annotations
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.tree_node import Failure
+from executive.tree.blackboard import Failure
 
 
 class Leaf(Behaviour):

@@ -13,8 +13,9 @@ from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.events import BranchChosen
 from executive.skill import In, Skill, port
+from executive.tree.blackboard import Blackboard
 from executive.tree.loops import ForEach
-from executive.tree.tree_node import Blackboard, SkillLeaf, Wiring, halt
+from executive.tree.tree_node import SkillLeaf, Wiring, halt
 
 
 class Use(Skill):

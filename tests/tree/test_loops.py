@@ -13,12 +13,12 @@ from py_trees.common import Status
 
 from executive.errors import Fault
 from executive.events import BranchChosen, NodeEnded
+from executive.tree.blackboard import NodeContext
 from executive.tree.keys import key
 from executive.tree.loops import GeneratorBehaviour, NodeRun
 from executive.tree.node import ControlNode
 from executive.tree.retry import Backoff, Retry
 from executive.tree.specification import Child
-from executive.tree.tree_node import NodeContext
 from tests.node_behaviours import build
 
 

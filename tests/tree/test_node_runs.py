@@ -25,9 +25,10 @@ from py_trees.common import Status
 from scripted_leaf import Leaf
 
 from executive.events import BranchChosen, Event
+from executive.tree.blackboard import Blackboard
 from executive.tree.loops import ForEach
 from executive.tree.retry import TryCatch
-from executive.tree.tree_node import Blackboard, halt
+from executive.tree.tree_node import halt
 
 LOST, EMPTY = [("A", "lost")], [("A", "empty")]
 
