@@ -49,6 +49,17 @@ DEFINITIONS = {
     "ParamKeys": "param", "SubtreeKeys": "subtree",
 }  # fmt: skip
 """Values in words, by the definition in the schema of missions."""
+VALUES_IN_WORDS = {
+    "library": "file, or list of files",
+    "routes": "classes with bins",
+    "quotas": "bins with numbers, or with numbers by class",
+    "trees": "names with subtrees",
+    "args": "list of names, or names with values",
+    "with": "names with values",
+    "until": "reason, section, or list of both",
+    "catch": "section, or list of sections",
+}
+"""Values of keys whose schemas are too long for a sentence."""
 PARAM_TYPES = {"float": "number", "int": "whole number", "str": "text", "str | None": "text"}
 """Types of the params of skills in words."""
 
@@ -89,7 +100,8 @@ def _mission_files() -> Iterator[str]:
         rows = []
         for name, field in model.get_keys().items():
             default = _default(... if field.is_required() else "")
-            rows.append([f"`{name}`", _value(properties[name]), default, field.description or ""])
+            value = VALUES_IN_WORDS.get(name) or _value(properties[name])
+            rows.append([f"`{name}`", value, default, field.description or ""])
         yield _table(KEYS, rows)
 
 
@@ -116,7 +128,7 @@ def _key_rows(owner: str, node: type[KeyOwner], prefix: str = "") -> Iterator[li
         if key.shorthand:
             written = (f"{written}, or " if node.inner_keys else "") + f"the value of `{owner}`"
         schema = key.make_validator().json_schema() if key.is_constant else make_key_schema(key, {})
-        value = _value(schema)
+        value = VALUES_IN_WORDS.get(name) or _value(schema)
         value = value.replace("node", "condition") if key.requires_conditions else value
         value += f", at most {key.max_count}" if key.max_count else ""
         default = ... if key.is_required else key.field.default
