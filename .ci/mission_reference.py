@@ -50,7 +50,6 @@ DEFINITIONS = {
 }  # fmt: skip
 """Values in words, by the definition in the schema of missions."""
 VALUES_IN_WORDS = {
-    "library": "file, or list of files",
     "routes": "classes with bins",
     "quotas": "bins with numbers, or with numbers by class",
     "trees": "names with subtrees",
