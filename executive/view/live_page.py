@@ -220,7 +220,7 @@ class LivePage:
         with self._catch_errors():
             if self._run.control.is_paused != self._was_paused:
                 self._was_paused = not self._was_paused
-                self._enqueue(PageChange(is_paused=self._was_paused))
+                self._enqueue(PageChange(is_paused=self._was_paused, clock=self._run.now))
             if self._can_send_images:
                 poses = None if self._visuals is None else encode_poses(self._visuals.poses())
                 self._enqueue(PageChange(clock=self._run.now, body_poses=poses))
