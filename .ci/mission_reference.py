@@ -11,20 +11,20 @@ from typing import Any
 
 import yaml
 
+from executive.behaviours import load_skills
 from executive.cell.config import CellConfig
 from executive.cell.device_config import Section
-from executive.cells.sim.scene import SceneConfig
 from executive.cli.main import main as command_line
 from executive.cli.skills import Declaration, collect_declarations
-from executive.mission.findings import MEANING_BY_CODE
+from executive.drivers.sim.scene import SceneConfig
 from executive.mission.grammar import LibraryKeys, MissionKeys, NodeKeys, ParamKeys, SubtreeKeys, UseKeys
 from executive.mission.schema import Schema, make_key_schema, make_schema, make_type_schema
-from executive.mission.yaml_files import list_shipped_missions
 from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.perception.detectors.noisy import NoisyOptions
 from executive.perception.detectors.rfdetr import RfdetrOptions
 from executive.perception.detectors.roboflow.detector import RoboflowOptions
-from executive.plugins import load_skills
+from executive.text.findings import MEANING_BY_CODE
+from executive.text.yaml_files import list_shipped_missions
 from executive.tree.keys import KeyOwner
 from executive.tree.node import load_control_nodes
 

@@ -1,7 +1,8 @@
-"""Behaviours of py_trees as skills, with a blackboard of py_trees for each run."""
+"""Installed skills, and behaviours of py_trees as skills, with a blackboard of py_trees for each run."""
 
 from __future__ import annotations
 
+import difflib
 import inspect
 import re
 import threading
@@ -9,8 +10,20 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
 from functools import cache, partial
+from importlib import import_module
 from types import NoneType, UnionType
-from typing import Any, ClassVar, Literal, TypeGuard, Union, cast, get_args, get_origin, get_type_hints
+from typing import (
+    Any,
+    ClassVar,
+    Literal,
+    TypeAlias,
+    TypeGuard,
+    Union,
+    cast,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 from weakref import WeakKeyDictionary
 
 from py_trees.behaviour import Behaviour
@@ -21,6 +34,7 @@ from py_trees.ports import PortInformation, PortsMixin
 
 from executive.cell.protocols import BehaviourStep, Cell, Clock, Steps
 from executive.errors import Fault, InputError
+from executive.plugins import CLASS_PATH, list_entries
 from executive.skill import Direction, Param, Port, Skill, get_attribute_name, param
 
 _PLAIN_TYPES = (str, int, float, bool, NoneType, list, tuple, dict, set, frozenset, Any)
@@ -335,3 +349,64 @@ def _stop_and_shut_down(behaviour: Behaviour) -> None:
         node.shutdown()
     if errors:
         raise errors[0]
+
+
+SKILL_GROUP = "executive.skills"
+"""Entry-point group of skills."""
+Skills: TypeAlias = Mapping[str, type[Skill]]
+"""Installed skills by name."""
+PY_TREES_MODULES = ("py_trees.behaviours", "py_trees.timers")
+"""Modules of py_trees whose behaviours a mission may use."""
+
+
+def load_skills() -> dict[str, type[Skill]]:
+    """Return the classes of all registered skills, by name; a behaviour of py_trees becomes a skill.
+
+    Raises:
+        InputError: Two packages register the same name, an entry is not a skill or cannot be loaded, or the
+            pyproject.toml of the project in the working directory is invalid.
+    """
+    entries = list_entries(SKILL_GROUP, "skill").items()
+    return {name: _convert_to_skill(name, entry.value, entry.load()) for name, entry in entries}
+
+
+def load_behaviour(path: str) -> type[Skill]:
+    """Return the behaviour of py_trees at `module:Class` as a skill with the name of the class.
+
+    A mission cannot execute code: the module must belong to py_trees, or contain a registered skill. The
+    function `load_skills` imports the modules of all registered skills anyway.
+
+    Raises:
+        InputError: The path is malformed, the module is not permitted, or the class cannot be used.
+    """
+    if CLASS_PATH.fullmatch(path) is None:
+        raise InputError(f'"{path}" is no import path; write, for example, py_trees.behaviours:TickCounter')
+    module, _, name = path.partition(":")
+    entries = list_entries(SKILL_GROUP, "skill").values()
+    if module not in {*PY_TREES_MODULES, *(entry.value.partition(":")[0] for entry in entries)}:
+        raise InputError(
+            f'a mission may not import "{module}"; it may name classes of {" and ".join(PY_TREES_MODULES)}, '
+            "and of modules that register a skill"
+        )
+    members = vars(import_module(module))
+    behaviour = members.get(name)
+    if getattr(behaviour, "__module__", "") != module:
+        similar = "".join(difflib.get_close_matches(name, members, n=1))
+        suggestion = f' (did you mean "{similar}"?)' if similar else ""
+        raise InputError(f'the module "{module}" defines no class "{name}"{suggestion}')
+    if not (isinstance(behaviour, type) and issubclass(behaviour, Behaviour)):
+        problem = "is not a behaviour of py_trees, a subclass of py_trees.behaviour.Behaviour"
+        raise InputError(f'"{path}" {problem}')
+    return _convert_to_skill(name, path, behaviour)
+
+
+def _convert_to_skill(name: str, path: str, loaded: object) -> type[Skill]:
+    """Return a loaded class if it is a skill, or the skill for a behaviour of py_trees."""
+    if isinstance(loaded, type) and issubclass(loaded, Skill):
+        return loaded
+    if isinstance(loaded, type) and issubclass(loaded, Behaviour):
+        try:
+            return make_behaviour_skill(name, loaded)
+        except InputError as error:
+            raise InputError(f'the behaviour "{name}" ({path}) {error}') from None
+    raise InputError(f'the entry point "{name}" ({path}) is neither a subclass of Skill nor of Behaviour')

@@ -1,11 +1,10 @@
-"""Installed skills, cells, detectors and control nodes, from entry points, and software versions.
+"""Classes that packages register as entry points, and software versions.
 
 The entry points of the project in the working directory are found even if the project is not installed.
 """
 
 from __future__ import annotations
 
-import difflib
 import functools
 import os
 import platform
@@ -15,20 +14,16 @@ import sys
 import traceback
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib import import_module, metadata
+from importlib import metadata
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import Any
 
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
-from py_trees.behaviour import Behaviour
 
-from executive.behaviours import make_behaviour_skill
-from executive.cell.workcell import CellKind
 from executive.errors import InputError, explain_os_errors
-from executive.skill import Skill
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -37,85 +32,10 @@ else:
 
 DISTRIBUTION = "pick-place-executive"
 """Name of the distribution of this project; `executive` in the package index is another project."""
-SKILL_GROUP = "executive.skills"
-"""Entry-point group of skills."""
-CELL_KIND_GROUP = "executive.cells"
-"""Entry-point group of kinds of cells."""
-Skills: TypeAlias = Mapping[str, type[Skill]]
-"""Installed skills by name."""
-PY_TREES_MODULES = ("py_trees.behaviours", "py_trees.timers")
-"""Modules of py_trees whose behaviours a mission may use."""
-_CLASS_PATH = re.compile(r"\w+(\.\w+)*:\w+(\.\w+)*")
+CLASS_PATH = re.compile(r"\w+(\.\w+)*:\w+(\.\w+)*")
 """Import path of a class: `module:Class`."""
 _EXAMPLE_LINE = 'Wave = "my_package.wave:Wave"'
 """Line of a pyproject.toml that registers a class, for error messages."""
-
-
-def load_skills() -> dict[str, type[Skill]]:
-    """Return the classes of all registered skills, by name; a behaviour of py_trees becomes a skill.
-
-    Raises:
-        InputError: Two packages register the same name, an entry is not a skill or cannot be loaded, or the
-            pyproject.toml of the project in the working directory is invalid.
-    """
-    entries = list_entries(SKILL_GROUP, "skill").items()
-    return {name: _convert_to_skill(name, entry.value, entry.load()) for name, entry in entries}
-
-
-def load_behaviour(path: str) -> type[Skill]:
-    """Return the behaviour of py_trees at `module:Class` as a skill with the name of the class.
-
-    A mission cannot execute code: the module must belong to py_trees, or contain a registered skill. The
-    function `load_skills` imports the modules of all registered skills anyway.
-
-    Raises:
-        InputError: The path is malformed, the module is not permitted, or the class cannot be used.
-    """
-    if _CLASS_PATH.fullmatch(path) is None:
-        raise InputError(f'"{path}" is no import path; write, for example, py_trees.behaviours:TickCounter')
-    module, _, name = path.partition(":")
-    entries = list_entries(SKILL_GROUP, "skill").values()
-    if module not in {*PY_TREES_MODULES, *(entry.value.partition(":")[0] for entry in entries)}:
-        raise InputError(
-            f'a mission may not import "{module}"; it may name classes of {" and ".join(PY_TREES_MODULES)}, '
-            "and of modules that register a skill"
-        )
-    members = vars(import_module(module))
-    behaviour = members.get(name)
-    if getattr(behaviour, "__module__", "") != module:
-        similar = "".join(difflib.get_close_matches(name, members, n=1))
-        suggestion = f' (did you mean "{similar}"?)' if similar else ""
-        raise InputError(f'the module "{module}" defines no class "{name}"{suggestion}')
-    if not (isinstance(behaviour, type) and issubclass(behaviour, Behaviour)):
-        problem = "is not a behaviour of py_trees, a subclass of py_trees.behaviour.Behaviour"
-        raise InputError(f'"{path}" {problem}')
-    return _convert_to_skill(name, path, behaviour)
-
-
-def _convert_to_skill(name: str, path: str, loaded: object) -> type[Skill]:
-    """Return a loaded class if it is a skill, or the skill for a behaviour of py_trees."""
-    if isinstance(loaded, type) and issubclass(loaded, Skill):
-        return loaded
-    if isinstance(loaded, type) and issubclass(loaded, Behaviour):
-        try:
-            return make_behaviour_skill(name, loaded)
-        except InputError as error:
-            raise InputError(f'the behaviour "{name}" ({path}) {error}') from None
-    raise InputError(f'the entry point "{name}" ({path}) is neither a subclass of Skill nor of Behaviour')
-
-
-def load_cell_kind(name: str) -> CellKind:
-    """Return the class that builds the cells of the kind `name`.
-
-    Raises:
-        InputError: No package registers this kind, or its class cannot be loaded.
-    """
-    entries = list_entries(CELL_KIND_GROUP, "kind of cell")
-    if name not in entries:
-        installed = ", ".join(sorted(entries)) or "none"
-        raise InputError(f'no installed package offers cells of kind "{name}"; installed: {installed}')
-    cell_kind: CellKind = entries[name].load()
-    return cell_kind
 
 
 @dataclass(frozen=True)
@@ -245,7 +165,7 @@ class Project:
         if not isinstance(entries, dict):
             raise InputError(f"{location} is not a table; write lines like {_EXAMPLE_LINE} below it")
         for name, value in entries.items():
-            if not isinstance(value, str) or _CLASS_PATH.fullmatch(value) is None:
+            if not isinstance(value, str) or CLASS_PATH.fullmatch(value) is None:
                 raise InputError(
                     f'{location}: "{name}" is not the import path of a class: {value!r}; '
                     f"write it as {_EXAMPLE_LINE}"

@@ -7,10 +7,10 @@ from contextlib import closing
 from pathlib import Path
 
 from executive.cell.workcell import CellOptions, ResumePoint, Workcell
-from executive.cells.fake import FakeCell
-from executive.cells.without_hardware import SilentOperator
+from executive.drivers.fake import FakeCell
 from executive.events import discard_event
 from executive.mission.load import LoadedMission
+from executive.station.without_hardware import SilentOperator
 from executive.testing.oracle import WorldAccess
 
 SETTLING_STEPS = 240

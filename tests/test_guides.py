@@ -14,20 +14,21 @@ import pytest
 from click.testing import CliRunner
 from guide_blocks import GUIDES, ROOT, TUTORIAL, blocks, files, read, shown, transcripts
 
-from executive.cells.fake import FakeCell
-from executive.cells.sim.scene import (
+from executive.behaviours import load_skills
+from executive.cell.workcell import load_cell_kind
+from executive.cli.main import main
+from executive.drivers.fake import FakeCell
+from executive.drivers.sim.scene import (
     load_scene,
 )
-from executive.cli.main import main
 from executive.events import Event
 from executive.mission.cell_file import load_cell
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.schema import make_mission_schema
-from executive.mission.yaml_files import list_shipped_missions, parse_yaml
-from executive.plugins import load_cell_kind, load_skills
 from executive.run.assembly import RunOptions, assemble
+from executive.text.findings import Source
+from executive.text.yaml_files import list_shipped_missions, parse_yaml
 from executive.tree.node import load_control_nodes
-from executive.tree.specification import Source
 
 LONGEST = 300.0
 """Time on the run's clock within which every mission shown is done on the fake cell [s]."""

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from executive.behaviours import load_behaviour, load_skills
+from executive.cell.workcell import load_cell_kind
 from executive.errors import InputError
 from executive.perception.detectors.detector_registry import find_detector_kinds
-from executive.plugins import list_entries, load_behaviour, load_cell_kind, load_skills
+from executive.plugins import list_entries
 
 Write = Callable[..., Path]
 Install = Callable[[str, str], None]

@@ -24,13 +24,15 @@ from packaging.utils import canonicalize_name
 
 import executive
 from executive import plugins
+from executive.behaviours import SKILL_GROUP
 from executive.campaign.jobs import SweepJob
 from executive.campaign.results import RunRecord
+from executive.cell.workcell import CELL_KIND_GROUP
 from executive.errors import InputError, explain_os_errors
-from executive.mission.yaml_files import find_mission, get_shipped_folder
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.detectors.envelope import MEASUREMENT_SUFFIX
 from executive.record.run_directory import FOLDER_ADVICE, make_unique_folder
+from executive.text.yaml_files import find_mission, get_shipped_folder
 from executive.tree.node import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
 
 if TYPE_CHECKING:
@@ -42,7 +44,7 @@ TEXT_SUFFIXES = (".yaml", ".yml", ".urdf", ".obj", ".mtl")
 """Suffixes of files that name further files: libraries, cells, weights, labels, meshes and textures."""
 _FILE_NAME_PATTERN = re.compile(r""""([^"\n]+)"|'([^'\n]+)'|([^\s"'<>,\[\]{}]+)""")
 """Pattern of a possible file name in a text: a quoted text or a word."""
-PLUGIN_GROUPS = (plugins.SKILL_GROUP, CONTROL_NODE_GROUP, DETECTOR_GROUP, plugins.CELL_KIND_GROUP)
+PLUGIN_GROUPS = (SKILL_GROUP, CONTROL_NODE_GROUP, DETECTOR_GROUP, CELL_KIND_GROUP)
 """Groups of entry points with which a package extends this project."""
 PROJECT_PACKAGES = ("executive", "skills")
 """Top-level packages of this project, which each worker has."""

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from executive.cell.config import CellConfig, DetectorConfig
-from executive.cells.sim.scene import find_max_object_count, load_scene
+from executive.drivers.sim.scene import find_max_object_count, load_scene
 from executive.errors import InputError, explain_os_errors
 from executive.mission.cell_file import load_cell
-from executive.mission.findings import suggest_choice
-from executive.mission.yaml_files import get_shipped_folder
 from executive.perception.detectors import envelope
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 from executive.perception.localization import CellLocalizer
 from executive.record.run_directory import write_atomically
+from executive.text.findings import suggest_choice
+from executive.text.yaml_files import get_shipped_folder
 from executive.training import evaluate
 from executive.training.dataset import LabelledImage
 from executive.training.evaluate import CellDetector, Mistake

@@ -16,11 +16,11 @@ from itertools import product
 from pathlib import Path
 from typing import TypeVar
 
+from executive.behaviours import load_skills
 from executive.campaign.results import RunRecord, RunRow, SweepSettings, make_record
-from executive.cell.workcell import Workcell
+from executive.cell.workcell import Workcell, load_cell_kind
 from executive.errors import ExecutiveError, InputError
 from executive.mission.load import LoadedMission, load_mission
-from executive.plugins import load_cell_kind, load_skills
 from executive.processes import WorkerPool, kill_workers
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.timeline import Timeline

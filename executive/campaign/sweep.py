@@ -13,16 +13,18 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
+from executive.behaviours import load_skills
 from executive.campaign.jobs import JobOptions, list_jobs, make_fault_record, run_job, run_jobs
 from executive.campaign.results import FILE_NAME, ResultsDatabase, RunRecord, SweepSettings
 from executive.campaign.sweep_summary import SweepResults, summarize_runs
-from executive.cells.sim.scene import load_scene
+from executive.cell.workcell import load_cell_kind
+from executive.drivers.sim.scene import load_scene
 from executive.errors import InputError
 from executive.mission.load import load_mission
-from executive.mission.yaml_files import read_source
 from executive.perception.detectors.envelope import FAKE_KIND, compute_fingerprint
-from executive.plugins import DISTRIBUTION, list_versions, load_cell_kind, load_skills
+from executive.plugins import DISTRIBUTION, list_versions
 from executive.record.run_directory import make_dated_folder
+from executive.text.yaml_files import read_source
 
 SIDES = ("a", "b")
 """Names of the folders of the two sweeps of a comparison."""

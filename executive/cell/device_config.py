@@ -141,7 +141,7 @@ class ArmConfig(Section):
 
     urdf: str = "kuka_iiwa/model.urdf"
     """Model of the arm, in pybullet_data. Another arm needs kinematics in `executive/motion/arms.py` and a
-    model in `executive/cells/sim/world.py`; supported: `kuka_iiwa/model.urdf` (KUKA LBR iiwa 14)."""
+    model in `executive/drivers/sim/world.py`; supported: `kuka_iiwa/model.urdf` (KUKA LBR iiwa 14)."""
     limits: LimitsConfig
     """Joint limits of the arm."""
     poses_deg: dict[Name, tuple[Angle, ...]] = Field(min_length=1)

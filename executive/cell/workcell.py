@@ -10,8 +10,11 @@ from typing import Any, Protocol
 from executive.cell.config import ObjectConfig
 from executive.cell.objects import Quotas
 from executive.cell.protocols import Cell, Ledger, Operator, Routes
+from executive.errors import InputError
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array, Pose
+from executive.plugins import list_entries
+from executive.text.validate import KeyPath
 
 
 @dataclass(frozen=True)
@@ -183,10 +186,6 @@ class CellOptions:
     quotas: Quotas = field(default_factory=dict)
 
 
-KeyPath = tuple[str | int, ...]
-"""Keys on the path from the top level of a cell file to a value, outermost first."""
-
-
 class CellKind(Protocol):
     """Factory of work cells. Each entry point of the group `executive.cells` is such a factory.
 
@@ -251,3 +250,21 @@ def find_innermost_cell(workcell: Workcell) -> Workcell:
     while isinstance(workcell, CellWrapper):
         workcell = workcell.inner
     return workcell
+
+
+CELL_KIND_GROUP = "executive.cells"
+"""Entry-point group of kinds of cells."""
+
+
+def load_cell_kind(name: str) -> CellKind:
+    """Return the class that builds the cells of the kind `name`.
+
+    Raises:
+        InputError: No package registers this kind, or its class cannot be loaded.
+    """
+    entries = list_entries(CELL_KIND_GROUP, "kind of cell")
+    if name not in entries:
+        installed = ", ".join(sorted(entries)) or "none"
+        raise InputError(f'no installed package offers cells of kind "{name}"; installed: {installed}')
+    cell_kind: CellKind = entries[name].load()
+    return cell_kind

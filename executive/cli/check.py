@@ -33,9 +33,10 @@ def check_command(missions: tuple[str, ...], overrides: dict[str, str], as_json:
     """
     with keep_stdout_clean():
         # The imports take 0.3 s, for which `--help` must not wait.
-        from executive.mission.findings import MAX_LISTED_FINDINGS, Finding, MissionError, describe_findings
+        from executive.behaviours import load_skills
+        from executive.cell.workcell import load_cell_kind
         from executive.mission.load import load_mission
-        from executive.plugins import load_cell_kind, load_skills
+        from executive.text.findings import MAX_LISTED_FINDINGS, Finding, MissionError, describe_findings
 
         # The last garbage collection of the process would take 0.1 s. Commands that plan motions need this
         # collection, because ruckig would otherwise report its objects as leaks.
@@ -112,11 +113,11 @@ def tree_command(
     check_usage((len(formats) > 1, conflict_message), (formats and details, redundancy_message))
     with keep_stdout_clean():
         # The imports take half a second, for which `--help` and wrong options must not wait.
+        from executive.behaviours import load_skills
         from executive.events import discard_event
         from executive.mission.build import build_tree
         from executive.mission.load import load_mission
         from executive.mission.outline import make_outline
-        from executive.plugins import load_skills
         from executive.record.run_directory import format_tree
         from executive.tree.blackboard import Blackboard
         from executive.view.btcpp import format_btcpp
@@ -156,8 +157,8 @@ def schema_command(cell: bool, library: bool, journal: bool) -> None:
         raise click.UsageError("--cell, --library and --journal exclude each other; give one of them")
     with keep_stdout_clean():
         # The imports take half a second, for which `--help` and wrong options must not wait.
+        from executive.behaviours import load_skills
         from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
-        from executive.plugins import load_skills
         from executive.record.journal import make_journal_schema
         from executive.tree.node import load_control_nodes
 

@@ -85,8 +85,10 @@ def check_packages() -> Iterator[CheckResult]:
 
 def check_plugins() -> Iterator[CheckResult]:
     """Load all installed skills, kinds of cells and kinds of detectors."""
+    from executive.behaviours import load_skills
+    from executive.cell.workcell import CELL_KIND_GROUP
     from executive.perception.detectors.detector_registry import find_detector_kinds
-    from executive.plugins import CELL_KIND_GROUP, list_entries, load_skills
+    from executive.plugins import list_entries
 
     for entry in (*list_entries(CELL_KIND_GROUP, "kind of cell").values(), *find_detector_kinds().values()):
         entry.load()
@@ -95,9 +97,9 @@ def check_plugins() -> Iterator[CheckResult]:
 
 def check_simulator() -> Iterator[CheckResult]:
     """Load a simulated cell."""
-    from executive.cells.sim.world import World
+    from executive.drivers.sim.world import World
     from executive.mission.cell_file import load_cell
-    from executive.mission.yaml_files import get_shipped_folder
+    from executive.text.yaml_files import get_shipped_folder
 
     World(load_cell(get_shipped_folder() / "cells" / "overhead.yaml"))
     yield CheckResult("ok", "simulator", "loads the cell overhead")

@@ -58,9 +58,10 @@ def run_command(
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from rich.console import Console
 
+        from executive.behaviours import load_skills
         from executive.cell.json_values import to_json
+        from executive.cell.workcell import load_cell_kind
         from executive.mission.load import load_mission
-        from executive.plugins import load_cell_kind, load_skills
         from executive.record.diagnosis import format_diagnosis
         from executive.record.journal import find_run_start, read_journal
         from executive.record.recorded_run import GuardedView, RecordOptions, record_run
@@ -108,7 +109,7 @@ def run_command(
                 if scene is not None:
                     # The import loads the simulator. Only simulated cells read the scene file, but its errors
                     # are reported for every cell.
-                    from executive.cells.sim.scene import load_scene
+                    from executive.drivers.sim.scene import load_scene
 
                     load_scene(scene, loaded_mission.cell_config)
                 if video is not None:
@@ -168,7 +169,7 @@ def replay_command(
     """
     with keep_stdout_clean():
         # The imports take half a second, for which `--help` and wrong options must not wait.
-        from executive.plugins import load_skills
+        from executive.behaviours import load_skills
         from executive.record.journal import read_journal
         from executive.record.replayed_run import replay_run
         from executive.record.run_directory import find_run, read_cell

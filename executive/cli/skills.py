@@ -37,8 +37,8 @@ def skills_command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
     """
     with keep_stdout_clean():
         # The imports take 0.2 s, for which `--help` must not wait.
-        from executive.mission.findings import suggest_choice
-        from executive.plugins import load_skills
+        from executive.behaviours import load_skills
+        from executive.text.findings import suggest_choice
 
         skills = load_skills()
         if name is not None and name not in skills:

@@ -6,15 +6,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from executive.behaviours import Skills
 from executive.cell.config import CellConfig
-from executive.mission.findings import find_similar_word, suggest_choice
 from executive.mission.mission_file import Mission
 from executive.mission.ports import Wire, find_node_wires, find_wires, find_written_variables
-from executive.plugins import Skills
 from executive.skill import Direction, Param, Skill
+from executive.text.findings import Span, find_similar_word, suggest_choice
 from executive.tree.flow import INITIAL_STATE, UNKNOWN_STATE, Flow, FlowState, compute_skill_flow, join_states
 from executive.tree.node import ControlNode, ControlNodes
-from executive.tree.specification import Node, Reference, SkillNode, Span, SubtreeNode
+from executive.tree.specification import Node, Reference, SkillNode, SubtreeNode
 
 
 class FlowAnalysis:

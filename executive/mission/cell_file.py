@@ -14,9 +14,9 @@ from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.objects import BIN_THICKNESS
 from executive.errors import InputError
 from executive.geometry import Array
-from executive.mission.findings import Finding, MissionError, make_error, sort_findings
-from executive.mission.validate import BASE_KEY, KeyPath, find_span, override_cell, validate
-from executive.mission.yaml_files import (
+from executive.text.findings import Finding, MissionError, Source, Span, make_error, sort_findings
+from executive.text.validate import BASE_KEY, KeyPath, find_span, override_cell, validate
+from executive.text.yaml_files import (
     YamlEntry,
     YamlMapping,
     YamlNode,
@@ -29,7 +29,6 @@ from executive.mission.yaml_files import (
     parse_yaml,
     read_source,
 )
-from executive.tree.specification import Source, Span
 
 DETECTORS_KEY = "detectors"
 """Key whose value is merged with the value in the base, detector by detector."""

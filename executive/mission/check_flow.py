@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations
 
 from executive.mission.analysis import CheckContext, FlowAnalysis
-from executive.mission.findings import Finding, make_error, make_warning
 from executive.mission.ports import Wire
 from executive.skill import EMPTY, HOLDING, Direction
+from executive.text.findings import Finding, Span, make_error, make_warning
 from executive.tree.flow import PossibleToolState
 from executive.tree.node import ControlNode
-from executive.tree.specification import Node, SkillNode, Span, SubtreeNode
+from executive.tree.specification import Node, SkillNode, SubtreeNode
 
 
 def find_unreachable(context: CheckContext) -> Iterator[Finding]:

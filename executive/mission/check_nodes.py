@@ -9,20 +9,21 @@ from pydantic import TypeAdapter
 
 from executive.mission import grammar
 from executive.mission.analysis import CheckContext, FlowAnalysis
-from executive.mission.findings import (
+from executive.mission.ports import ValueProblem, convert_constant
+from executive.skill import Skill, list_condition_violations
+from executive.text.findings import (
     Finding,
+    Span,
     describe_value,
     make_error,
     make_warning,
     suggest_choice,
     suggest_word,
 )
-from executive.mission.ports import ValueProblem, convert_constant
-from executive.skill import Skill, list_condition_violations
 from executive.tree.flow import UNKNOWN_NAME, Flow, FlowState, PossibleFailure
 from executive.tree.keys import PREDEFINED_LISTS, KeySection, KeyValue, list_nodes
 from executive.tree.node import ControlNode, NodeFinding
-from executive.tree.specification import Constant, Node, Reason, Reference, SkillNode, Span, SubtreeNode
+from executive.tree.specification import Constant, Node, Reason, Reference, SkillNode, SubtreeNode
 
 
 def check_constants(context: CheckContext) -> Iterator[Finding]:

@@ -16,11 +16,11 @@ from executive.manipulation.tool_goals import MAX_ROLL_DISTANCE
 from executive.mission.analysis import CheckContext
 from executive.mission.cell_file import CellFile
 from executive.mission.check_nodes import check_constant
-from executive.mission.findings import Finding, make_error, make_warning, suggest_choice
 from executive.mission.mission_file import Mission
 from executive.mission.ports import find_literals, find_problem
 from executive.skill import HOLDING, Direction, Param, Port, Skill
-from executive.tree.specification import Constant, Reference, SkillNode, Span
+from executive.text.findings import Finding, Span, make_error, make_warning, suggest_choice
+from executive.tree.specification import Constant, Reference, SkillNode
 
 
 def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:

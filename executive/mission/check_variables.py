@@ -9,7 +9,6 @@ from typing import Any
 from executive.cell.objects import Item
 from executive.mission.analysis import CheckContext
 from executive.mission.check_skills import find_unknown_names
-from executive.mission.findings import Finding, describe_value, make_error, make_warning, suggest_choice
 from executive.mission.ports import (
     Wire,
     describe_type,
@@ -21,9 +20,10 @@ from executive.mission.ports import (
     is_assignable,
 )
 from executive.skill import Direction, Param, Port
+from executive.text.findings import Finding, Span, describe_value, make_error, make_warning, suggest_choice
 from executive.tree.keys import Key
 from executive.tree.node import ControlNode
-from executive.tree.specification import Constant, Node, Reference, SkillNode, Span, SubtreeNode, Value
+from executive.tree.specification import Constant, Node, Reference, SkillNode, SubtreeNode, Value
 
 
 def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:

@@ -10,11 +10,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
-from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
+from executive.behaviours import Skills
 from executive.mission.mission_file import Mission, QuotaKey, Subtree
 from executive.mission.ports import find_node_wires, find_written_variables
-from executive.plugins import Skills
 from executive.skill import Direction
+from executive.text.findings import Finding, Span, find_similar_word, make_error, make_warning, suggest_choice
 from executive.tree.keys import Children, Elements, KeyOwner, KeySection, KeyValue, Part, map_parts
 from executive.tree.node import ControlNode
 from executive.tree.specification import (
@@ -24,7 +24,6 @@ from executive.tree.specification import (
     Node,
     Reference,
     SkillNode,
-    Span,
     SubtreeNode,
     Value,
     VariableName,

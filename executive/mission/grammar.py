@@ -14,8 +14,8 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 from pydantic.fields import FieldInfo
 
-from executive.mission.findings import Finding, make_error, suggest_choice
-from executive.mission.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence, list_scalars
+from executive.text.findings import Finding, Span, make_error, suggest_choice
+from executive.text.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence, list_scalars
 from executive.tree.specification import (
     Child,
     Constant,
@@ -24,7 +24,6 @@ from executive.tree.specification import (
     Reason,
     Reference,
     Setting,
-    Span,
     Value,
 )
 

@@ -10,6 +10,7 @@ from typing import cast
 
 from pydantic import JsonValue
 
+from executive.behaviours import Skills
 from executive.cell.config import CellConfig
 from executive.cell.objects import Quotas
 from executive.cell.workcell import CellKind
@@ -18,22 +19,21 @@ from executive.mission import check_flow, check_nodes, check_skills, check_varia
 from executive.mission.analysis import CheckContext, UnhandledFailure, find_unhandled_failures
 from executive.mission.cell_file import CellFile, read_cell
 from executive.mission.expand import assign_paths, expand
-from executive.mission.findings import Finding, MissionError, make_warning, sort_findings
 from executive.mission.mission_file import Mission, Subtree, parse_library, parse_mission
 from executive.mission.node_parser import NodeParser
-from executive.mission.yaml_files import (
+from executive.perception.camera_model import find_calibration_doubts
+from executive.perception.detectors.envelope import find_unmeasured_detectors
+from executive.skill import Skill
+from executive.text.findings import Finding, MissionError, Source, make_warning, sort_findings
+from executive.text.yaml_files import (
     find_file_below,
     find_mission,
     get_shipped_folder,
     parse_yaml,
     read_source,
 )
-from executive.perception.camera_model import find_calibration_doubts
-from executive.perception.detectors.envelope import find_unmeasured_detectors
-from executive.plugins import Skills
-from executive.skill import Skill
 from executive.tree.node import ControlNodes, load_control_nodes
-from executive.tree.specification import Constant, InvalidNode, LocatedName, Node, Source
+from executive.tree.specification import Constant, InvalidNode, LocatedName, Node
 
 Check = Callable[[CheckContext], Iterator[Finding]]
 """Function that yields the findings of one check."""

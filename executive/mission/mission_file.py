@@ -9,7 +9,6 @@ from typing import Any, cast, get_origin
 
 from pydantic import JsonValue
 
-from executive.mission.findings import suggest_choice
 from executive.mission.grammar import (
     NAME_PATTERN,
     LibraryKeys,
@@ -24,9 +23,10 @@ from executive.mission.grammar import (
 )
 from executive.mission.node_parser import NodeParser
 from executive.mission.ports import ValueProblem, convert_setting, convert_value
-from executive.mission.validate import CELL_PREFIX, make_override_source, parse_override
-from executive.mission.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.skill import Param, param
+from executive.text.findings import suggest_choice
+from executive.text.validate import CELL_PREFIX, make_override_source, parse_override
+from executive.text.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.tree.specification import Constant, InvalidValue, LocatedName, Node, Value
 
 

@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+from executive.behaviours import Skills, load_behaviour
 from executive.errors import InputError
 from executive.mission import grammar
-from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.grammar import NAME_PATTERN, MappingReader, is_empty, read_settings, read_value
-from executive.mission.yaml_files import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
-from executive.plugins import Skills, load_behaviour
 from executive.skill import Skill
+from executive.text.findings import Finding, Span, make_error, suggest_choice
+from executive.text.yaml_files import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
 from executive.tree.keys import (
     Children,
     Key,
@@ -33,7 +33,6 @@ from executive.tree.specification import (
     Reason,
     Reference,
     SkillNode,
-    Span,
     SubtreeNode,
     Value,
     VariableName,

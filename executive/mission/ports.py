@@ -13,11 +13,11 @@ from pydantic import TypeAdapter, ValidationError
 
 from executive.behaviours import find_mission_type
 from executive.cell.objects import KnownItem, RefersTo
-from executive.mission.findings import describe_validation_error, describe_value, suggest_word
 from executive.skill import Direction, Param, Port, Skill
+from executive.text.findings import Span, describe_validation_error, describe_value, suggest_word
 from executive.tree.keys import Elements, Key, is_union
 from executive.tree.node import ControlNode
-from executive.tree.specification import Constant, Node, Reference, SkillNode, Span, VariableName
+from executive.tree.specification import Constant, Node, Reference, SkillNode, VariableName
 
 _DESCRIPTIONS = {
     str: "a text",

@@ -14,11 +14,11 @@ from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema, to_jsonable_python
 
+from executive.behaviours import Skills
 from executive.cell.config import CellConfig
 from executive.mission import grammar
 from executive.mission.grammar import BehaviourKeys, FileKeys, LibraryKeys, MissionKeys, NodeKeys, UseKeys
 from executive.mission.ports import is_plain_type
-from executive.plugins import Skills
 from executive.skill import Direction, Param, Port, Skill
 from executive.tree.keys import Children, Elements, Key, KeyOwner, list_member_types
 from executive.tree.node import ControlNode, ControlNodes

@@ -8,12 +8,12 @@ import numpy as np
 
 from executive.cell.arm import Goal
 from executive.cell.config import CellConfig
-from executive.cell.workcell import KeyPath
 from executive.errors import Unreachable
 from executive.geometry import Array
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.iiwa14_kinematics import IIWA14_JOINT_COUNT, Iiwa14
 from executive.motion.joints import JointLimits, JointRange, Kinematics
+from executive.text.validate import KeyPath
 
 KinematicsFactory = Callable[[float, JointRange, float | None], Kinematics]
 """Function that builds kinematics from tool length [m], joint range, and minimum link distance [m]."""

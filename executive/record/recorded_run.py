@@ -17,7 +17,6 @@ from executive.errors import ExecutiveError
 from executive.events import Observer, TimedEvent
 from executive.mission.load import LoadedMission
 from executive.mission.outline import make_outline
-from executive.mission.yaml_files import read_source
 from executive.record.diagnose import diagnose
 from executive.record.journal import Recorder
 from executive.record.result import Audit, ItemCounts, Result, is_resumable, list_requests, write_result
@@ -25,6 +24,7 @@ from executive.record.run_directory import SCENE_FILE, RunDirectory, format_tree
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
+from executive.text.yaml_files import read_source
 
 
 class View(Protocol):

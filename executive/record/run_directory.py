@@ -18,7 +18,7 @@ from executive.mission.cell_file import CellFile
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.outline import OutlineNode
 from executive.skill import Skill
-from executive.tree.specification import Source
+from executive.text.findings import Source
 
 FOLDER_ADVICE = "name another folder with --runs DIR"
 """Advice if a run directory cannot be made or written."""

@@ -11,17 +11,17 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.cell.protocols import Cell, Operator
-from executive.cell.workcell import CellOptions, ResumePoint, Workcell
-from executive.cells.without_hardware import CellWithoutHardware
+from executive.cell.workcell import CellOptions, ResumePoint, Workcell, load_cell_kind
 from executive.errors import Fault, InputError
 from executive.events import Observer, RequestGiven, RunEnded, RunResumed, RunStarted
 from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission
-from executive.plugins import list_versions, load_cell_kind
+from executive.plugins import list_versions
 from executive.replay.replayed_cell import InputLog, Interruption, ReplayedCell
 from executive.run.operator import ScriptedOperator, TerminalOperator
 from executive.run.run import LookaheadPlanner, Run, brake_arm
 from executive.skill import Skill
+from executive.station.without_hardware import CellWithoutHardware
 from executive.tree.blackboard import Blackboard
 from executive.tree.tree_node import SkillLeaf, halt
 

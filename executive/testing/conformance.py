@@ -22,11 +22,11 @@ from executive.cell.objects import Item, Target
 from executive.cell.protocols import STEP
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import CellOptions
-from executive.cells.fake import SHIPPED_ROUTES, FakeCell
-from executive.cells.without_hardware import SilentOperator
+from executive.drivers.fake import SHIPPED_ROUTES, FakeCell
 from executive.manipulation.motions import capture_and_detect, complete, localize_and_observe
 from executive.mission.ports import describe_type, find_element_type, is_assignable
 from executive.skill import ANY, EMPTY, HALT, HOLDING, Direction, Param, Port, Skill
+from executive.station.without_hardware import SilentOperator
 from executive.testing import faults
 from executive.testing.faulty_cell import FaultyCell, ScheduledFault
 from executive.testing.run_skill import SkillResult, run_skill

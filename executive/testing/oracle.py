@@ -23,11 +23,11 @@ from executive.cell.frame import Detection, Frame
 from executive.cell.objects import UNKNOWN_LABEL
 from executive.cell.protocols import Clock
 from executive.cell.workcell import TrueObject, Workcell, find_innermost_cell
-from executive.cells.fake import FakeCell
-from executive.cells.sim.camera import Image, SimCamera
-from executive.cells.sim.cell import SimCell
-from executive.cells.sim.models import compute_bounding_box, load_mesh
-from executive.cells.sim.world import World
+from executive.drivers.fake import FakeCell
+from executive.drivers.sim.camera import Image, SimCamera
+from executive.drivers.sim.cell import SimCell
+from executive.drivers.sim.models import compute_bounding_box, load_mesh
+from executive.drivers.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import NEAR_PLANE, project

@@ -17,13 +17,13 @@ from typing import Any, cast
 
 from py_trees.visitors import VisitorBase
 
+from executive.behaviours import load_skills
 from executive.cell.protocols import Cell, Steps
 from executive.cell.workcell import Accounts, Workcell, find_innermost_cell
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.events import FaultInjected, NodeEnded, NodeStarted, Observer, RunEnded, TimedEvent
 from executive.mission.load import load_mission
-from executive.plugins import load_skills
 from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run

@@ -23,8 +23,8 @@ from executive.cell.config import CellConfig
 from executive.cell.frame import Box
 from executive.cell.objects import UNKNOWN_LABEL
 from executive.cell.workcell import TrueObject
-from executive.cells.sim import arrangements
-from executive.cells.sim.camera import (
+from executive.drivers.sim import arrangements
+from executive.drivers.sim.camera import (
     CELL_LIGHT,
     Image,
     RenderedImage,
@@ -33,14 +33,14 @@ from executive.cells.sim.camera import (
     get_camera_pose,
     render,
 )
-from executive.cells.sim.models import (
+from executive.drivers.sim.models import (
     compute_bounding_box,
     compute_silhouette_area,
     find_model_errors,
     load_mesh,
 )
-from executive.cells.sim.scene import DECLARED_SCENE, SceneConfig, build_world, spawn_objects
-from executive.cells.sim.world import WOOD_TEXTURE
+from executive.drivers.sim.scene import DECLARED_SCENE, SceneConfig, build_world, spawn_objects
+from executive.drivers.sim.world import WOOD_TEXTURE
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, intersect_plane, project
 from executive.processes import WorkerPool

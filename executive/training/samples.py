@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
 from executive.errors import MAX_QUOTATION_LENGTH, InputError
 from executive.geometry import Array
-from executive.mission.yaml_files import has_outside_link
+from executive.text.yaml_files import has_outside_link
 from executive.training.dataset import (
     MAX_LABEL_FILE_SIZE,
     DatasetEntry,

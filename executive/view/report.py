@@ -22,7 +22,6 @@ from markupsafe import Markup
 
 from executive.errors import ExecutiveError, InputError, explain_os_errors
 from executive.mission.outline import OutlineNode
-from executive.mission.yaml_files import get_shipped_folder
 from executive.perception.evidence import describe_unknown_labels
 from executive.record.diagnosis import list_labelled_sentences, make_resume_command
 from executive.record.journal import find_run_end, find_run_start, read_journal
@@ -30,6 +29,7 @@ from executive.record.picture_recorder import PALETTE, split_picture_name
 from executive.record.result import is_resumable, list_requests, read_result
 from executive.record.run_directory import RunDirectory, read_tree, write_atomically
 from executive.record.timeline import Activation, Timeline, find_last_failure, format_counts, group_by_node
+from executive.text.yaml_files import get_shipped_folder
 from executive.view.svg import NodeResult, make_svg
 from executive.view.terminal import describe_place_on_table, format_repeat_command
 from executive.view.text import estimate_text_width, render_template, wrap_and_truncate

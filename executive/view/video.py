@@ -13,11 +13,11 @@ import numpy as np
 import PIL.Image
 
 from executive.cell.config import CellConfig
-from executive.cells.sim.camera import Image, Light, render
-from executive.cells.sim.rebuild import WorldRebuilder
-from executive.cells.sim.scene import build_initial_world, load_scene
-from executive.cells.sim.tool import SuctionTool
-from executive.cells.world_log import RUN_STEP, read_commands
+from executive.drivers.sim.camera import Image, Light, render
+from executive.drivers.sim.rebuild import WorldRebuilder
+from executive.drivers.sim.scene import build_initial_world, load_scene
+from executive.drivers.sim.tool import SuctionTool
+from executive.drivers.world_log import RUN_STEP, read_commands
 from executive.errors import InputError, explain_os_errors
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import compute_camera_matrix, compute_look_at_pose

@@ -11,12 +11,11 @@ import pytest
 from guide_blocks import blocks
 from py_trees.blackboard import Blackboard
 
-from executive.cells.fake import FakeCell
+from executive.behaviours import load_skills
+from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.events import NodeEnded, TimedEvent
-from executive.mission.findings import MissionError
 from executive.mission.load import load_mission
-from executive.plugins import load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replayed_run import replay_run, resume_run
@@ -24,6 +23,7 @@ from executive.record.result import Result
 from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions
 from executive.testing.run_mission import MissionResult, run_mission
+from executive.text.findings import MissionError
 
 PROJECT = """\
 [project]

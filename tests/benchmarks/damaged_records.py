@@ -20,8 +20,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from executive.campaign.jobs import MissionUnderTest
-from executive.cells.world_log import FILE_HEADER
 from executive.cli.main import main
+from executive.drivers.world_log import FILE_HEADER
 from executive.errors import InputError
 from executive.events import NodeEnded, TimedEvent
 from executive.record.journal import read_journal

@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from executive.behaviours import load_skills
 from executive.cell.objects import UNKNOWN_LABEL
-from executive.cell.workcell import TrueObject
-from executive.cells.sim.cell import SimCell, list_final_objects
-from executive.cells.without_hardware import count_outcomes
+from executive.cell.workcell import TrueObject, load_cell_kind
+from executive.drivers.sim.cell import SimCell, list_final_objects
 from executive.events import ItemChanged
 from executive.ledger.item import State
 from executive.mission.load import load_mission
 from executive.perception.detectors.envelope import build_rated_detectors
 from executive.perception.detectors.requests import ClosableDetector
-from executive.plugins import load_cell_kind, load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
+from executive.station.without_hardware import count_outcomes
 from tests.benchmarks.forks import ForkRunner
 
 HUNG = "HUNG"

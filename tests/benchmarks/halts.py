@@ -22,7 +22,7 @@ from py_trees.common import Status
 from executive.campaign.jobs import MissionUnderTest
 from executive.cell.protocols import STEP
 from executive.cell.workcell import CellWrapper, Workcell
-from executive.cells.sim.arm import SimArm
+from executive.drivers.sim.arm import SimArm
 from executive.errors import ExecutiveError
 from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent
 from executive.geometry import Array

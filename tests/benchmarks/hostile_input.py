@@ -25,8 +25,8 @@ from random import Random
 import cv2
 import numpy as np
 
+from executive.behaviours import load_skills
 from executive.cli.main import COMMANDS, main
-from executive.plugins import load_skills
 from tests.benchmarks.report import Figures, run_command, show_progress
 
 MAX_CPU_TIME = 5.0

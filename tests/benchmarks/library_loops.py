@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from executive.cell.frame import Answer
+from executive.cell.workcell import load_cell_kind
 from executive.errors import Fault
-from executive.plugins import load_cell_kind
 from executive.testing.faults import (
     after,
     during,

@@ -14,11 +14,11 @@ import numpy as np
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass, Obstacle
-from executive.cells.sim.collision import ClearanceChecker
-from executive.cells.sim.models import build_simulated_class, load_mesh
-from executive.cells.sim.scene import spawn_objects
-from executive.cells.sim.tool import TOUCH_DISTANCE, compute_breakaway_force, measure_contact
-from executive.cells.sim.world import World
+from executive.drivers.sim.collision import ClearanceChecker
+from executive.drivers.sim.models import build_simulated_class, load_mesh
+from executive.drivers.sim.scene import spawn_objects
+from executive.drivers.sim.tool import TOUCH_DISTANCE, compute_breakaway_force, measure_contact
+from executive.drivers.sim.world import World
 from executive.errors import InputError, Unreachable
 from executive.geometry import make_tool_down_pose
 from executive.manipulation.tool_goals import make_object_goal, make_slot_goal

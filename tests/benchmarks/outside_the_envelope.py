@@ -16,13 +16,13 @@ from typing import Any
 
 import yaml
 
+from executive.behaviours import load_skills
 from executive.cell.config import CellConfig
 from executive.cell.frame import Answer, Frame
-from executive.cells.sim.scene import load_scene
+from executive.drivers.sim.scene import load_scene
 from executive.mission.load import load_mission
 from executive.perception.detectors.envelope import build_rated_detectors
 from executive.perception.detectors.requests import ChangedRequest, ClosableDetector
-from executive.plugins import load_skills
 from executive.processes import WorkerPool
 from tests.benchmarks.ground_truth import FAULT, HUNG, WALL_TIME_LIMIT, AuditedRun, run_audited
 from tests.benchmarks.report import Figures, run_command, show_progress, write_json

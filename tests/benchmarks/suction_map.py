@@ -16,9 +16,9 @@ import numpy as np
 
 from executive.cell.config import CellConfig
 from executive.cell.device_config import ToolConfig
-from executive.cells.sim.models import load_mesh
-from executive.cells.sim.tool import compute_breakaway_force, measure_contact
-from executive.cells.sim.world import World
+from executive.drivers.sim.models import load_mesh
+from executive.drivers.sim.tool import compute_breakaway_force, measure_contact
+from executive.drivers.sim.world import World
 from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
 from tests.benchmarks.report import Figures, run_command
 

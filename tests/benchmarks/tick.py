@@ -23,7 +23,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.cell.protocols import Cell
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.events import Event, Observer, TimedEvent
 from executive.record.journal import Recorder
 from executive.record.run_directory import RunDirectory

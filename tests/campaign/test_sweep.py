@@ -15,12 +15,12 @@ from typing import Any
 
 import pytest
 
+from executive.behaviours import load_skills
 from executive.campaign.jobs import JobOptions, SweepJob, list_jobs, make_fault_record, run_job, run_jobs
 from executive.campaign.results import ResultsDatabase, RunRecord, RunRow, SweepSettings, make_record
 from executive.campaign.sweep import run_sweep
 from executive.errors import InputError
 from executive.mission.load import load_mission
-from executive.plugins import load_skills
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions

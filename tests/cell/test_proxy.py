@@ -6,7 +6,7 @@ from typing import Any
 
 from executive.cell.arm import Task
 from executive.cell.proxy import Access, intercept
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 
 
 def test_every_access_goes_through_the_interceptor_and_so_do_those_to_what_a_call_returns(

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from executive.behaviours import load_skills
 from executive.cli.main import main
-from executive.mission.yaml_files import list_shipped_missions
-from executive.plugins import load_skills
+from executive.text.yaml_files import list_shipped_missions
 
 MISSION = """\
 mission: small

@@ -19,10 +19,10 @@ from executive.cell.json_values import to_json
 from executive.cli.main import main
 from executive.errors import Fault, InputError
 from executive.mission.analysis import UnhandledFailure
-from executive.mission.findings import Finding
 from executive.record.result import Audit, ItemCounts, Result
 from executive.record.timeline import PlanningTotals
 from executive.run.assembly import RunOptions
+from executive.text.findings import Finding
 
 RESULT = Result(
     mission="sort", status="SUCCESS", reason="", message="", node="", seed=7,

@@ -11,11 +11,12 @@ import pytest
 from click.testing import CliRunner
 
 from executive import plugins
+from executive.behaviours import load_skills
 from executive.cli import doctor
 from executive.cli.doctor import CheckResult
 from executive.cli.main import main
 from executive.errors import InputError
-from executive.plugins import DISTRIBUTION, load_skills
+from executive.plugins import DISTRIBUTION
 
 
 def find_statuses(results: Iterator[CheckResult]) -> dict[str, str]:

@@ -7,9 +7,9 @@ import json
 import pytest
 from click.testing import CliRunner
 
+from executive.behaviours import load_skills
 from executive.cli.main import main
 from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
-from executive.plugins import load_skills
 from executive.tree.node import load_control_nodes
 
 

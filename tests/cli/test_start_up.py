@@ -11,7 +11,7 @@ import pytest
 UNUSED_MODULES = {
     "PIL", "av", "executive.record",
     "executive.replay", "executive.run.run", "executive.view", "inference_sdk", "jinja2", "onnxruntime",
-    "executive.cells.sim", "pybullet", "pybullet_data", "rich", "scipy", "supervision", "torch",
+    "executive.drivers.sim", "pybullet", "pybullet_data", "rich", "scipy", "supervision", "torch",
 }  # fmt: skip
 """Modules that only runs, views and training need."""
 PROGRAM = """

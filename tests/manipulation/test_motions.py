@@ -8,7 +8,7 @@ from at_hand import pick
 
 from executive.cell.arm import Goal, Task
 from executive.cell.objects import Obstacle, Target
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.geometry import GRAVITY
 from executive.manipulation.drops import MAX_PREDICTABLE_SPEED, detect_and_record_drop, predict_landing
 from executive.manipulation.motions import plan

@@ -11,7 +11,7 @@ import pytest
 
 import executive.mission.load
 from executive.cell.config import CellConfig
-from executive.cells.sim.kind import SIM_CELL_KIND
+from executive.drivers.sim.kind import SIM_CELL_KIND
 from executive.mission import cell_file
 from executive.mission.load import LoadedMission, load_mission
 from executive.skill import In, Metres, Out, Skill, param, port

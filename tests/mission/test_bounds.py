@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.mission.findings import MAX_PRINTED_FINDINGS
+from executive.text.findings import MAX_PRINTED_FINDINGS
 
 HEAD = "mission: m\ncell: cells/overhead.yaml\nroutes: {cube: red_bin}\n"
 

@@ -17,12 +17,13 @@ from typing import NamedTuple
 import pytest
 from click.testing import CliRunner
 
+from executive.behaviours import load_skills
+from executive.cell.workcell import load_cell_kind
 from executive.cli.main import main
 from executive.cli.streams import keep_stdout_clean
-from executive.mission.findings import MEANING_BY_CODE, Finding, MissionError
 from executive.mission.load import CellKindFinder, load_mission
-from executive.plugins import load_cell_kind, load_skills
 from executive.skill import Skill
+from executive.text.findings import MEANING_BY_CODE, Finding, MissionError
 
 FOLDER = Path(__file__).parent / "broken"
 BROKEN = sorted(FOLDER.glob("*.yaml"))

@@ -10,8 +10,8 @@ import pytest
 
 from executive.cell.device_config import CameraConfig
 from executive.mission.cell_file import load_cell
-from executive.mission.findings import MissionError
 from executive.perception.camera_model import compute_calibration, find_calibration_doubts
+from executive.text.findings import MissionError
 
 K = "[461, 0, 319.5, 0, 461, 239.5, 0, 0, 1]"
 NINE = f"matrix: {K}"

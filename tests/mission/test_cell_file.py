@@ -9,7 +9,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.mission.cell_file import find_overlaps, load_cell, read_cell
-from executive.mission.findings import MissionError
+from executive.text.findings import MissionError
 
 
 @pytest.fixture(autouse=True)

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from executive.cells.fake import FakeCell
+from executive.behaviours import load_skills
+from executive.drivers.fake import FakeCell
 from executive.events import NodeEnded
-from executive.mission.findings import MissionError
 from executive.mission.load import load_mission
-from executive.plugins import load_skills
 from executive.testing.run_mission import MissionResult, run_mission
+from executive.text.findings import MissionError
 
 HEAD = """\
 mission: m

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from executive.behaviours import load_skills
+from executive.cell.workcell import load_cell_kind
 from executive.errors import InputError
 from executive.mission.load import load_mission
-from executive.plugins import load_cell_kind, load_skills
 
 MISSION = "mission: m\ncell: cells/own.yaml\nroutes: {cube: red_bin}\ntree: Detect\n"
 CELL = "base: cells/overhead.yaml\ncell: own\ndetectors:\n  eye: {kind: roboflow, model_id: a/1, KEY}\n"

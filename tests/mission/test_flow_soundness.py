@@ -19,11 +19,11 @@ from executive.mission.expand import assign_paths, expand
 from executive.mission.load import run_checks
 from executive.mission.mission_file import parse_mission
 from executive.mission.node_parser import NodeParser
-from executive.mission.yaml_files import parse_yaml
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Skill, port
+from executive.text.findings import Source
+from executive.text.yaml_files import parse_yaml
 from executive.tree.blackboard import Blackboard
 from executive.tree.node import load_control_nodes
-from executive.tree.specification import Source
 from executive.tree.tree_node import halt
 
 MOST_TICKS = 400

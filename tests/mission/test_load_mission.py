@@ -10,11 +10,11 @@ from unittest.mock import Mock
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.errors import InputError
-from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
-from executive.mission.yaml_files import find_mission, get_shipped_folder
+from executive.text.findings import MissionError
+from executive.text.yaml_files import find_mission, get_shipped_folder
 from executive.tree.specification import Reference, SkillNode
 
 Load = Callable[..., LoadedMission]

@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 import yaml
 
-from executive.cells.fake import FakeCell
+from executive.behaviours import load_skills
+from executive.drivers.fake import FakeCell
 from executive.errors import InputError
-from executive.mission.findings import MissionError
 from executive.mission.load import load_mission
-from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
+from executive.text.findings import MissionError
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 BASES = sorted((Path(__file__).parent / "bases").glob("*.yaml"))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from executive.mission.cell_file import load_cell
-from executive.mission.findings import MissionError
+from executive.text.findings import MissionError
 
 WASHER = "objects: {washer: {mesh: parts/washer.obj, height: 0.006, radius: 0.025, ring: 0.017}}\n"
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
+from executive.text.findings import MissionError
 
 Load = Callable[..., LoadedMission]
 

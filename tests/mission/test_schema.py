@@ -11,12 +11,12 @@ import pytest
 from jsonschema import Draft7Validator
 from referencing import Registry
 
+from executive.behaviours import load_skills
 from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
-from executive.mission.yaml_files import get_shipped_folder, parse_yaml
-from executive.plugins import load_skills
 from executive.skill import Skill
+from executive.text.findings import Source
+from executive.text.yaml_files import get_shipped_folder, parse_yaml
 from executive.tree.node import load_control_nodes
-from executive.tree.specification import Source
 
 MISSIONS = get_shipped_folder()
 SCHEMAS: dict[str, tuple[Callable[[], dict[str, Any]], str]] = {

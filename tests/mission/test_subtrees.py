@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
 from executive.mission.ports import find_node_wires, find_wires
 from executive.skill import Direction, Skill
+from executive.text.findings import MissionError
 from executive.tree.specification import SkillNode
 
 Load = Callable[..., LoadedMission]

@@ -11,8 +11,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.mission.yaml_files import convert_scalar, parse_yaml
-from executive.tree.specification import Source
+from executive.text.findings import Source
+from executive.text.yaml_files import convert_scalar, parse_yaml
 
 
 def read(text: str) -> tuple[Any, list[str]]:
@@ -97,6 +97,6 @@ FRAGMENTS = [
 @given(st.lists(st.sampled_from(FRAGMENTS), max_size=20).map("".join))
 def test_the_parser_of_libyaml_changes_no_node_and_no_finding(text: str) -> None:
     source = Source("a.yaml", text)
-    with patch("executive.mission.yaml_files._FAST_LOADER", yaml.SafeLoader):
+    with patch("executive.text.yaml_files._FAST_LOADER", yaml.SafeLoader):
         expected = parse_yaml(source)
     assert parse_yaml(source) == expected

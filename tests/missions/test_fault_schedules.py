@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from executive.cell.frame import Answer
-from executive.cells.fake import FakeCell
-from executive.plugins import load_cell_kind
+from executive.cell.workcell import load_cell_kind
+from executive.drivers.fake import FakeCell
 from executive.testing.faults import (
     after,
     during,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from executive.cell.protocols import Cell, Steps
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.events import ItemChanged, NodeEnded
 from executive.testing.faults import during, seal_fails
 from executive.testing.run_mission import MissionResult, run_mission

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.fake import FakeCell
+from executive.cell.workcell import load_cell_kind
+from executive.drivers.fake import FakeCell
 from executive.mission.cell_file import load_cell
 from executive.perception.detectors.envelope import find_unmeasured_detectors
-from executive.plugins import load_cell_kind
 
 CELLS = sorted((Path(__file__).parents[2] / "missions" / "cells").glob("*.yaml"))
 

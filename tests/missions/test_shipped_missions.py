@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from executive.cell.workcell import Workcell
-from executive.cells.fake import FakeCell
+from executive.behaviours import load_skills
+from executive.cell.workcell import Workcell, load_cell_kind
+from executive.drivers.fake import FakeCell
 from executive.events import ItemChanged, MotionPlanned, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
-from executive.plugins import load_cell_kind, load_skills
 from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import make_oracle_kind

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.events import ItemChanged
 from executive.testing.faults import during, object_moved
 from executive.testing.run_mission import MissionResult, run_mission

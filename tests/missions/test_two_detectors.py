@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from executive.cell.frame import Detection
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.events import FrameSearched
 from executive.testing.run_mission import MissionResult, run_mission
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.cells.fake import FakeCell, FakeTool
+from executive.drivers.fake import FakeCell, FakeTool
 from executive.testing.faults import during, seal_breaks
 from executive.testing.run_mission import run_mission
 

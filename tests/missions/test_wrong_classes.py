@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from executive.cell.frame import Detection
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.events import ItemChanged
 from executive.testing.run_mission import MissionResult, run_mission
 

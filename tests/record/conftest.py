@@ -8,7 +8,7 @@ from typing import NoReturn
 
 import pytest
 
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 
 MISSION = """\
 mission: bring_one

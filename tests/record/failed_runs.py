@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from executive.cells.fake import FakeCell
+from executive.behaviours import load_skills
+from executive.drivers.fake import FakeCell
 from executive.events import RunEnded
 from executive.mission.load import load_mission
-from executive.plugins import load_skills
 from executive.record.diagnose import diagnose
 from executive.record.diagnosis import Diagnosis
 from executive.record.timeline import Timeline

@@ -7,7 +7,7 @@ import re
 import pytest
 from failed_runs import PICK, FailedRun
 
-from executive.plugins import load_skills
+from executive.behaviours import load_skills
 
 CUBE = [("cube", 0.5, 0.1)]
 

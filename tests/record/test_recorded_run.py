@@ -11,18 +11,18 @@ import py_trees
 import pytest
 from click.testing import CliRunner, Result
 
+from executive.behaviours import load_skills
 from executive.cell.json_values import to_json
-from executive.cells.fake import FakeCell
-from executive.cells.without_hardware import CellWithoutHardware
 from executive.cli.main import main
+from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.events import RunEnded, RunStarted, TargetSelected
 from executive.mission.load import load_mission
-from executive.plugins import load_skills
 from executive.record.journal import Journal, read_journal
 from executive.record.picture_recorder import PictureRecorder
 from executive.record.recorded_run import GuardedView, RecordOptions, record_run
 from executive.run.assembly import RunOptions
+from executive.station.without_hardware import CellWithoutHardware
 
 
 class Watcher:

@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 
+from executive.behaviours import load_skills
 from executive.cell.json_values import to_json
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.events import InputRead, ItemChanged, TimedEvent, ToolCommanded
 from executive.mission.load import LoadedMission, load_mission
-from executive.plugins import load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replayed_run import ReplayResult, replay_and_compare, replay_run, resume_run

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from executive.cell.protocols import StepClock
 from executive.cell.proxy import IS_METHOD
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.errors import Fault, Unreachable
 from executive.events import Event, TimedEvent, ToolCommanded
 from executive.replay.recording_cell import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from events import STEP, at, read, run_started
 
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.errors import Stopped
 from executive.events import RunHalted, TimedEvent
 from executive.replay.replayed_cell import InputLog, Interruption, ReplayedCell

@@ -11,7 +11,7 @@ import pytest
 
 from executive.cell.arm import Goal
 from executive.cell.objects import Target
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.errors import Unreachable
 from executive.events import FrameSearched, MotionPlanned, TargetSelected, TimedEvent
 from executive.manipulation.tool_goals import sort_pickable_targets

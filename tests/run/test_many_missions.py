@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from py_trees.blackboard import Blackboard
 
-from executive.cells.fake import FakeCell
+from executive.behaviours import load_skills
+from executive.drivers.fake import FakeCell
 from executive.mission.load import LoadedMission, load_mission
-from executive.plugins import load_skills
 from executive.record.journal import Trace
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import make_oracle_kind

@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
-from executive.cells.fake import FakeCell
+from executive.behaviours import load_skills
+from executive.drivers.fake import FakeCell
 from executive.errors import InputError, Stopped
 from executive.events import Event, NodeEnded, NodeStarted, OperatorAsked, RequestGiven, TimedEvent
 from executive.mission.load import load_mission
-from executive.plugins import load_skills
 from executive.record.replayed_run import replay_and_compare
 from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions, assemble

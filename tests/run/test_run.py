@@ -7,10 +7,10 @@ from typing import Any
 
 from py_trees.common import Status
 
-from executive.cells.fake import FakeCell
+from executive.behaviours import load_skills
+from executive.drivers.fake import FakeCell
 from executive.events import Event, RequestGiven, RunEnded, TimedEvent, ToolCommanded
 from executive.mission.load import load_mission
-from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from executive.cells.fake import FakeCell
+from executive.behaviours import load_skills
+from executive.drivers.fake import FakeCell
 from executive.errors import Fault
 from executive.events import Event, FaultRaised, ItemChanged, RunEnded, TimedEvent
 from executive.mission.load import load_mission
-from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.run.run_control import RunControl

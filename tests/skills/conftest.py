@@ -8,14 +8,14 @@ import at_hand
 import pytest
 
 from executive.cell.objects import Target
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 
 
 @pytest.fixture(autouse=True)
 def no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing here can import the simulator, though tests of other folders may have done so before."""
     for name in [*sys.modules]:
-        if name.startswith("executive.cells.sim."):
+        if name.startswith("executive.drivers.sim."):
             monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.setitem(sys.modules, "pybullet", None)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from executive.cell.frame import Detection, Frame
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.errors import NoDepth
 from executive.skill import SkillFailed
 from executive.testing.run_skill import run_skill

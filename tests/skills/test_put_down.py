@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.errors import Blocked, Unreachable
 from executive.motion.straight_paths import StraightMotion
 from executive.skill import SkillFailed

@@ -10,8 +10,8 @@ from at_hand import look
 
 from executive.cell.arm import Goal
 from executive.cell.workcell import CellOptions
-from executive.cells.fake import FakeCell
-from executive.cells.without_hardware import SilentOperator
+from executive.drivers.fake import FakeCell
+from executive.station.without_hardware import SilentOperator
 from executive.testing.run_skill import SkillResult, run_skill
 from skills.items import Defer, ListItems
 from skills.select_target import SelectTarget

@@ -7,7 +7,7 @@ import math
 import at_hand
 import pytest
 
-from executive.cells.fake import FakeCell, FakeTool, load_empty_cell
+from executive.drivers.fake import FakeCell, FakeTool, load_empty_cell
 from executive.geometry import GRAVITY
 from executive.skill import SkillFailed
 from executive.testing.run_skill import SkillResult, run_skill

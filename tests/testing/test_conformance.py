@@ -6,11 +6,11 @@ from typing import Any, ClassVar
 
 import pytest
 
+from executive.behaviours import load_skills
 from executive.cell.arm import Goal
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import follow, make_task, plan
-from executive.plugins import load_skills
 from executive.skill import EMPTY, HOLDING, In, Metres, Out, Skill, param, port
 from executive.testing.conformance import RULES, SkillScene, list_conformance_checks
 

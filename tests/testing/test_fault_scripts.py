@@ -13,7 +13,7 @@ from events import at
 
 from executive.cell.frame import Observation
 from executive.cell.protocols import Request
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.errors import InputError, NoDepth, Unavailable, Unreachable
 from executive.events import FaultInjected, NodeEnded, NodeStarted, ToolCommanded
 from executive.testing import faults as effects

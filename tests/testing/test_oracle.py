@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from executive.cell.workcell import CellOptions
-from executive.cells.fake import SHIPPED_ROUTES
-from executive.cells.without_hardware import SilentOperator
+from executive.drivers.fake import SHIPPED_ROUTES
 from executive.events import discard_event
 from executive.geometry import Pose
 from executive.mission.cell_file import load_cell
+from executive.station.without_hardware import SilentOperator
 from executive.testing.oracle import make_oracle_kind
 
 

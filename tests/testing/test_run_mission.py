@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.errors import Fault, InputError
 from executive.events import RunEnded, RunStarted, TimedEvent
 from executive.testing.faults import after, detector_dead, during, seal_fails

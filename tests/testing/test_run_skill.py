@@ -10,7 +10,7 @@ import pytest
 from executive.cell.arm import Goal
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.errors import Fault, InputError
 from executive.skill import In, Out, Skill, param, port
 from executive.testing.run_mission import make_failing, make_raising

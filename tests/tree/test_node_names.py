@@ -12,12 +12,12 @@ from executive.tree.node import load_control_nodes
 PERMITTED = {
     ("mission/grammar.py", f'"{SEQUENCE_KEYWORD}"'),
     ("mission/grammar.py", f'"{USE_KEYWORD}"'),
-    ("cells/sim/scene.py", '"any"'),  # any class of objects
+    ("drivers/sim/scene.py", '"any"'),  # any class of objects
     ("skill.py", '"any"'),  # any state of the tool
     ("record/diagnosis.py", '"repeat"'),  # label before the command that repeats a run
     # The table of former and foreign words states what to write instead.
     *(
-        ("mission/findings.py", f'"{word}"')
+        ("text/findings.py", f'"{word}"')
         for word in ("all", "any", "fallback", "for_each", "repeat", "try")
     ),
 }

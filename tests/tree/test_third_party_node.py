@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from executive.behaviours import load_skills
+from executive.cell.workcell import load_cell_kind
 from executive.cli.main import main
 from executive.events import NodeEnded
-from executive.mission.findings import MissionError
 from executive.mission.load import load_mission
-from executive.plugins import load_cell_kind, load_skills
 from executive.testing.run_mission import run_mission
+from executive.text.findings import MissionError
 
 RACE = '''
 """Race of branches."""

@@ -8,10 +8,10 @@ from xml.etree.ElementTree import Element, fromstring
 
 import pytest
 
+from executive.behaviours import load_skills
 from executive.mission.load import read_mission
-from executive.mission.yaml_files import find_mission, get_shipped_folder
-from executive.plugins import load_skills
 from executive.skill import In, Out, Skill, param, port
+from executive.text.yaml_files import find_mission, get_shipped_folder
 from executive.tree.node import load_control_nodes
 from executive.view.btcpp import format_btcpp
 

@@ -15,10 +15,10 @@ import aiohttp
 import pytest
 from events import at
 
+from executive.behaviours import load_skills
 from executive.cell.frame import FrameCaptured
-from executive.cells.fake import FakeCell
+from executive.drivers.fake import FakeCell
 from executive.mission.load import load_mission
-from executive.plugins import load_skills
 from executive.record.result import Result
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run

@@ -13,10 +13,10 @@ from pydantic_core import ErrorDetails
 from executive.cell.config import DetectorConfig
 from executive.cell.device_config import CameraConfig, Section
 from executive.cell.protocols import Clock
-from executive.cell.workcell import KeyPath
 from executive.errors import InputError
 from executive.perception.detectors.requests import ClosableDetector, DetectorContext
 from executive.plugins import PluginEntry, list_entries
+from executive.text.validate import KeyPath
 
 OptionErrors = Iterator[tuple[str, str]]
 """Names of missing, unknown or invalid options of a detector, each with an error message."""

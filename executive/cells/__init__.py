@@ -1,1 +1,0 @@
-"""Kinds of cells: the simulated cell, and the fake cell for tests."""

@@ -1,0 +1,1 @@
+"""Drivers of cells: devices only, without planner, ledger and detectors."""

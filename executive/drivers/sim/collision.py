@@ -1,0 +1,241 @@
+"""Collision check of planned paths of arm, tool and load against the cell, and of the arm against itself.
+
+The check uses a separate world, because moving the arm of the running world would disturb the physics.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from operator import attrgetter
+from typing import NamedTuple
+
+import numpy as np
+import pybullet
+
+from executive.cell.arm import Task
+from executive.cell.config import CellConfig
+from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
+from executive.drivers.sim.world import DISTANCE, LINK_A, POSITION_B, World, name_load
+from executive.errors import Blocked
+from executive.geometry import Array, format_point
+
+ROUNDING_ERROR = 1e-5
+"""Maximum rounding error of a distance [m]."""
+SEARCH_DISTANCE = 0.1
+"""Distances that exceed the margin by more than this value are not computed [m]."""
+JOINT_AXIS = 13
+"""Index of the axis of the joint in the information about a joint of PyBullet."""
+SUPPORT_TOLERANCE = 0.001
+"""Maximum height above the table or the floor of a bin at which a contact supports the load [m]."""
+
+
+class BodyPair(NamedTuple):
+    """Two bodies of which at least one moves with the arm.
+
+    Attributes:
+        bodies: Indices of both bodies.
+        link_pair: Indices of two links of the arm, or () if all links of the bodies count.
+        links: Links of the first body whose distances count.
+        joints: Joints that change the distance.
+        body_name: Name of the second body in messages; "" for the pair of arm and load, whose messages name
+            the load first, and then the nearest link of the arm.
+        load_name: Name of the load if it belongs to the pair, else "".
+        support_height: Height in the world up to which the second body supports the load [m].
+    """
+
+    bodies: tuple[int, int]
+    links: range
+    joints: range
+    body_name: str = ""
+    load_name: str = ""
+    support_height: float = -math.inf
+    link_pair: tuple[int, ...] = ()
+
+
+class ClosestApproach(NamedTuple):
+    """Closest approach between a part of the robot and a body.
+
+    Attributes:
+        part, body: Names of the part and of the body for messages.
+        distance: Distance between part and body [m], negative for a penetration.
+        min_distance: Required minimum distance [m].
+    """
+
+    part: str
+    body: str
+    distance: float
+    min_distance: float
+
+    def __str__(self) -> str:
+        relation = f"{self.distance:.3f} m from" if self.distance >= 0 else f"{-self.distance:.3f} m into"
+        return f"{self.part} {relation} {self.body}"
+
+
+class ClearanceChecker:
+    """Checks paths of the arm for collisions with table, bins, obstacles and the arm itself.
+
+    After a stop, or with a held object on the table, a motion may begin closer to a body than the margin.
+    The distance from this body must then not decrease. A held object is modelled by an upright cylinder
+    under the tool, which may touch the table and the floors of bins.
+
+    The check is a conservative advancement: two bodies whose distance is known need no further query until a
+    part of the arm may have moved by that distance. The upper bound of the movement is the sum of the joint
+    movements, each multiplied by the maximum distance of a point of the arm from the axis of the joint.
+
+    Attributes:
+        world: World of the check, whose arm is at the last joint positions that needed a query.
+    """
+
+    def __init__(self, config: CellConfig) -> None:
+        self.world = World(config, visuals=False)
+        self._margin = config.motion.margin
+        self._get_cylinder = functools.cache(self._add_cylinder)
+        """Returns the body of the load (number 0) or of an obstacle, by radius [m], height [m] and number."""
+        # The function is looked up once, because a look-up takes as long as a call.
+        self._get_closest_points = self.world.client.getClosestPoints
+        self._radii = self._compute_max_radii()
+
+    def check(self, path: Array, task: Task = Task()) -> None:
+        """Check that the joint positions along a path `(N, n)` [rad] keep the margin of the cell file.
+
+        Raises:
+            Blocked: The path violates the margin; the message states bodies, distance and tool position.
+        """
+        load = task.load
+        load_size = load.height + load.radius + load.contact_radius if load else 0.0
+        pairs = self._list_pairs(load, self._place_obstacles(task.obstacles))
+        movements = np.abs(np.diff(path, axis=0, prepend=path[:1])).cumsum(axis=0) * (self._radii + load_size)
+        # Upper bound of the movement since the start of the path [m], by pair and state.
+        pair_movements = [movements[:, pair.joints].sum(axis=1).tolist() for pair in pairs]
+        # Movement up to which the bodies of each pair are farther apart than the margin [m].
+        clear_until = [0.0] * len(pairs)
+        # A part that starts within the margin of a body must not come closer than at the start, until the
+        # distance has exceeded the margin for the first time. Every other part must keep the margin.
+        start_distances: dict[tuple[str, str], float] = {}
+        for index, q in enumerate(path):
+            due = [i for i in range(len(pairs)) if pair_movements[i][index] >= clear_until[i]]
+            if due:
+                self._place_arm(q, load)
+            closest: dict[tuple[str, str], ClosestApproach] = {}
+            for i in due:
+                distance, approaches = self._measure_distance(pairs[i])
+                clear_until[i] = pair_movements[i][index] + distance - self._margin - ROUNDING_ERROR
+                for approach in approaches:
+                    key = approach.part, approach.body
+                    pair = (closest.get(key, approach), approach)
+                    closest[key] = min(pair, key=lambda each: each.distance - each.min_distance)
+            if index == 0:
+                start_distances = {key: approach.distance for key, approach in closest.items()}
+            start_distances = {key: start_distances[key] for key in closest if key in start_distances}
+            for key, approach in closest.items():
+                min_distance = min(approach.min_distance, start_distances.get(key, math.inf))
+                if approach.distance < min_distance - ROUNDING_ERROR:
+                    place = format_point(self.world.get_tool_pose().position)
+                    message = f"the motion would bring {approach}, with the tool at {place}; "
+                    raise Blocked(f"{message}the minimum clearance is {self._margin:.3f} m")
+
+    def find_violation(self, q: Array) -> ClosestApproach | None:
+        """Return the closest approach of the unloaded arm at `q` `(n,)` [rad], or None if it is allowed."""
+        self._place_arm(q, None)
+        approaches = [a for pair in self._list_pairs(None, []) for a in self._measure_distance(pair)[1]]
+        closest = min(approaches, key=attrgetter("distance"), default=None)
+        return closest if closest and closest.distance < closest.min_distance - ROUNDING_ERROR else None
+
+    def close(self) -> None:
+        """Close the world of the check."""
+        self.world.close()
+
+    def _list_pairs(self, load: ObjectClass | None, obstacles: Sequence[tuple[str, int]]) -> list[BodyPair]:
+        """Return all pairs; `obstacles` contains name and body of each obstacle."""
+        world = self.world
+        robot = world.robot
+        joints = world.joints
+        bodies = [("the table", world.table), *world.bin_bodies.items(), *obstacles]
+        links = range(robot.first_collision_link, world.tool_index + 1)
+        pairs = [BodyPair((world.arm, body), links, joints, body_name=name) for name, body in bodies]
+        for link_a, link_b in robot.self_collision_pairs:
+            moving_joints = joints[min(link_a, link_b) + 1 : max(link_a, link_b) + 1]
+            first_links = range(link_a, link_a + 1)
+            pair = BodyPair((world.arm, world.arm), first_links, moving_joints, world.name_link(link_b))
+            pairs.append(pair._replace(link_pair=(link_a, link_b)))
+        if load is None:
+            return pairs
+        load_body = self._get_load_body(load)
+        name = name_load(load.label)
+        for body_name, body in bodies:
+            support_height = -math.inf
+            if body == world.table or body_name in world.bin_bodies:
+                bin = world.config.bins.get(body_name)
+                support_height = (bin.position[2] if bin else 0.0) + BIN_THICKNESS + SUPPORT_TOLERANCE
+            pairs.append(BodyPair((load_body, body), range(-1, 0), joints, body_name, name, support_height))
+        lower_links = range(robot.first_collision_link, robot.wrist_link)
+        lower_joints = joints[lower_links.start + 1 :]
+        return [*pairs, BodyPair((world.arm, load_body), lower_links, lower_joints, load_name=name)]
+
+    def _measure_distance(self, pair: BodyPair) -> tuple[float, list[ClosestApproach]]:
+        """Return the distance of a pair [m], and a `ClosestApproach` for each pair of points in the margin.
+
+        A distance beyond the margin plus `SEARCH_DISTANCE` is returned as this sum.
+        """
+        max_distance = self._margin + SEARCH_DISTANCE
+        all_points = self._get_closest_points(*pair.bodies, max_distance, *pair.link_pair)
+        all_points = [points for points in all_points if points[LINK_A] in pair.links]
+        approaches = [
+            ClosestApproach(
+                pair.load_name or self.world.name_link(points[LINK_A]),
+                pair.body_name or self.world.name_link(points[LINK_A]),
+                points[DISTANCE],
+                0.0 if points[POSITION_B][2] <= pair.support_height else self._margin,
+            )
+            for points in all_points
+            if points[DISTANCE] <= self._margin
+        ]
+        return min((points[DISTANCE] for points in all_points), default=max_distance), approaches
+
+    def _place_arm(self, q: Array, load: ObjectClass | None) -> None:
+        """Move the arm to joint positions `(n,)` [rad], with the load under the tool."""
+        world = self.world
+        client = world.client
+        client.resetJointStatesMultiDof(world.arm, range(len(q)), [[angle] for angle in q])
+        if load is not None:
+            flange = client.getLinkState(world.arm, world.flange_index, computeForwardKinematics=True)[4:6]
+            offset = world.robot.flange_offset + world.config.tool.length + load.height / 2
+            load_pose = client.multiplyTransforms(*flange, [0, 0, offset], [0, 0, 0, 1])
+            client.resetBasePositionAndOrientation(self._get_load_body(load), *load_pose)
+
+    def _get_load_body(self, load: ObjectClass) -> int:
+        return self._get_cylinder(load.radius + load.contact_radius, load.height, 0)
+
+    def _compute_max_radii(self) -> Array:
+        """Return the maximum distance of a point of the arm from the axis of each joint `(n,)` [m]."""
+        world = self.world
+        client = world.client
+        states = client.getLinkStates(world.arm, world.joints, computeForwardKinematics=True)
+        axes = [
+            client.rotateVector(state[5], client.getJointInfo(world.arm, joint)[JOINT_AXIS])
+            for joint, state in zip(world.joints, states, strict=True)
+        ]
+        links = np.diff([*(state[4] for state in states), world.get_tool_pose().position], axis=0)
+        lengths = np.linalg.norm(links, axis=1)
+        # The link of a joint counts only with its component perpendicular to the axis of the joint.
+        perpendicular_lengths = np.linalg.norm(np.cross(axes, links), axis=1)
+        return perpendicular_lengths + lengths[::-1].cumsum()[::-1] - lengths + world.robot.link_radius
+
+    def _place_obstacles(self, obstacles: Sequence[Obstacle]) -> list[tuple[str, int]]:
+        """Represent the obstacles by cylinders on the table; return name and body of each obstacle."""
+        placed_obstacles = []
+        for number, obstacle in enumerate(obstacles, 1):
+            body = self._get_cylinder(round(obstacle.radius, 4), round(obstacle.top, 4), number)
+            position = [obstacle.x, obstacle.y, obstacle.top / 2]
+            self.world.client.resetBasePositionAndOrientation(body, position, [0, 0, 0, 1])
+            placed_obstacles.append((obstacle.name, body))
+        return placed_obstacles
+
+    def _add_cylinder(self, radius: float, height: float, number: int) -> int:
+        """Add a cylinder and return the body; `number` distinguishes cylinders of equal size in the cache."""
+        del number
+        client = self.world.client
+        shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=radius, height=height)
+        return int(client.createMultiBody(0, shape))

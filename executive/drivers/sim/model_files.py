@@ -1,0 +1,304 @@
+"""Readers and checks of model files (URDF and meshes) before PyBullet opens the files."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import re
+import tempfile
+import warnings
+import zipfile
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+from urllib.parse import unquote
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pybullet
+import pybullet_data
+from numpy.typing import ArrayLike, NDArray
+
+from executive.errors import InputError
+from executive.geometry import Array, Pose, rotate_about_z
+from executive.text.yaml_files import has_outside_link, is_outside_path
+
+MAX_MODEL_SIZE = 20_000_000
+"""Maximum size of a model file [byte], to limit the duration of the check."""
+MAX_TRIANGLE_COUNT = 20_000
+"""Maximum number of triangles of a mesh: a collision in PyBullet takes 3 s with 20,000, 60 s with 300,000."""
+FIXED_JOINTS = "joint[@type='fixed'][parent]"
+"""Path of the fixed joints of a URDF."""
+MESH_KINDS = {".obj": "Wavefront", ".stl": "STL", ".dae": "COLLADA"}
+"""Formats of mesh files by suffix."""
+
+Triangles = tuple[Array, NDArray[np.intp]]
+"""Vertices `(N, 3)` [m], and the indices of the vertices of each triangle `(M, 3)`."""
+
+
+def find_model(name: str) -> Path:
+    """Return the path of a model file, for an absolute path or a path in the folder of pybullet_data.
+
+    Raises:
+        InputError: There is no such file, or the file is larger than `MAX_MODEL_SIZE`.
+    """
+    path = os.path.join(pybullet_data.getDataPath(), name)
+    # For an invalid file name, Path.is_file raises an error, but os.path.isfile returns False.
+    if os.path.isfile(path):
+        if os.path.getsize(path) > MAX_MODEL_SIZE:
+            raise InputError(f"the model {name} is larger than {MAX_MODEL_SIZE // 1_000_000} MB")
+        return Path(path).resolve()
+    raise InputError(f"there is no model {name}, neither beside the cell file nor in pybullet_data")
+
+
+def read_urdf(path: Path) -> Element:
+    """Return the root element of the URDF of an object; links joined by fixed joints become one link.
+
+    Raises:
+        InputError: The file is no URDF, refers to a file outside of its folder, or has an invalid mesh.
+    """
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
+        raise InputError(f"the model {path.name} is no URDF: {error}") from None
+    if root.tag != "robot":
+        raise InputError(f"the model {path.name} is no URDF: its root is <{root.tag}>, not <robot>")
+    for element in root.iter():
+        if element.tag.startswith("{"):
+            raise InputError(f"the model {path.name} has an XML namespace, {element.tag}; remove it")
+        if "filename" in element.attrib:
+            _normalize_name(path, element.attrib["filename"])
+        if element.tag == "mesh":
+            read_mesh(find_mesh(path, element))
+    _merge_links(path, root)
+    return root
+
+
+def _merge_links(path: Path, root: Element) -> None:
+    """Move the parts of links joined by fixed joints into the base, the link that is no child of a joint."""
+    pairs = [(joint, child) for joint in root.findall(FIXED_JOINTS) for child in joint.findall("child")]
+    joints = {child.get("link"): joint for joint, child in pairs}
+    links = {link.get("name"): link for link in root.findall("link")}
+    for name, link in links.items():
+        base = name
+        X_BL = Pose.identity()
+        left = dict(joints)  # each joint is passed once, even in a loop of joints
+        while (joint := left.pop(base, None)) is not None:
+            X_BL = _read_origin(path, joint) @ X_BL
+            base = joint.findall("parent")[0].get("link")
+        if base == name or base not in links:
+            continue
+        for part in link:
+            X_BP = X_BL @ _read_origin(path, part)
+            angles = pybullet.getEulerFromQuaternion(X_BP.quaternion)
+            xyz, rpy = (" ".join(map(str, numbers)) for numbers in (X_BP.position, angles))
+            part[:] = [child for child in part if child.tag != "origin"]
+            ElementTree.SubElement(part, "origin", xyz=xyz, rpy=rpy)
+        links[base].extend(link)
+        root.remove(link)
+        root.remove(joints[name])
+
+
+def _read_origin(path: Path, element: Element) -> Pose:
+    """Return the pose in the `origin` of an element of a URDF."""
+    origin = next(element.iter("origin"), Element("origin"))
+    xyz, rpy = (parse_numbers(path, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
+    return Pose(make_rotation(*rpy), np.array(xyz))
+
+
+def read_shapes(path: Path, tag: str) -> Triangles:
+    """Return vertices and triangles of all `visual` or `collision` of a URDF, in the frame of its link.
+
+    Raises:
+        InputError: There is none, a shape is unknown or invalid, or the URDF has several links or inertials.
+    """
+    root = read_urdf(path)
+    vertices: list[Array] = []
+    triangles: list[NDArray[np.intp]] = []
+    for element in root.iterfind(f"link/{tag}"):
+        X_LE = _read_origin(path, element)
+        for shape in element.iterfind("geometry/*"):
+            points, faces = _read_shape(path, shape)
+            triangles.append(faces + sum(map(len, vertices)))  # indices count the vertices of earlier shapes
+            vertices.append(X_LE.apply(points))
+    link_count, inertial_count = (len(root.findall(key)) for key in ("link", "link/inertial"))
+    if link_count != 1 or not vertices or inertial_count > 1:
+        counts = f"{link_count} link(s), {inertial_count} inertial(s) and {len(vertices)} shape(s) as <{tag}>"
+        needed = "one <link>, or links joined by fixed joints, with <visual>, <collision> and one <inertial>"
+        raise InputError(f"the model {path.name} has {counts}; an object is {needed}")
+    return np.concatenate(vertices), np.concatenate(triangles)
+
+
+def _read_shape(path: Path, shape: Element) -> Triangles:
+    """Return vertices and triangles of an element below `geometry` of a URDF."""
+    if shape.tag == "mesh":
+        points, faces = read_mesh(find_mesh(path, shape))
+        return points * parse_numbers(path, shape, "scale", (1.0, 1.0, 1.0), 0.0), faces
+    if shape.tag not in ("box", "cylinder", "sphere", "capsule"):
+        problem = f"the model {path.name} has the geometry <{shape.tag}>"
+        raise InputError(f"{problem}; possible are box, cylinder, sphere, capsule and mesh")
+    from trimesh import creation  # the import takes a second
+
+    if shape.tag == "box":
+        mesh = creation.box(parse_numbers(path, shape, "size", (0.0, 0.0, 0.0), 0.0))
+    else:
+        (radius,) = parse_numbers(path, shape, "radius", (0.0,), 0.0)
+        (length,) = (0.0,) if shape.tag == "sphere" else parse_numbers(path, shape, "length", (0.0,), 0.0)
+        make = creation.cylinder if shape.tag == "cylinder" else creation.capsule
+        mesh = make(radius=radius, height=length)
+    return mesh.vertices, mesh.faces
+
+
+@lru_cache(maxsize=64)
+def convert_model(path: Path) -> str:
+    """Return the path of a URDF or mesh that contains Wavefront meshes only.
+
+    PyBullet crashes, ignores units or reads nothing for some STL and COLLADA meshes. The files of converted
+    models exist until the end of the process.
+    """
+    if path.suffix == ".obj":
+        return str(path)
+    if path.suffix.lower() in MESH_KINDS:
+        import trimesh  # the import takes a second
+
+        content = str(trimesh.Trimesh(*read_mesh(path), process=False).export(file_type="obj")).encode()
+    else:
+        root = read_urdf(path)
+        files = [(mesh, find_mesh(path, mesh)) for mesh in root.iter("mesh")]
+        names = [str(path.parent / mesh.attrib["filename"]) for mesh, _ in files]
+        if names == [convert_model(file) for _, file in files] and b"<joint" not in path.read_bytes():
+            return str(path)
+        for mesh, file in files:
+            mesh.set("filename", convert_model(file))
+        content = ElementTree.tostring(root)
+    suffix = ".obj" if path.suffix.lower() in MESH_KINDS else ".urdf"
+    with tempfile.NamedTemporaryFile(suffix=suffix, dir=_make_folder().name, delete=False) as target:
+        target.write(content)
+    return target.name
+
+
+@lru_cache(maxsize=1)
+def _make_folder() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="models_")
+
+
+def find_mesh(urdf: Path, mesh: Element) -> Path:
+    """Return the path of the mesh file of a `mesh` element of a URDF.
+
+    Raises:
+        InputError: The mesh is no file in the folder of the URDF, or is too large.
+    """
+    return find_model(str(urdf.parent / _normalize_name(urdf, mesh.get("filename", ""))))
+
+
+def _normalize_name(urdf: Path, name: str) -> str:
+    """Return a file name without `package://NAME/`, `file://` etc., relative to the URDF's folder.
+
+    Raises:
+        InputError: The file is outside of the folder.
+    """
+    scheme, path = re.findall(r"^(?:(\w+):(?://)?)?(.*)", name)[0]
+    if scheme in ("package", "model") and not (urdf.parent / path).exists():
+        path = path.partition("/")[2]
+    if os.path.isabs(path):
+        path = os.path.relpath(os.path.realpath(unquote(path) if scheme else path), urdf.parent)
+    is_foreign = scheme not in ("", "file", "package", "model") or is_outside_path(path)
+    if is_foreign or has_outside_link(urdf.parent, path):
+        problem = f'the model {urdf.name} names the file "{name}", which is outside of its folder'
+        raise InputError(f"{problem}; copy the file into the folder, and name it without a folder")
+    return path
+
+
+@lru_cache(maxsize=64)
+def read_mesh(path: Path) -> Triangles:
+    """Return vertices and triangles of a Wavefront, STL or COLLADA file; polygons are split into triangles.
+
+    Raises:
+        InputError: The file has another suffix, contains no valid mesh, or has too many triangles.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in MESH_KINDS:
+        raise InputError(f"the model {path.name} is no mesh; convert it to one of: {', '.join(MESH_KINDS)}")
+    try:
+        vertices, triangles = _read_wavefront(path) if suffix == ".obj" else _read_with_trimesh(path, suffix)
+        points = np.array(vertices, dtype=float)
+        faces = np.array(triangles, dtype=np.intp).reshape(-1, 3)
+        if not len(faces):
+            raise ValueError("it has no faces" + (" (lines beginning with f)" if suffix == ".obj" else ""))
+        if points.shape != (len(points), 3) or not np.isfinite(points).all():
+            raise ValueError("a vertex needs three finite numbers")
+        if faces.min() < 0 or faces.max() >= len(points):
+            raise ValueError(f"a face names a vertex that is not there; there are {len(points)}")
+    except Exception as error:  # trimesh raises errors of many types
+        reason = "it has no scene, or a wrong reference" if isinstance(error, AttributeError) else error
+        raise InputError(f"the model {path.name} is no {MESH_KINDS[suffix]} mesh: {reason}") from None
+    if len(faces) > MAX_TRIANGLE_COUNT:
+        problem = f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles"
+        raise InputError(f"{problem}; simplify the mesh")
+    return points, faces
+
+
+def _read_wavefront(path: Path) -> tuple[ArrayLike, ArrayLike]:
+    vertices: list[list[float]] = []
+    triangles: list[tuple[int, int, int]] = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        keyword, *words = line.split() or [""]
+        if keyword == "v":
+            vertices.append([float(word) for word in words[:3]])
+        elif keyword == "f":
+            # A word such as 3/1/2 starts with a vertex number, from 1 or, if negative, from the end.
+            numbers = [int(word.split("/")[0]) for word in words]
+            indices = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
+            triangles += [(indices[0], *pair) for pair in pairwise(indices[1:])]
+    return vertices, triangles
+
+
+def _read_with_trimesh(path: Path, suffix: str) -> tuple[ArrayLike, ArrayLike]:
+    """Read an STL or COLLADA file, the latter with its unit, but, like PyBullet, without its `up_axis`."""
+    import trimesh  # the import takes a second
+
+    content = path.read_bytes()
+    if suffix == ".stl":
+        # A binary file has a header of 80 bytes, the number of triangles, and 50 bytes for each triangle.
+        content = content[: 84 + 50 * int.from_bytes(content[80:84], "little")]
+    elif zipfile.is_zipfile(path) or re.search(rb"\bnan\b", content, re.IGNORECASE):
+        # trimesh would unpack an archive of any size, and replace NaN by 0.
+        raise ValueError("it is an archive, or contains NaN")
+    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
+        warnings.simplefilter("error", DeprecationWarning)  # NumPy warns about text that is no number
+        scene = trimesh.load_scene(io.BytesIO(content), suffix[1:], process=False)
+        if scene.units:
+            scene = scene.convert_units("meters")
+        corners = scene.to_mesh().triangles.reshape(-1, 3)
+    return np.unique(corners, axis=0, return_inverse=True)
+
+
+def make_rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation matrix for the angles in a URDF [rad]: about the fixed axes x, then y, then z."""
+    cr, cp = np.cos([roll, pitch])
+    sr, sp = np.sin([roll, pitch])
+    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    return np.asarray(rotate_about_z(yaw) @ about_y @ about_x)
+
+
+def parse_numbers(
+    path: Path, element: Element, key: str, default: tuple[float, ...], minimum: float = -math.inf
+) -> tuple[float, ...]:
+    """Return the numbers in an attribute of a URDF, or `default` if the attribute is missing.
+
+    Raises:
+        InputError: The numbers are not as many finite numbers as in `default`, or not above `minimum`.
+    """
+    text = element.get(key)
+    try:
+        numbers = default if text is None else tuple(map(float, text.split()))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != len(default) or not (np.isfinite(numbers) & (np.array(numbers) > minimum)).all():
+        problem = f'the model {path.name} has {key}="{text or ""}" in a <{element.tag}>'
+        limit = f" above {minimum:g}" if minimum > -math.inf else ""
+        raise InputError(f"{problem}; write {len(default)} finite number(s){limit}")
+    return numbers

@@ -1,0 +1,448 @@
+"""Initial world of a run: the changes of a scene file, and random objects at rest on the table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import AfterValidator, Field
+
+from executive.cell.config import CellConfig, ObjectConfig
+from executive.cell.device_config import (
+    POSE_AND_FOV_KEYS,
+    CalibrationConfig,
+    CameraConfig,
+    Colour,
+    Fraction,
+    Natural,
+    NoiseConfig,
+    Section,
+    TransformConfig,
+    check_ascending,
+)
+from executive.cell.objects import UNKNOWN_LABEL
+from executive.drivers.sim.camera import Light
+from executive.drivers.sim.models import (
+    DAMAGED_MODEL_NUMBER,
+    DROP_HEIGHT,
+    UNKNOWN_MODEL_COUNT,
+    load_mesh,
+    load_unknown_model,
+    scale_model,
+)
+from executive.drivers.sim.world import TEXTURES, WOOD_TEXTURE, World
+from executive.errors import InputError
+from executive.geometry import Array, Pose, rotate_about_z
+from executive.perception.camera_model import (
+    compute_calibration,
+    compute_camera_matrix,
+    compute_field_of_view,
+    intersect_plane,
+)
+from executive.text.findings import Finding, MissionError, make_error, sort_findings, suggest_choice
+from executive.text.validate import KeyPath, find_span, validate
+from executive.text.yaml_files import YamlNode, parse_yaml, read_source
+
+ANY_CLASS = "any"
+"""Key in `objects` of the section for all classes without their own section."""
+MAX_FOV_DEG = 178.0
+"""Maximum vertical field of view of a camera [degree]."""
+
+
+def _check_texture(name: str) -> str:
+    if name not in TEXTURES:
+        last_pattern = TEXTURES[-1]
+        raise ValueError(f'must be "wood", "plain", or "pattern 0" to "{last_pattern}", not "{name}"')
+    return name
+
+
+def _check_model_range(numbers: tuple[int, int]) -> tuple[int, int]:
+    if set(numbers) == {DAMAGED_MODEL_NUMBER}:
+        raise ValueError(
+            f"contains only number {DAMAGED_MODEL_NUMBER}, whose mesh is damaged; name a wider range"
+        )
+    return numbers
+
+
+def _check_palette(colours: tuple[Colour, ...]) -> tuple[Colour, ...]:
+    if not colours:
+        raise ValueError("needs at least one colour [r, g, b], each 0 to 1")
+    return colours
+
+
+Displacement = Annotated[float, Field(ge=-1, le=1)]
+AngleDeg = Annotated[float, Field(ge=-90, le=90)]
+CountRange = Annotated[tuple[Natural, Natural], AfterValidator(check_ascending)]
+ModelNumber = Annotated[int, Field(ge=0, lt=UNKNOWN_MODEL_COUNT)]
+ModelRange = Annotated[
+    tuple[ModelNumber, ModelNumber], AfterValidator(check_ascending), AfterValidator(_check_model_range)
+]
+Palette = Annotated[tuple[Colour, ...], AfterValidator(_check_palette)]
+
+
+class SceneTableConfig(Section):
+    """The surface of the table and the arrangement of the objects."""
+
+    colour: Colour = (1.0, 1.0, 1.0)
+    """Factors on the texture: r, g, b, each 0 to 1."""
+    texture: Annotated[str, AfterValidator(_check_texture)] = WOOD_TEXTURE
+    """`wood`, `plain` (white), or a generated texture, `pattern 0` to `pattern 23`."""
+    objects: CountRange | None = None
+    """Minimum and maximum number of objects of the cell's classes; by default as in the cell file."""
+    gap: float | None = Field(None, ge=0, le=0.5)
+    """Minimum distance between the outlines of two objects [m]; 0: outlines may touch. By default
+    as in the cell file."""
+    stacked: Fraction | None = None
+    """Fraction of the objects that are put on top of another object, 0 to 1; objects of an unstable
+    stack return to the table. By default as in the cell file."""
+
+
+class SceneObjectConfig(Section):
+    """Colours and size of one object class."""
+
+    colours: Palette | None = None
+    """Colours (r, g, b, each 0 to 1) of which each object gets one; by default those of the cell
+    file."""
+    scale: float = Field(1.0, ge=0.2, le=3)
+    """Factor on the size that the cell file declares."""
+
+
+class UnknownConfig(Section):
+    """Objects without a class, in addition to the other objects; they are never stacked."""
+
+    count: CountRange
+    """Minimum and maximum number of these objects."""
+    models: ModelRange = (800, 999)
+    """First and last number of the shapes in `random_urdfs` of pybullet_data, 0 to 999; the shipped detector
+    was trained with 0 to 799."""
+    scale: float = Field(0.6, ge=0.1, le=2)
+    """Factor on the size of the shapes; most shapes are 0.12 m long at factor 1."""
+    colours: Palette = ((1.0, 1.0, 1.0),)
+    """Colours (r, g, b, each 0 to 1) of which each object gets one."""
+
+
+class SceneCameraConfig(Section):
+    """Calibration errors of the camera; its frames contain the matrix and the pose of the cell file."""
+
+    shift: tuple[Displacement, Displacement, Displacement] = (0.0, 0.0, 0.0)
+    """Displacement x, y, z [m], each -1 to 1: in the world, or for a wrist camera in the flange frame."""
+    turn_deg: tuple[AngleDeg, AngleDeg, AngleDeg] = (0.0, 0.0, 0.0)
+    """Rotation vector about the optical centre [degree], each -90 to 90; axes of the camera: x to the
+    right, y down, z forwards."""
+    orbit_deg: tuple[AngleDeg, AngleDeg, AngleDeg] = (0.0, 0.0, 0.0)
+    """Rotation vector about the point where the optical axis meets the table top [degree], each -90 to 90;
+    axes of the world. Only for a fixed camera."""
+    fov_factor: float = Field(1.0, ge=0.3, le=3)
+    """Factor on the vertical field of view."""
+    noise: NoiseConfig | None = None
+    """Sensor noise; by default as in the cell file."""
+
+
+class SceneConfig(Section):
+    """Changes to the simulated world; a missing key leaves the world as the cell file declares it."""
+
+    scene: str = Field(min_length=1)
+    """Name of the scene."""
+    light: Light = Light()
+    """The directional light and the ambient light."""
+    table: SceneTableConfig = SceneTableConfig()
+    """The table, and the number and positions of the objects."""
+    objects: dict[str, SceneObjectConfig] = Field(default_factory=dict)
+    """Colours and sizes by class; `any`: every class without a section."""
+    unknown: UnknownConfig | None = None
+    """Objects without a class; none by default."""
+    camera: SceneCameraConfig = SceneCameraConfig()
+    """Calibration errors and noise of the camera."""
+
+
+DECLARED_SCENE = SceneConfig(scene="as declared")
+"""The scene without changes to the world of the cell file."""
+
+
+def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
+    """Return the content of a scene file, checked against the cell whose world it changes.
+
+    Args:
+        path: The file, or None for `DECLARED_SCENE`.
+        config: The cell file.
+
+    Raises:
+        MissionError: The file is invalid; the error lists all findings.
+        InputError: There is no such file, or the cell is not simulated.
+    """
+    if path is None:
+        return DECLARED_SCENE
+    if config.kind != "sim":
+        raise InputError(
+            f"the scene {path} changes the simulated world of a cell of kind sim, and the cell {config.cell} "
+            f"is of kind {config.kind}; leave --scene out, or name a mission on a cell of kind sim"
+        )
+    source = read_source(path)
+    root, findings = parse_yaml(source)
+    scene, errors = (None, ()) if root is None else validate(root, SceneConfig)
+    if root is not None and scene is not None:
+        errors = (*errors, *_find_cell_findings(scene, root, config))
+    if scene is None or findings or errors:
+        raise MissionError(sort_findings((*findings, *errors), source.path))
+    return scene
+
+
+def _find_cell_findings(scene: SceneConfig, root: YamlNode, config: CellConfig) -> Iterator[Finding]:
+    for label in scene.objects:
+        if label not in (ANY_CLASS, *config.objects):
+            span = find_span(root, ("objects", label), at_key=True)
+            hint = suggest_choice(label, (*config.objects, ANY_CLASS), "Valid keys")
+            yield make_error(span, "unknown-class", f'the cell {config.cell} has no class "{label}"', hint)
+    name, camera = next(iter(config.cameras.items()))
+    if any(scene.camera.orbit_deg) and camera.mount != "fixed":
+        yield make_error(
+            find_span(root, ("camera", "orbit_deg")), "wrong-value",
+            f"camera.orbit_deg moves a fixed camera, and the camera {name} of the cell {config.cell} is "
+            "mounted on the wrist; use shift and turn_deg",
+        )  # fmt: skip
+    declared_fov = compute_field_of_view(compute_calibration(camera)[0], camera.height)
+    if declared_fov * scene.camera.fov_factor > MAX_FOV_DEG:
+        yield make_error(
+            find_span(root, ("camera", "fov_factor")), "out-of-range",
+            f"camera.fov_factor must be at most {MAX_FOV_DEG / declared_fov:.2f}, because the declared field "
+            f"of view is {declared_fov:.1f} degrees, and no lens has more than {MAX_FOV_DEG:g}",
+        )  # fmt: skip
+
+
+def build_world(config: CellConfig, scene: SceneConfig, *, gui: bool = False) -> World:
+    """Return the world of a scene, without objects; its `config` contains the changes of the scene."""
+    world = World(apply_scene(config, scene), gui=gui)
+    if (scene.table.colour, scene.table.texture) != ((1.0, 1.0, 1.0), WOOD_TEXTURE):
+        world.paint_table(scene.table.colour, scene.table.texture)
+    return world
+
+
+def apply_scene(config: CellConfig, scene: SceneConfig) -> CellConfig:
+    """Return the cell configuration with the objects, the table and the camera of a scene."""
+    table_changes = scene.table.model_dump(include={"objects", "gap", "stacked"}, exclude_none=True)
+    table = config.table.model_copy(update=table_changes)
+    objects = {label: _change_object(label, model, scene) for label, model in config.objects.items()}
+    cameras = {name: _change_camera(camera, scene) for name, camera in config.cameras.items()}
+    return config.model_copy(update={"table": table, "objects": objects, "cameras": cameras})
+
+
+def _change_object(label: str, model: ObjectConfig, scene: SceneConfig) -> ObjectConfig:
+    section = scene.objects.get(label, scene.objects.get(ANY_CLASS))
+    if section is None:
+        return model
+    colours = section.colours or model.colours
+    if len(colours) == 1:
+        # The number of colours is kept, because each later random choice depends on this number.
+        colours *= len(model.colours)
+    return scale_model(model, section.scale).model_copy(update={"colours": colours})
+
+
+def _change_camera(camera: CameraConfig, scene: SceneConfig) -> CameraConfig:
+    """Return a camera whose key `calibration` contains the pose and the intrinsics of a scene."""
+    section = scene.camera
+    if section.noise is not None:
+        camera = camera.model_copy(update={"noise": section.noise})
+    if not any((*section.shift, *section.turn_deg, *section.orbit_deg)) and section.fov_factor == 1:
+        return camera
+    matrix, X_MC = compute_calibration(camera)
+    if any(section.orbit_deg):
+        centre = intersect_plane(matrix, X_MC, matrix[:2, 2], 0.0)
+        X_MC = Pose.of(centre) @ _make_rotation(section.orbit_deg) @ Pose.of(-centre) @ X_MC
+    X_MC = Pose.of(section.shift) @ X_MC @ _make_rotation(section.turn_deg)
+    fov = compute_field_of_view(matrix, camera.height) * section.fov_factor
+    factor = compute_camera_matrix(camera.width, camera.height, fov)[1, 1] / matrix[1, 1]
+    fx, fy = factor * matrix.diagonal()[:2]
+    cx, cy = matrix[:2, 2] - 0.5
+    pose = TransformConfig(rotation=tuple(X_MC.rotation_vector), translation=tuple(X_MC.position))
+    calibration = CalibrationConfig(matrix=(fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0), camera_to_mount=pose)
+    return camera.model_copy(update={**dict.fromkeys(POSE_AND_FOV_KEYS), "calibration": calibration})
+
+
+def _make_rotation(vector_deg: ArrayLike) -> Pose:
+    return Pose(np.asarray(cv2.Rodrigues(np.radians(vector_deg))[0]), np.zeros(3))
+
+
+MAX_REST_SPEED = 0.002
+"""Speed below which an object counts as at rest [m/s]."""
+MIN_SETTLING_STEPS = 60
+"""Minimum number of physics steps until rest; released objects are slow in the first steps."""
+MAX_SETTLING_STEPS = 480
+"""Maximum number of physics steps until rest."""
+MAX_STACK_OFFSET = 0.004
+"""Maximum offset between the axes of two stacked objects, along x and y [m]."""
+PUSH_SPEED = 0.1
+"""Horizontal speed given to an upper object to test a stack [m/s]; a stable object stops within 1 mm."""
+MAX_DISPLACEMENT = 0.005
+"""Maximum distance of an object in a stable stack from its goal position [m]."""
+
+
+def derive_seeds(seed: int) -> tuple[int, ...]:
+    """Return the random seeds of objects, camera noise, detectors and load noise for the seed of a run."""
+    return tuple(int(child.generate_state(1)[0]) for child in np.random.SeedSequence(seed).spawn(4))
+
+
+def build_initial_world(
+    config: CellConfig, seed: int, *, gui: bool = False, scene: SceneConfig = DECLARED_SCENE
+) -> World:
+    """Return the initial world of the run with a seed: arm at `home`, objects at rest on the table.
+
+    Raises:
+        InputError: The workspace has no room for the objects.
+    """
+    world = build_world(config, scene, gui=gui)
+    object_seed, *_ = derive_seeds(seed)
+    spawn_objects(world, object_seed, scene.unknown)
+    world.rest_positions = {body: [world.get_object_pose(body).position] for body in world.labels}
+    return world
+
+
+def spawn_objects(world: World, seed: int, unknown: UnknownConfig | None = None) -> tuple[int, ...]:
+    """Put random objects on the table, simulate until they are at rest, and return the bodies.
+
+    The cell file of the world states the classes and the range of their number.
+
+    Raises:
+        InputError: The workspace has no room for the objects.
+    """
+    config = world.config
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(*config.table.objects, endpoint=True))
+    labels = [str(label) for label in rng.choice(list(config.objects), count)]
+    models = [(label, config.objects[label]) for label in labels]
+    if unknown is not None:
+        models += [(UNKNOWN_LABEL, model) for model in _draw_unknown_models(unknown, rng)]
+    positions = draw_positions(config, [model.radius for _, model in models], rng)
+    bodies = []
+    for (label, model), position in zip(models, positions, strict=True):
+        height = DROP_HEIGHT - load_mesh(model).bottom
+        X_WO = Pose(rotate_about_z(rng.uniform(0, math.tau)), np.array([*position, height]))
+        colour = model.colours[int(rng.integers(len(model.colours)))]
+        bodies.append(world.add_object(label, X_WO, colour, model))
+    _step_until_rest(world, bodies, lambda: False)
+    if config.table.stacked:
+        _stack_objects(world, bodies[:count], config.table.stacked, rng)
+    return tuple(bodies)
+
+
+def _draw_unknown_models(unknown: UnknownConfig, rng: np.random.Generator) -> Iterator[ObjectConfig]:
+    first_number, last_number = unknown.models
+    numbers = [number for number in range(first_number, last_number + 1) if number != DAMAGED_MODEL_NUMBER]
+    count = int(rng.integers(*unknown.count, endpoint=True))
+    for number in rng.choice(numbers, count):
+        model = scale_model(load_unknown_model(int(number)), unknown.scale)
+        yield model.model_copy(update={"colours": unknown.colours})
+
+
+def _stack_objects(world: World, bodies: Sequence[int], probability: float, rng: np.random.Generator) -> None:
+    """Put objects at rest, each with a probability of 0 to 1, on others, in stacks of two.
+
+    A simulation tests each stack, first without and then with a push. If the upper object falls, all objects
+    return to their previous poses. Balls are therefore never stacked.
+    """
+    unstacked = set(bodies)
+    for upper in bodies:
+        if rng.random() >= probability or upper not in unstacked:
+            continue
+        for lower in map(int, rng.permutation(sorted(unstacked - {upper}))):
+            if _try_stack(world, upper, lower, rng):
+                unstacked -= {upper, lower}
+                break
+
+
+def _try_stack(world: World, upper: int, lower: int, rng: np.random.Generator) -> bool:
+    """Put one object on another and return True if the stack is stable; otherwise restore all poses."""
+    initial_poses = {body: world.get_object_pose(body) for body in world.labels}
+    lower_position = initial_poses[lower].position
+    lower_mesh, upper_mesh = (load_mesh(world.models[body]) for body in (lower, upper))
+    height = lower_position[2] + lower_mesh.top - upper_mesh.bottom + DROP_HEIGHT
+    offset = rng.uniform(-MAX_STACK_OFFSET, MAX_STACK_OFFSET, 2)
+    position = np.array([*(lower_position[:2] + offset), height])
+    goals = {**initial_poses, upper: Pose(rotate_about_z(rng.uniform(0, math.tau)), position)}
+    world.place_object(upper, goals[upper])
+    _step_until_rest(world, list(goals), lambda: _has_moved(world, goals))
+    angle = rng.uniform(0, math.tau)
+    world.client.resetBaseVelocity(upper, [PUSH_SPEED * math.cos(angle), PUSH_SPEED * math.sin(angle), 0.0])
+    _step_until_rest(world, list(goals), lambda: _has_moved(world, goals))
+    if not _has_moved(world, goals):
+        return True
+    for body, X_WO in initial_poses.items():
+        world.place_object(body, X_WO)
+    return False
+
+
+def _has_moved(world: World, goals: Mapping[int, Pose]) -> bool:
+    return any(
+        float(np.linalg.norm(world.get_object_pose(body).position - X_WO.position)) > MAX_DISPLACEMENT
+        for body, X_WO in goals.items()
+    )
+
+
+def _step_until_rest(world: World, bodies: Sequence[int], must_end: Callable[[], bool]) -> None:
+    """Step until all bodies are at rest or `must_end` returns True, at most `MAX_SETTLING_STEPS` times."""
+    for step in range(MAX_SETTLING_STEPS):
+        world.step()
+        speeds = [np.linalg.norm(world.client.getBaseVelocity(body)[0]) for body in bodies]
+        if (step >= MIN_SETTLING_STEPS and max(speeds, default=0.0) < MAX_REST_SPEED) or must_end():
+            return
+
+
+MAX_POSITION_ATTEMPTS = 2000
+"""Number of random positions for one set of objects after which the workspace counts as too small."""
+OBJECT_SET_COUNT = 5
+"""Number of random sets of objects for which `find_object_count_errors` tries to find positions."""
+
+
+def find_object_count_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the key and an error if no random set with the maximum number of objects fits the workspace."""
+    message = ""
+    for seed in range(OBJECT_SET_COUNT):
+        rng = np.random.default_rng(seed)
+        labels = [str(label) for label in rng.choice(list(config.objects), config.table.objects[1])]
+        try:
+            draw_positions(config, [config.objects[label].radius for label in labels], rng)
+            return
+        except InputError as error:
+            message = str(error)
+    yield ("table", "objects"), message
+
+
+def find_max_object_count(config: CellConfig, limit: int) -> int:
+    """Return the maximum number of objects, up to `limit`, for which the workspace has room."""
+    for count in range(limit, 0, -1):
+        table = config.table.model_copy(update={"objects": (0, count)})
+        if not any(find_object_count_errors(config.model_copy(update={"table": table}))):
+            return count
+    return 0
+
+
+def draw_positions(config: CellConfig, radii: Sequence[float], rng: np.random.Generator) -> list[Array]:
+    """Return random positions `(2,)` [m] of circles with the given radii [m] and the gap of the cell file.
+
+    After a failed attempt to position a circle, all circles are positioned again with a probability of 2 %.
+
+    Raises:
+        InputError: The workspace has no room for the circles.
+    """
+    low, high = np.array([config.table.x, config.table.y]).T
+    positions: list[Array] = []
+    for _ in range(MAX_POSITION_ATTEMPTS):
+        if len(positions) == len(radii):
+            return positions
+        position = rng.uniform(low, high)
+        radius = radii[len(positions)]
+        circles = zip(positions, radii, strict=False)
+        gaps = [np.linalg.norm(position - centre) - radius - other_radius for centre, other_radius in circles]
+        if min(gaps, default=math.inf) >= config.table.gap:
+            positions.append(position)
+        elif rng.random() < 0.02:
+            positions = []
+    raise InputError(
+        f"{len(radii)} objects found no room on the workspace of cell {config.cell}, "
+        f"{high[0] - low[0]:.2f} m by {high[1] - low[1]:.2f} m, {config.table.gap * 1000:.0f} mm apart; "
+        "ask for fewer or widen table.x and table.y"
+    )

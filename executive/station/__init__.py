@@ -1,0 +1,1 @@
+"""What is built above the devices of a cell: planner service, camera, ledger, detectors."""

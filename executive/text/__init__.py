@@ -1,0 +1,1 @@
+"""Texts of files: sources with positions, findings, YAML trees, and their validation."""

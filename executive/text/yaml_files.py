@@ -1,0 +1,446 @@
+"""Search for the files of missions and cells, and parsing of their YAML text to nodes with positions.
+
+A file can neither execute code nor exhaust the memory: tags are errors, and the size of the tree is limited.
+"""
+
+from __future__ import annotations
+
+import math
+import os.path
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+import yaml
+from pydantic import JsonValue
+
+import executive
+from executive.errors import InputError
+from executive.text.findings import Finding, Source, Span, describe_value, make_error, suggest_choice
+
+_MAX_FILE_SIZE = 1_000_000
+"""Maximum size of a mission or cell file [byte]."""
+
+
+def is_outside_path(path_text: str) -> bool:
+    """Return True if a path may lead out of its folder: it is absolute, or contains `..` or a backslash."""
+    path = PurePosixPath(path_text)
+    return path.is_absolute() or ".." in path.parts or "\\" in path_text
+
+
+def has_outside_link(folder: Path, path_text: str) -> bool:
+    """Return True if a relative path leads out of a folder through a symbolic link."""
+    return not (folder / path_text).resolve().is_relative_to(folder.resolve())
+
+
+def get_shipped_folder() -> Path:
+    """Return the folder of the shipped missions, in a wheel or in a checkout."""
+    package = Path(executive.__file__).parent
+    wheel_folder = package / "shipped"
+    return wheel_folder if wheel_folder.is_dir() else package.parent / "missions"
+
+
+def list_shipped_missions() -> list[str]:
+    """Return the names of the shipped missions."""
+    return sorted(path.stem for path in get_shipped_folder().glob("*.yaml"))
+
+
+def find_mission(name: str | Path) -> Path:
+    """Return the mission file with the path `name`, or the shipped mission with this name.
+
+    Raises:
+        InputError: There is no such file and no such shipped mission.
+    """
+    path = Path(name)
+    # Unlike the methods of Path, these functions return False for invalid file names.
+    if os.path.isfile(path):
+        return path
+    if os.path.lexists(path):
+        raise InputError(f'"{name}" is {_describe_kind(path)}, not a file')
+    stem = PurePosixPath(str(name).removeprefix("missions/").removesuffix(".yaml"))
+    if len(stem.parts) == 1 and os.path.isfile(shipped_path := get_shipped_folder() / f"{stem}.yaml"):
+        return shipped_path
+    hint = suggest_choice(str(stem), list_shipped_missions(), "Shipped missions")
+    raise InputError(f'there is no mission file and no shipped mission "{name}". {hint}')
+
+
+def find_file_below(folder: Path, reference: str, shipped_subfolders: Sequence[str] = ("",)) -> Path:
+    """Return the file with the relative path `reference` in `folder`, otherwise in a shipped subfolder.
+
+    Raises:
+        InputError: The reference leaves the folder, or the file does not exist.
+    """
+    if is_outside_path(reference):
+        advice = 'give a relative path without ".."'
+        raise InputError(f'"{reference}" is outside the folder of the file that names it; {advice}')
+    roots = (folder, *(get_shipped_folder() / subfolder for subfolder in shipped_subfolders))
+    for root in roots:
+        path = root / reference
+        if os.path.isfile(path):
+            if has_outside_link(root, reference):
+                raise InputError(f'"{reference}" is a link to a file outside {root}')
+            return path
+        if os.path.lexists(path):
+            raise InputError(f'"{reference}" in {_shorten_path(root)} is {_describe_kind(path)}, not a file')
+    subfolder = PurePosixPath(reference).parent
+    existing_files = {
+        path.relative_to(root).as_posix()
+        for root in roots
+        if os.path.isdir(root / subfolder)
+        for path in (root / subfolder).glob("*.yaml")
+    }
+    hint = suggest_choice(reference, sorted(existing_files), "Existing files")
+    folders = " or ".join(dict.fromkeys(map(_shorten_path, roots)))
+    raise InputError(f'there is no file "{reference}" in {folders}. {hint}')
+
+
+def read_source(path: Path) -> Source:
+    """Return the text of a file.
+
+    Raises:
+        InputError: The file is missing, too large, or not UTF-8 text.
+    """
+    try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path} is {_describe_kind(path)}, not a file")
+        if path.stat().st_size > _MAX_FILE_SIZE:
+            limit = f"{_MAX_FILE_SIZE} bytes, the maximum size of a mission or a cell"
+            raise InputError(f"{path} is larger than {limit}")
+        return Source(_shorten_path(path), path.read_bytes().decode("utf-8-sig"))
+    except FileNotFoundError:
+        raise InputError(f"there is no file {path}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not UTF-8 text: byte {error.start} is invalid") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from None
+
+
+def _describe_kind(path: str | Path) -> str:
+    if os.path.isdir(path):
+        return "a folder"
+    return "a pipe or a device" if os.path.exists(path) else "a link to nothing"
+
+
+def _shorten_path(path: Path) -> str:
+    """Return the path relative to the working directory; a path outside this directory is unchanged."""
+    try:
+        cwd = Path.cwd()
+    except FileNotFoundError:  # The working directory was deleted.
+        return str(path)
+    return str(path.relative_to(cwd)) if path.is_absolute() and path.is_relative_to(cwd) else str(path)
+
+
+_MAX_DEPTH = 50
+"""Maximum depth of the nesting of lists and mappings."""
+_SURROGATE = re.compile("[\ud800-\udfff]")
+"""Surrogate code point, which an escape sequence can produce, but UTF-8 cannot encode."""
+_MAX_NODE_COUNT = 20_000
+"""Maximum number of keys and values; an alias counts like a copy of the anchored node."""
+_ADVICE_BY_MESSAGE = {
+    "mapping values are not allowed here": (
+        "Is a colon missing at the end of the line above, or are braces, as in Detect: {view: full}? "
+        'A text that contains ": " needs quotes.'
+    ),
+    "found character '\\t' that cannot start any token": "Indent with blanks instead of tabs.",
+    "expected <block end>": "Compare the indentation with the lines above.",
+    "expected ',' or": "Close the bracket or brace.",
+}
+"""Advice on syntax errors, by the start of PyYAML's message."""
+_DEPTH_MESSAGE = f"lists and mappings are nested more than {_MAX_DEPTH} levels deep"
+_FAST_LOADER: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""Parser of libyaml, which takes a quarter of the time; the Python parser if PyYAML lacks libyaml."""
+_LIBYAML_DIFFERENCE = re.compile(r"[^\n\x20-\x7e\xa1-\u1fff]|[?]|---|:\s*[,}\]]")
+"""Text that libyaml may read differently: special characters, `?`, `---`, and empty keys in brackets."""
+_LINE_LENGTH = 1000
+"""Length of a span [characters] that reaches the end of the line."""
+
+
+@dataclass(frozen=True)
+class _Node:
+    """Base class of the nodes."""
+
+    span: Span
+
+    @property
+    def python_value(self) -> JsonValue:
+        """The node as plain Python values."""
+        raise NotImplementedError
+
+    @property
+    def description(self) -> str:
+        """Description of the value, for the end of a sentence."""
+        return describe_value(self.python_value)
+
+
+@dataclass(frozen=True)
+class YamlScalar(_Node):
+    """A value that is no list or mapping; `text` is its text in the file without quotes."""
+
+    value: ScalarValue
+    text: str
+
+    @property
+    def python_value(self) -> JsonValue:
+        """The value."""
+        return self.value
+
+
+@dataclass(frozen=True)
+class YamlSequence(_Node):
+    """A list of nodes."""
+
+    items: tuple[YamlNode, ...]
+
+    @property
+    def python_value(self) -> JsonValue:
+        """The list of the values of the items."""
+        return [item.python_value for item in self.items]
+
+
+@dataclass(frozen=True)
+class YamlEntry:
+    """`key: value` in a mapping."""
+
+    key: YamlScalar
+    value: YamlNode
+
+
+@dataclass(frozen=True)
+class YamlMapping(_Node):
+    """Entries with unique keys, in the order of the text."""
+
+    entries: tuple[YamlEntry, ...]
+
+    @property
+    def python_value(self) -> JsonValue:
+        """The values by key."""
+        return {entry.key.text: entry.value.python_value for entry in self.entries}
+
+    def get_entry(self, key: str) -> YamlEntry | None:
+        """Return the entry of `key`, or None."""
+        return next((entry for entry in self.entries if entry.key.text == key), None)
+
+    def get(self, key: str) -> YamlNode | None:
+        """Return the value of `key`, or None."""
+        entry = self.get_entry(key)
+        return entry.value if entry else None
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The keys in the order of the text."""
+        return tuple(entry.key.text for entry in self.entries)
+
+
+YamlNode = YamlScalar | YamlSequence | YamlMapping
+
+
+def list_scalars(node: YamlNode) -> list[YamlScalar]:
+    """Return every scalar of a node in the order of the text, without keys."""
+    if isinstance(node, YamlScalar):
+        return [node]
+    return [scalar for child in list_children(node) for scalar in list_scalars(child)]
+
+
+def list_children(node: YamlNode) -> tuple[YamlNode, ...]:
+    """Return the items of a sequence, or the values of a mapping; () for a scalar."""
+    if isinstance(node, YamlMapping):
+        return tuple(entry.value for entry in node.entries)
+    return node.items if isinstance(node, YamlSequence) else ()
+
+
+def parse_yaml(source: Source, text: str | None = None) -> tuple[YamlNode | None, list[Finding]]:
+    """Return the root node, or None if an error prevents a complete tree, and the findings.
+
+    `text` is the YAML text at the same positions as in the source; by default the text of the source.
+    """
+    text = source.text if text is None else text
+    composer = _Composer(source, text, yaml.SafeLoader if _LIBYAML_DIFFERENCE.search(text) else _FAST_LOADER)
+    try:
+        try:
+            root = composer.read_document()
+        except (yaml.YAMLError, UnicodeEncodeError):
+            # Unlike libyaml, the Python parser has the same error messages in every installation.
+            composer = _Composer(source, text, yaml.SafeLoader)
+            root = composer.read_document()
+    except yaml.MarkedYAMLError as error:
+        return None, [*composer.findings, _make_syntax_error(source, error)]
+    except yaml.reader.ReaderError as error:
+        return None, [*composer.findings, _make_character_error(source, error)]
+    except _IncompleteTree:
+        return None, composer.findings
+    return root, composer.findings
+
+
+class _IncompleteTree(Exception):
+    """The tree is incomplete because of an error in the findings."""
+
+
+class _Composer:
+    """Composer of the tree of nodes from PyYAML's events, which collects findings."""
+
+    def __init__(self, source: Source, text: str, loader: type[yaml.SafeLoader]) -> None:
+        self.source = source
+        self.findings: list[Finding] = []
+        self._events: Iterator[yaml.Event] = yaml.parse(text, Loader=loader)
+        # Node of each anchor, and number of keys and values in the node.
+        self._anchors: dict[str, tuple[YamlNode, int]] = {}
+        self._node_count = 0
+
+    def read_document(self) -> YamlNode:
+        """Return the root node of the only document."""
+        next(self._events)  # StreamStartEvent
+        if isinstance(next(self._events), yaml.StreamEndEvent):
+            raise self._add_fatal_error(self.source.make_span(), "empty", "the file is empty")
+        root = self._read_node(next(self._events), 0)
+        next(self._events)  # DocumentEndEvent
+        event = next(self._events)
+        if not isinstance(event, yaml.StreamEndEvent):
+            message = 'a second document starts here, after "---"'
+            raise self._add_fatal_error(self._make_span(event, len("---")), "two-documents", message)
+        return root
+
+    def _read_node(self, event: yaml.Event, depth: int) -> YamlNode:
+        """Return the node that starts with `event`; `depth` is the number of containers around the node."""
+        if isinstance(event, yaml.AliasEvent):
+            return self._resolve_alias(event, depth)
+        # PyYAML checks the YAML grammar, so that only these events can start a node.
+        assert isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent)
+        count_before = self._node_count
+        self._count_nodes(1, event)
+        if event.tag is not None:
+            self._add_error(self._make_span(event), "tag", f'the tag "{event.tag}" is not allowed')
+        node = self._read_value(event, depth)
+        if event.anchor is not None:
+            self._anchors[event.anchor] = node, self._node_count - count_before
+        return node
+
+    def _resolve_alias(self, event: yaml.AliasEvent, depth: int) -> YamlNode:
+        if event.anchor not in self._anchors:
+            message = f'there is no anchor "&{event.anchor}" above'
+            raise self._add_fatal_error(self._make_span(event), "alias", message)
+        node, node_count = self._anchors[event.anchor]
+        if depth + _compute_height(node) > _MAX_DEPTH:
+            raise self._add_fatal_error(self._make_span(event), "too-deep", _DEPTH_MESSAGE)
+        self._count_nodes(node_count, event)
+        return node
+
+    def _count_nodes(self, count: int, event: yaml.Event) -> None:
+        """Add to the number of keys and values; raise `_IncompleteTree` above `_MAX_NODE_COUNT`."""
+        self._node_count += count
+        if self._node_count > _MAX_NODE_COUNT:
+            message = f"the file has more than {_MAX_NODE_COUNT} keys and values, including those of aliases"
+            raise self._add_fatal_error(self._make_span(event), "too-large", message)
+
+    def _read_value(self, event: yaml.Event, depth: int) -> YamlNode:
+        if isinstance(event, yaml.ScalarEvent):
+            text = event.value
+            span = self._make_span(event)
+            if _SURROGATE.search(text):
+                self._add_error(span, "yaml", "a surrogate (U+D800 to U+DFFF) is no character")
+                text = _SURROGATE.sub("?", text)
+            return YamlScalar(span, convert_scalar(text) if event.implicit[0] else text, text)
+        if depth >= _MAX_DEPTH:
+            raise self._add_fatal_error(self._make_span(event, 1), "too-deep", _DEPTH_MESSAGE)
+        if isinstance(event, yaml.SequenceStartEvent):
+            items = []
+            while not isinstance(item_event := next(self._events), yaml.SequenceEndEvent):
+                items.append(self._read_node(item_event, depth + 1))
+            return YamlSequence(self._make_span(event, 1), tuple(items))
+        return self._read_mapping(event, depth)
+
+    def _read_mapping(self, event: yaml.Event, depth: int) -> YamlMapping:
+        entries: dict[str, YamlEntry] = {}
+        while not isinstance(key_event := next(self._events), yaml.MappingEndEvent):
+            key = self._read_node(key_event, depth + 1)
+            value = self._read_node(next(self._events), depth + 1)
+            if not isinstance(key, YamlScalar):
+                self._add_error(key.span, "bad-key", "a key must be a single word")
+            elif key.text == "<<":
+                message = 'the merge key "<<" is not allowed; write the merged keys here'
+                self._add_error(key.span, "merge-key", message)
+            elif key.text in entries:
+                first_line = entries[key.text].key.span.line
+                message = f'the key "{key.text}" occurs twice here; the first is in line {first_line}'
+                self._add_error(key.span, "duplicate-key", message)
+            else:
+                entries[key.text] = YamlEntry(key, value)
+        return YamlMapping(self._make_span(event, 1), tuple(entries.values()))
+
+    def _make_span(self, event: yaml.Event, length: int = 0) -> Span:
+        """Return the span of an event; if `length` is 0, the span covers the first line of the event."""
+        start = event.start_mark
+        end = event.end_mark
+        assert start is not None and end is not None, "PyYAML locates every event"
+        if not length:
+            length = max(1, end.column - start.column) if start.line == end.line else _LINE_LENGTH
+        return Span(self.source, start.line + 1, start.column + 1, length)
+
+    def _add_fatal_error(self, span: Span, code: str, message: str) -> _IncompleteTree:
+        self._add_error(span, code, message)
+        return _IncompleteTree()
+
+    def _add_error(self, span: Span, code: str, message: str) -> None:
+        self.findings.append(make_error(span, code, message))
+
+
+def _compute_height(node: YamlNode) -> int:
+    height_below = max(map(_compute_height, list_children(node)), default=0)
+    return 0 if isinstance(node, YamlScalar) else 1 + height_below
+
+
+def _make_syntax_error(source: Source, error: yaml.MarkedYAMLError) -> Finding:
+    position = error.problem_mark or error.context_mark
+    span = source.make_span(position.line + 1, position.column + 1, 1) if position else source.make_span()
+    if position and not source.get_line(span.line):
+        # The error is at the end of the text, so the finding shows the last line that is not empty.
+        last_line = source.text.rstrip().count("\n") + 1
+        span = source.make_span(last_line, max(1, len(source.get_line(last_line))), 1)
+    context = f" {error.context}" if error.context else ""
+    context_mark = error.context_mark if context and error.context_mark is not position else None
+    note = f" that began in line {context_mark.line + 1}" if context_mark else ""
+    message = f"not valid YAML:{context}{note}: {error.problem}".replace("::", ":")
+    hints = (hint for text, hint in _ADVICE_BY_MESSAGE.items() if str(error.problem).startswith(text))
+    return make_error(span, "yaml", message, next(hints, ""))
+
+
+def _make_character_error(source: Source, error: yaml.reader.ReaderError) -> Finding:
+    lines = source.text[: error.position + 1].splitlines()
+    character = source.text[error.position : error.position + 1]
+    span = source.make_span(len(lines), len(lines[-1]), 1)
+    return make_error(span, "yaml", f"the character {character!r} is not allowed in YAML")
+
+
+# Spellings of the values in the core schema.
+_VALUE_BY_WORD: Mapping[str, bool | float | None] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+    **dict.fromkeys((".nan", ".NaN", ".NAN"), math.nan),
+}
+_INTEGER = re.compile(r"[-+]?[0-9]+")
+_PREFIXED_INTEGER = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_INFINITE = re.compile(r"[-+]?\.(inf|Inf|INF)")
+_MAX_NUMBER_LENGTH = 300
+"""Maximum number of characters of a number; a longer scalar is a string."""
+
+ScalarValue = None | bool | int | float | str
+
+
+def convert_scalar(text: str) -> ScalarValue:
+    """Return the value of a plain scalar: None, a boolean, a number, or the text itself."""
+    if text in _VALUE_BY_WORD:
+        return _VALUE_BY_WORD[text]
+    if text[0] not in "+-.0123456789" or len(text) > _MAX_NUMBER_LENGTH:
+        return text
+    if _INTEGER.fullmatch(text):
+        number = int(text)
+    elif _PREFIXED_INTEGER.fullmatch(text):
+        number = int(text, base=0)
+    elif _FLOAT.fullmatch(text):
+        return float(text)
+    else:
+        return float(text.replace(".", "")) if _INFINITE.fullmatch(text) else text
+    # A larger integer becomes a float, for JSON readers; the conversion of a text returns infinity if needed.
+    return number if -(2**63) <= number < 2**63 else float(str(number))

@@ -1,0 +1,103 @@
+"""The arm of a cell file with its tool over its table, stepped by hand."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from executive.cell.arm import Goal, Task
+from executive.cell.config import CellConfig
+from executive.cell.protocols import STEP, StepClock
+from executive.drivers.sim.arm import SimArm
+from executive.drivers.sim.collision import ClearanceChecker
+from executive.drivers.sim.tool import SuctionTool
+from executive.drivers.sim.world import World
+from executive.events import Event
+from executive.geometry import Array, Pose
+from executive.motion.planner import Planner
+from executive.motion.trajectory import Trajectory
+
+WHITE = (1.0, 1.0, 1.0)
+
+
+class Rig:
+    """An arm, its tool and nothing on the table, each part as a simulated cell makes it.
+
+    Attributes:
+        events: What arm and tool told the run.
+        commands: Joint positions `(7,)` [rad] that the arm was sent to last, newest at the end.
+    """
+
+    def __init__(self, config: CellConfig) -> None:
+        self.config = config
+        self.world = World(config, visuals=False)
+        self.clearance = ClearanceChecker(config)
+        self.planner = Planner(config, self.clearance.check)
+        self.clock = StepClock(lambda: self.world.step_count * STEP)
+        self.events: list[Event] = []
+        self.tool = SuctionTool(self.world, config.tool)
+        self.arm = SimArm(
+            self.world, self.planner, config, self.clock, lambda: self.tool.held_body, self.events.append
+        )
+        self.commands = deque([self.arm.q], maxlen=400)
+
+    def add(self, label: str, x: float, y: float, z: float | None = None) -> int:
+        """Put an object into the world, standing at (x, y) or with its middle at height z [m]."""
+        height = self.config.objects[label].height / 2 if z is None else z
+        return self.world.add_object(label, Pose.of([x, y, height]), WHITE)
+
+    def step(self, count: int = 1) -> None:
+        """Make control steps."""
+        for _ in range(count):
+            self.arm.advance()
+            self.commands.append(self.arm._commanded_q)
+            self.world.step()
+            self.tool.advance()
+
+    def planned(self, goal: Goal | str, task: Task = Task()) -> Trajectory:
+        """Return a motion, once it is known."""
+        planning = self.arm.plan(goal, task)
+        while not planning.ready:
+            self.step()
+        return planning.result()
+
+    def run(self, most: int = 2000) -> int:
+        """Step until the arm rests and return how many steps that took."""
+        for count in range(most):
+            if self.arm.at_rest:
+                return count
+            self.step()
+        raise AssertionError(f"still moving after {most} steps")
+
+    def go(self, goal: Goal | str, task: Task = Task()) -> Trajectory:
+        """Plan a motion, follow it to its end and return it."""
+        motion = self.planned(goal, task)
+        self.arm.start(motion)
+        self.run()
+        return motion
+
+    def touch_down(self, goal: Goal) -> tuple[Array, float]:
+        """Follow a guarded motion and brake as soon as the tool feels something.
+
+        Returns:
+            Where the tool felt it `(3,)` [m], and the largest force of its lip until it was at rest [N].
+        """
+        self.arm.start(self.planned(goal))
+        while not (self.tool.touching or self.arm.at_rest):
+            self.step()
+        felt, force = self.arm.tool_pose.position, self.pressing()
+        self.arm.stop()
+        while not self.arm.at_rest:
+            self.step()
+            force = max(force, self.pressing())
+        return felt, force
+
+    def pressing(self) -> float:
+        """Return the force between the tool and everything else [N]."""
+        points = self.world.client.getContactPoints(bodyA=self.world.arm, linkIndexA=self.world.tool_index)
+        return float(sum(point[9] for point in points))
+
+    def close(self) -> None:
+        """End the planner and give both worlds back."""
+        self.arm.close()
+        self.clearance.close()
+        self.world.close()

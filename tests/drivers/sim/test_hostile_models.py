@@ -1,0 +1,71 @@
+"""Models that are no models: garbage, other XML, wrong numbers, names that no file can have."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+from executive.cell.config import ObjectConfig
+from executive.drivers.sim.model_files import find_model
+from executive.drivers.sim.models import compute_mass, load_mesh
+from executive.errors import InputError
+
+LEVELS = "".join(f"<!ENTITY a{number + 1} '{f'&a{number};' * 10}'>" for number in range(9))
+BOMB = f"<!DOCTYPE r [<!ENTITY a0 'ha'>{LEVELS}]><robot name='&a9;'/>"
+
+
+@pytest.mark.parametrize(
+    ("content", "error"),
+    [
+        ("garbage", "is no URDF: syntax error"),
+        (BOMB, "is no URDF: "),
+        ("<robot><mesh xmlns='q' filename='../m.obj'/></robot>", "has an XML namespace"),
+        ("<svg/>", "its root is <svg>, not <robot>"),
+        ("<robot><inertial><mass value='nan'/></inertial></robot>", 'has value="nan" in a <mass>'),
+        ("<robot><inertial><mass value='1 2'/></inertial></robot>", 'has value="1 2" in a <mass>'),
+    ],
+    ids=["garbage", "XML bomb", "namespace", "other XML", "not finite", "two numbers"],
+)
+def test_a_file_that_is_no_urdf_is_an_error(content: str, error: str, tmp_path: Path) -> None:
+    (tmp_path / "m.urdf").write_text(content)
+    config = ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03)
+    with pytest.raises(InputError, match=re.escape(error)):
+        compute_mass(config)
+
+
+@pytest.mark.parametrize("mesh", ["/etc/x.obj", "../x.obj", "link.obj", "file:///etc/x.obj", "http://x.obj"])
+def test_a_mesh_outside_of_the_folder_of_its_urdf_is_not_opened(mesh: str, tmp_path: Path) -> None:
+    (tmp_path / "link.obj").symlink_to("/etc/passwd")
+    visual = f"<visual><geometry><mesh filename='{mesh}'/></geometry></visual>"
+    (tmp_path / "m.urdf").write_text(f"<robot>{visual}</robot>")
+    with pytest.raises(InputError, match=rf'names the file "{mesh}", which is outside of its folder; copy'):
+        load_mesh(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+
+
+@pytest.mark.parametrize("part", ["visual", "collision"])
+def test_a_mesh_that_is_no_file_is_not_opened(part: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.obj")
+    shape = f"<{part}><geometry><mesh filename='pipe.obj'/></geometry></{part}>"
+    (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
+    with pytest.raises(InputError, match=r"^there is no model .*pipe\.obj, neither beside the cell file nor"):
+        compute_mass(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+
+
+def test_a_mesh_of_more_than_20000_triangles_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 20_001)
+    shape = "<collision><geometry><mesh filename='m.obj'/></geometry></collision>"
+    (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
+    with pytest.raises(
+        InputError, match=r"^the model m\.obj has more than 20000 triangles; simplify the mesh$"
+    ):
+        load_mesh(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+
+
+def test_a_model_of_more_than_20_megabytes_is_not_read(tmp_path: Path) -> None:
+    with (tmp_path / "m.obj").open("wb") as file:
+        file.truncate(20_000_001)
+    with pytest.raises(InputError, match=r"m\.obj is larger than 20 MB$"):
+        find_model(str(tmp_path / "m.obj"))

@@ -1,0 +1,96 @@
+"""Objects of one's own, given as meshes: where they lie, what is solid of them, what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from executive.cell.config import CellConfig, ObjectConfig
+from executive.drivers.sim.model_files import read_mesh
+from executive.drivers.sim.models import find_model_errors, load_mesh
+from executive.drivers.sim.world import World
+from executive.errors import InputError
+from executive.geometry import Pose, rotate_about_z
+
+Build = Callable[[CellConfig], World]
+
+# A wedge 20 mm long, 10 mm wide and 30 mm high, its origin in a corner of its underside; one face is a quad.
+WEDGE = """
+v 0 0 0
+v 0.02 0 0
+v 0.02 0.01 0
+v 0 0.01 0
+v 0 0 0.03
+v 0 0.01 0.03
+f 4 3 2 1
+f 1/1/1 2/2/1 5/3/1
+f 3 4 6
+f -2 -5 -4 -1
+f 1 5 6 4
+"""
+
+
+@pytest.fixture
+def wedge(tmp_path: Path) -> ObjectConfig:
+    path = tmp_path / "wedge.obj"
+    path.write_text(WEDGE)
+    return ObjectConfig(mesh=str(path), height=0.03, radius=0.0112, mass=0.2)
+
+
+def with_objects(config: CellConfig, **objects: ObjectConfig) -> CellConfig:
+    return config.model_copy(update={"objects": objects})
+
+
+def test_a_mesh_stands_around_its_middle_and_weighs_about_the_middle_of_its_volume(
+    build: Build, overhead: CellConfig, wedge: ObjectConfig
+) -> None:
+    mesh = load_mesh(wedge)
+    assert mesh.vertices.min(axis=0) == pytest.approx([-0.01, -0.005, -0.015])
+    assert mesh.vertices.max(axis=0) == pytest.approx([0.01, 0.005, 0.015])
+    # A third of the way from its upright edge, and from its underside.
+    assert mesh.centroid == pytest.approx([-0.01 + 0.02 / 3, 0.0, -0.005])
+    laid = wedge.model_copy(update={"scale": 2.0, "upright_deg": (90.0, 0.0, 0.0)})
+    assert np.ptp(load_mesh(laid).vertices, axis=0) == pytest.approx([0.04, 0.06, 0.02])
+    world = build(with_objects(overhead, wedge=wedge, laid=laid))
+    X_WO = Pose(rotate_about_z(0.7), np.array([0.5, 0.1, 0.2]))
+    body, other = (
+        world.add_object("wedge", X_WO, (1, 1, 1)),
+        world.add_object("laid", Pose.of([0.3, 0, 0.3]), (1, 1, 1)),
+    )
+    assert world.get_object_pose(body).to_rounded_list() == pytest.approx(X_WO.to_rounded_list(), abs=1e-6)
+    assert world.client.getDynamicsInfo(body, -1)[0] == 0.2
+    centre, _ = world.client.getBasePositionAndOrientation(body)
+    assert centre == pytest.approx(X_WO.apply(mesh.centroid))
+    low, high = world.client.getAABB(other)
+    assert np.subtract(high, low) == pytest.approx([0.04, 0.06, 0.02], abs=0.005)
+    assert (np.array(low) + high) / 2 == pytest.approx([0.3, 0, 0.3], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\n", r"it has no faces \(lines beginning with f\)"),
+        ("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "a vertex needs three finite numbers"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "a face names a vertex that is not there; there are 3"),
+        ("v 0 0 zero\n", "could not convert string to float: 'zero'"),
+    ],
+)
+def test_what_is_no_mesh_is_refused_with_the_reason(text: str, complaint: str, tmp_path: Path) -> None:
+    path = tmp_path / "thing.obj"
+    path.write_text(text)
+    with pytest.raises(InputError, match=rf"the model thing\.obj is no Wavefront mesh: {complaint}"):
+        read_mesh(path)
+
+
+def test_missing_models_and_wrong_sizes_are_named_with_their_keys(
+    overhead: CellConfig, wedge: ObjectConfig
+) -> None:
+    gone = wedge.model_copy(update={"mesh": "gone.obj"})
+    half = overhead.objects["cube"].model_copy(update={"scale": 0.5})
+    found = dict(find_model_errors(with_objects(overhead, gone=gone, half=half)))
+    keys = ("gone", "mesh"), ("half", "height"), ("half", "radius")
+    assert list(found) == [("objects", *key) for key in keys]
+    assert "height of 0.0250 m, not 0.05 m; correct height" in found["objects", "half", "height"]

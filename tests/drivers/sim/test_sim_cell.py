@@ -1,0 +1,76 @@
+"""The simulated cell as a whole: what a seed decides, what the audit counts, what the camera can see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from executive.cell.arm import Goal
+from executive.cell.workcell import CellOptions
+from executive.drivers.fake import SHIPPED_ROUTES
+from executive.drivers.sim.cell import SimCell
+from executive.events import discard_event
+from executive.geometry import Pose
+from executive.mission.cell_file import load_cell
+from executive.station.without_hardware import SilentOperator
+from executive.testing.oracle import TrueFrame, make_oracle_kind
+
+Build = Callable[..., SimCell]
+
+
+@pytest.fixture
+def build_cell(missions: Path, request: pytest.FixtureRequest) -> Build:
+    """Build simulated cells whose detectors are oracles; they are closed after the test."""
+
+    def build_cell(name: str = "overhead", seed: int = 4, **changes: Any) -> SimCell:
+        path = missions / "cells" / f"{name}.yaml"
+        config = load_cell(path).model_copy(update=changes)
+        options = CellOptions(SilentOperator(), cell_folder=path.parent)
+        made = make_oracle_kind(box_std=0.0)(
+            config, seed=seed, routes=SHIPPED_ROUTES, emit=discard_event, options=options
+        )
+        request.addfinalizer(made.close)
+        return made
+
+    return build_cell
+
+
+def test_the_table_is_hidden_while_the_arm_is_over_it(build_cell: Build) -> None:
+    made = build_cell()
+    cell = made.cell
+    assert cell.camera.sees_table()
+    planning = cell.arm.plan(Goal((0.53, 0.0, 0.16)))
+    while not planning.ready:
+        made.advance()
+    cell.arm.start(planning.result())
+    while not cell.arm.at_rest:
+        made.advance()
+    assert not cell.camera.sees_table()
+    frame = cell.camera.capture()
+    left, top, right, bottom = (int(side) for side in cell.camera.get_view_box("table"))
+    hidden = ~frame.visible[top:bottom, left:right]
+    assert 0.05 < hidden.mean() < 0.9
+    x, y, z = frame.matrix @ frame.X_WC.inverse().apply(cell.arm.tool_pose.position)
+    assert not frame.visible[int(y / z), int(x / z)]
+
+
+@pytest.mark.parametrize(("way", "raised"), [("depth", 0.05), ("ray", 0.05), ("plane", 0.0)])
+def test_only_depth_and_ray_find_what_does_not_stand_on_the_table(
+    build_cell: Build, way: str, raised: float
+) -> None:
+    made = build_cell("depth", localization=way)
+    body = next(body for body, label in made._world.labels.items() if label == "cube")
+    made._world.place_object(body, Pose.of((0.6, 0.15, 0.075)))
+    frame = made.cell.camera.capture()
+    assert isinstance(frame, TrueFrame)
+    found = [
+        made.cell.localizer.locate(true, frame) for true in frame.true_detections if true.label == "cube"
+    ]
+    error = min(float(np.linalg.norm(place[:2] - (0.6, 0.15))) for place in found)
+    assert (error < 0.003) == (way != "plane")
+    height = min(found, key=lambda place: float(np.linalg.norm(place[:2] - (0.6, 0.15))))[2]
+    assert height - 0.025 == pytest.approx(raised, abs=0.006)
