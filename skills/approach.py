@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import partial
 
-from executive.cell.arm import Goal
+from executive.cell.arm import Goal, Guard
 from executive.cell.objects import ObjectClass, Target
-from executive.cell.protocols import Cell, Steps, Tool
+from executive.cell.protocols import Cell, Steps
 from executive.manipulation.motions import follow, plan
 from executive.manipulation.tool_goals import (
     OVERTRAVEL,
@@ -60,7 +59,7 @@ class Approach(Skill):
         goal, _ = find_goal_and_task()
         # The zero of a load cell drifts; only before the descent, the tool is at rest and certainly empty.
         cell.ledger.record_empty_load(tool.load)
-        yield from follow(self, cell, motion, until=_build_contact_check(tool))
+        yield from follow(self, cell, motion, Guard(touch=True))
         label = self.target.label
         object_class = cell.classes[label]
         centre_height = float(self.target.position[2])
@@ -94,16 +93,3 @@ def _proves_absence(goal: Goal, target: Target, object_class: ObjectClass) -> bo
     x, y, z = goal.position
     is_central = math.dist((x, y), target.position[:2]) <= object_class.radius / 2
     return is_central and z < target.position[2] and z <= 2 * PROBE_CLEARANCE
-
-
-def _build_contact_check(tool: Tool) -> Callable[[], bool]:
-    """Return a function that returns True on a contact that starts after this call."""
-    was_free = not tool.touching
-
-    def has_new_contact() -> bool:
-        nonlocal was_free
-        is_touching = tool.touching
-        was_free = was_free or not is_touching
-        return was_free and is_touching
-
-    return has_new_contact

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from executive.cell.objects import Target
-from executive.drivers.fake import FakeCell
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 from skills.detect import Detect

@@ -9,7 +9,7 @@ from at_hand import look
 from hypothesis import settings
 
 from executive.cell.objects import Target
-from executive.drivers.fake import FakeCell
+from executive.testing.fake_cell import FakeCell
 
 # Every run of the tests draws the same examples, so that a red test is red again when it is repeated.
 settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)

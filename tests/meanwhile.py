@@ -6,11 +6,12 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
-from executive.cell.workcell import CellOptions, ResumePoint, Workcell
-from executive.drivers.fake import FakeCell
+from executive.cell.workcell import ResumePoint, Workcell
+
 from executive.events import discard_event
 from executive.mission.load import LoadedMission
-from executive.station.without_hardware import SilentOperator
+from executive.station.station import CellOptions, SilentOperator
+from executive.testing.fake_cell import FakeCell
 from executive.testing.oracle import WorldAccess
 
 SETTLING_STEPS = 240

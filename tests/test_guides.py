@@ -12,12 +12,11 @@ from types import ModuleType
 import jsonschema
 import pytest
 from click.testing import CliRunner
+from executive.cell.workcell import load_cell_kind
 from guide_blocks import GUIDES, ROOT, TUTORIAL, blocks, files, read, shown, transcripts
 
 from executive.behaviours import load_skills
-from executive.cell.workcell import load_cell_kind
 from executive.cli.main import main
-from executive.drivers.fake import FakeCell
 from executive.drivers.sim.scene import (
     load_scene,
 )
@@ -26,6 +25,7 @@ from executive.mission.cell_file import load_cell
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.schema import make_mission_schema
 from executive.run.assembly import RunOptions, assemble
+from executive.testing.fake_cell import FakeCell
 from executive.text.findings import Source
 from executive.text.yaml_files import list_shipped_missions, parse_yaml
 from executive.tree.node import load_control_nodes

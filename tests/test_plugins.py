@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from executive.cell.workcell import load_cell_kind
 
 from executive.behaviours import load_behaviour, load_skills
-from executive.cell.workcell import load_cell_kind
 from executive.errors import InputError
 from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.plugins import list_entries

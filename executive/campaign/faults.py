@@ -24,8 +24,7 @@ from executive.record.result import is_confirmed_by_audit
 from executive.record.timeline import Timeline, group_by_node
 from executive.run.assembly import RunOptions, assemble
 from executive.skill import Skill
-from executive.testing.faults import with_faults
-from executive.testing.faulty_cell import FaultyCell
+from executive.testing.faulty_cell import FaultInjector
 from executive.tree.node import ControlNode
 from executive.tree.specification import SubtreeNode
 from executive.view.report import try_write_report
@@ -225,14 +224,14 @@ def run_trial(
         else:
             cell_faults.append(fault.injected)
     timeout = MIN_TIMEOUT + TIMEOUT_FACTOR * nominal_run.robot_time if nominal_run else math.inf
-    make_cell = with_faults(mission.make_cell, cell_faults, timeout)
+    injector = FaultInjector(cell_faults, timeout)
+    make_cell = injector.wrap(mission.make_cell)
     options = RunOptions(mission.seed, mission.requests, make_cell=make_cell, substitutes=substitutes)
     timeline = Timeline()
     run_directory = ""
     with closing(assemble(loaded, options, [timeline])) as run:
-        workcell = run.workcell
-        assert isinstance(workcell, FaultyCell)
-        run.add_observer(workcell.on_event)
+        station = run.station
+        run.add_observer(injector.on_event)
         if runs_folder is None:
             run.execute()
         else:
@@ -240,10 +239,10 @@ def run_trial(
             recorder = Recorder(directory)
             run_directory = execute_recorded(run, loaded, recorder, mission.seed, start_time).run
             try_write_report(run_directory)
-        items = workcell.accounts.count_states()
-        audit = workcell.audit()
-        is_arm_at_rest = workcell.cell.arm.at_rest
-        is_holding = workcell.cell.tool.holding
+        items = station.ledger.count_states()
+        audit = station.audit()
+        is_arm_at_rest = station.cell.arm.at_rest
+        is_holding = station.cell.tool.holding
     end = timeline.ended
     assert end is not None, "every run emits its end"
     activations_by_path = group_by_node(timeline.activations)

@@ -18,7 +18,6 @@ from typing import TypeVar
 
 from executive.behaviours import load_skills
 from executive.campaign.results import RunRecord, RunRow, SweepSettings, make_record
-from executive.cell.workcell import Workcell, load_cell_kind
 from executive.errors import ExecutiveError, InputError
 from executive.mission.load import LoadedMission, load_mission
 from executive.processes import WorkerPool, kill_workers
@@ -26,6 +25,8 @@ from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions
 from executive.run.run_control import HALT_SIGNALS, handle_signals
+from executive.station.check import load_checker
+from executive.station.station import Station
 from executive.view.report import try_write_report
 
 Job = TypeVar("Job")
@@ -43,13 +44,13 @@ class MissionUnderTest:
 
     Attributes:
         loaded: The mission, checked together with its cell file.
-        make_cell: Function that makes the work cell.
+        make_cell: Function that makes the station.
         cell_description: Kind of the cell, and source of the detections, for reports.
         seed: Random seed; in a series of runs, the seed of the first run.
     """
 
     loaded: LoadedMission
-    make_cell: Callable[..., Workcell]
+    make_cell: Callable[..., Station]
     cell_description: str
     seed: int
 
@@ -72,10 +73,10 @@ def load_mission_under_test(
     Raises:
         InputError: The mission does not exist or has errors, or `has_oracle` requires a simulated cell.
     """
-    loaded = load_mission(mission, load_skills(), overrides, load_cell_kind)
+    loaded = load_mission(mission, load_skills(), overrides, load_checker)
     kind = loaded.cell_config.kind
     if not has_oracle:
-        return MissionUnderTest(loaded, load_cell_kind(kind), kind, seed)
+        return MissionUnderTest(loaded, Station, kind, seed)
     if kind != "sim":
         name = loaded.mission.name
         raise InputError(f"--oracle requires a simulated cell, but the cell of {name} is of kind {kind}")

@@ -17,13 +17,13 @@ from executive.behaviours import load_skills
 from executive.campaign.jobs import JobOptions, list_jobs, make_fault_record, run_job, run_jobs
 from executive.campaign.results import FILE_NAME, ResultsDatabase, RunRecord, SweepSettings
 from executive.campaign.sweep_summary import SweepResults, summarize_runs
-from executive.cell.workcell import load_cell_kind
 from executive.drivers.sim.scene import load_scene
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.perception.detectors.envelope import FAKE_KIND, compute_fingerprint
 from executive.plugins import DISTRIBUTION, list_versions
 from executive.record.run_directory import make_dated_folder
+from executive.station.check import load_checker
 from executive.text.yaml_files import read_source
 
 SIDES = ("a", "b")
@@ -63,7 +63,7 @@ def _complete_settings(settings: SweepSettings) -> SweepSettings:
     """
     skills = load_skills()
     missions = [
-        load_mission(settings.mission, skills, {**settings.overrides, **variant}, load_cell_kind)
+        load_mission(settings.mission, skills, {**settings.overrides, **variant}, load_checker)
         for variant in settings.variants
     ]
     for loaded in missions:

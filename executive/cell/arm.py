@@ -5,18 +5,52 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
+
+import numpy as np
 
 from executive.cell.objects import ObjectClass, Obstacle
 from executive.geometry import Array, Pose
 
 
+class JointState(NamedTuple):
+    """Position [rad], velocity [rad/s] and acceleration [rad/s²] of `n` joints, each `(n,)` or `(N, n)`."""
+
+    q: Array
+    qd: Array
+    qdd: Array
+
+    @staticmethod
+    def at_rest(q: Array) -> JointState:
+        """Return the state of rest at `q` `(n,)` [rad]."""
+        return JointState(q, np.zeros(len(q)), np.zeros(len(q)))
+
+
 class Motion(Protocol):
-    """A planned, collision-checked arm trajectory from rest to rest."""
+    """A planned, collision-checked trajectory of an arm with `n` joints, at rest at both ends."""
 
     @property
     def duration(self) -> float:
         """Time from the start of the motion to rest at its end [s]."""
+
+    @property
+    def guarded_start_time(self) -> float:
+        """Time from which the tool may touch the target [s]; infinite for no contact."""
+
+    def state_at(self, time: float) -> JointState:
+        """Return the joint state `(n,)` at `time` [s]; at rest before time 0 and after `duration`."""
+
+
+class Guard(NamedTuple):
+    """Events at which an arm stops along the path of its motion, beside collisions.
+
+    Attributes:
+        touch: The tool touches something that it did not touch at the start of the motion.
+        lost_grip: The tool no longer holds anything.
+    """
+
+    touch: bool = False
+    lost_grip: bool = False
 
 
 @dataclass(frozen=True)
@@ -79,11 +113,7 @@ class Planning(Protocol):
 
 
 class Arm(Protocol):
-    """A robot arm that follows planned motions."""
-
-    @property
-    def q(self) -> Array:
-        """Measured joint positions `(n,)` [rad]."""
+    """A robot arm that plans and follows motions, as skills see it."""
 
     @property
     def tool_pose(self) -> Pose:
@@ -122,8 +152,8 @@ class Arm(Protocol):
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
         """Plan a motion from the end of the current motion, for a later call of `plan`."""
 
-    def start(self, motion: Motion) -> None:
-        """Start to follow `motion`; the arm must be at rest at the start position of `motion`."""
+    def start(self, motion: Motion, guard: Guard = Guard()) -> None:
+        """Follow `motion` until its end or an event of `guard`; the arm must be at rest at its start."""
 
     def stop(self) -> None:
         """Start to brake along the path of the current motion, if any; return at once."""

@@ -15,6 +15,7 @@ from executive.cell.device_config import (
     Angles,
     ArmConfig,
     CameraConfig,
+    ClockConfig,
     Colour,
     Count,
     Distance,
@@ -213,6 +214,8 @@ class CellConfig(Section):
     """Suction tool."""
     motion: MotionConfig = MotionConfig()
     """Distances, speeds and times of motion planning."""
+    clock: ClockConfig = ClockConfig()
+    """Time between two ticks of the behaviour tree."""
     table: TableConfig = TableConfig()
     """Workspace, and the objects that a simulated run spawns there."""
     bins: dict[Name, BinConfig] = Field(min_length=1)

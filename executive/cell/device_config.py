@@ -24,6 +24,10 @@ from pydantic import (
 
 from executive.geometry import Pose
 
+STEP = 1 / 240
+"""Physics step of the simulation, spacing of the checked samples of motions, and default time between two
+ticks [s]."""
+
 Number = TypeVar("Number", int, float)
 
 
@@ -186,6 +190,14 @@ class ToolConfig(Section):
     small load cell."""
     source: str
     """Source of the constants."""
+
+
+class ClockConfig(Section):
+    """The clock of the cell."""
+
+    step: float = Field(STEP, ge=0.999 * STEP, le=0.1)
+    """Time between two ticks of the behaviour tree [s]; in simulation a multiple of 1/240 s. Devices follow
+    their motions at their own rate."""
 
 
 class MotionConfig(Section):

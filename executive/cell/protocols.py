@@ -16,33 +16,6 @@ from executive.cell.frame import Answer, Box, Detection, Detections, Frame, Obse
 from executive.cell.objects import Bin, Item, KnownItem, ObjectClass, Quotas, Target
 from executive.geometry import Array
 
-STEP = 1 / 240
-"""Duration of one control step, and of one physics step of the simulation [s]."""
-
-
-class StepClock:
-    """Clock that reads its time from a function; implements `executive.cell.protocols.Clock`.
-
-    Args:
-        get_time: Function that returns the time since the start of the run [s].
-        step: Duration of one control step [s].
-    """
-
-    def __init__(self, get_time: Callable[[], float], step: float = STEP) -> None:
-        self._get_time = get_time
-        self.step = step
-
-    @property
-    def now(self) -> float:
-        """Time since the start of the run [s]."""
-        return self._get_time()
-
-    def sleep(self, duration: float) -> Iterator[None]:
-        """Yield until the time of the clock has advanced by `duration` [s]."""
-        end = self.now + duration
-        while self.now < end - self.step / 2:
-            yield
-
 
 class Presence(Enum):
     """Answer to the question whether an item is at the place where the ledger believes it to be."""
@@ -253,10 +226,17 @@ class Clock(Protocol):
 
     @property
     def step(self) -> float:
-        """Duration of one control step [s]."""
+        """Time between two ticks [s]."""
+
+    @property
+    def is_simulated(self) -> bool:
+        """True if the time stands still between two ticks."""
 
     def sleep(self, duration: float) -> Steps:
         """Yield until the time of the clock has advanced by `duration` [s]."""
+
+    def wait_for_tick(self) -> None:
+        """Wait until the next tick; a simulation advances its devices to this tick. Only a run calls this."""
 
 
 class Tool(Protocol):

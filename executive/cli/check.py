@@ -34,8 +34,8 @@ def check_command(missions: tuple[str, ...], overrides: dict[str, str], as_json:
     with keep_stdout_clean():
         # The imports take 0.3 s, for which `--help` must not wait.
         from executive.behaviours import load_skills
-        from executive.cell.workcell import load_cell_kind
         from executive.mission.load import load_mission
+        from executive.station.check import load_checker
         from executive.text.findings import MAX_LISTED_FINDINGS, Finding, MissionError, describe_findings
 
         # The last garbage collection of the process would take 0.1 s. Commands that plan motions need this
@@ -48,7 +48,7 @@ def check_command(missions: tuple[str, ...], overrides: dict[str, str], as_json:
             failures: Sequence[UnhandledFailure] = ()
             is_valid = False
             try:
-                loaded = load_mission(mission, skills, overrides, load_cell_kind)
+                loaded = load_mission(mission, skills, overrides, load_checker)
                 findings = loaded.warnings
                 failures = loaded.unhandled_failures
                 is_valid = True

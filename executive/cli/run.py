@@ -60,7 +60,6 @@ def run_command(
 
         from executive.behaviours import load_skills
         from executive.cell.json_values import to_json
-        from executive.cell.workcell import load_cell_kind
         from executive.mission.load import load_mission
         from executive.record.diagnosis import format_diagnosis
         from executive.record.journal import find_run_start, read_journal
@@ -68,6 +67,7 @@ def run_command(
         from executive.record.result import find_exit_code
         from executive.record.run_directory import RunDirectory, find_run, read_cell
         from executive.run.assembly import RunOptions
+        from executive.station.check import load_checker
         from executive.view import terminal
         from executive.view.live_page import LivePage
         from executive.view.report import try_write_report
@@ -103,7 +103,7 @@ def run_command(
                 start_event = find_run_start(events, path, "run the mission again")
                 repeat_arguments = (start_event.file, start_event.seed, start_event.overrides)
             else:
-                loaded_mission = load_mission(mission, load_skills(), overrides, load_cell_kind)
+                loaded_mission = load_mission(mission, load_skills(), overrides, load_checker)
                 for warning in loaded_mission.warnings if views else ():
                     click.echo(str(warning), err=True)
                 if scene is not None:

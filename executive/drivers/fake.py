@@ -1,49 +1,39 @@
-"""Work cell without physics: world, arm, tool, camera and detectors, with the real ledger and localizer."""
+"""Driver of a cell without physics: world, arm, tool and camera, for tests and rehearsals of missions."""
 
 from __future__ import annotations
 
-import functools
 import json
+import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from executive.cell.arm import Goal, Motion
-from executive.cell.config import CellConfig, DetectorConfig
-from executive.cell.frame import Box, Detection, Frame
+from executive.cell.arm import Goal, Guard, Motion
+from executive.cell.device_config import STEP
+from executive.cell.config import CellConfig
+from executive.cell.devices import DEFAULT_ROLE, CameraImage, DriverOptions, StepClock, TrueObject, WallClock
+from executive.cell.frame import Box, Detection
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
-from executive.cell.protocols import Clock, Ledger, Routes
-from executive.cell.workcell import CellOptions, TrueObject
+from executive.cell.protocols import Clock
 from executive.drivers.world_log import LogFile
-from executive.errors import InputError, Unavailable
-from executive.events import Emit, discard_event
+from executive.errors import InputError
 from executive.geometry import GRAVITY, Array, Pose
-from executive.mission.cell_file import load_cell
-from executive.motion.arms import build_planning_kinematics, find_arm_errors, find_places_out_of_reach
+from executive.motion.arms import build_planning_kinematics
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.planner import PlanningArm
-from executive.motion.straight_paths import StraightMotion, plan_straight_motion
-from executive.perception.camera_model import MountedCamera, compute_hull_mask
-from executive.perception.detectors.requests import PendingSearch
-from executive.perception.localization import CellLocalizer
-from executive.station.view_check import find_view_errors
-from executive.station.without_hardware import CellWithoutHardware, SilentOperator
+from executive.perception.camera_model import compute_calibration
 from executive.text.validate import KeyPath
-from executive.text.yaml_files import get_shipped_folder
 
-SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
-"""Permitted bins of each class of the shipped cells."""
-DEFAULT_CONFIDENCE = 0.9
-"""Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""
 MAX_SEAL_OFFSET = 0.012
 """Maximum horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
 TOUCH_DISTANCE = 0.002
 """Maximum vertical distance between the cup and the top of an object for contact [m]."""
+
+
+MAX_STEP_ERROR = 1e-6
+"""Maximum rounding error of a number of steps."""
 
 
 @dataclass(eq=False)
@@ -178,81 +168,43 @@ class FakeTool:
         self.world.release(is_dropped=True)
 
 
-class FakeCamera(MountedCamera):
-    """The camera of a cell file, with blank images.
+class FakeCamera:
+    """The camera of a cell file, with blank images and the true detections of all objects on the table.
 
     Attributes:
-        occluded_regions: Regions of the image that frames mark as occluded [pixel]; set by tests.
+        occluded_regions: Regions of the image that the images mark as occluded [pixel]; set by tests.
     """
 
-    def __init__(self, config: CellConfig, arm: FakeArm, clock: Clock, ledger: Ledger) -> None:
-        name, camera = next(iter(config.cameras.items()))
-        X_TF = Pose.of((0.0, 0.0, -config.tool.length))  # pose of the flange F in the frame T of the tool
-        super().__init__(name, camera, lambda: arm.tool_pose @ X_TF, clock, lambda: ledger.change_count)
+    def __init__(self, config: CellConfig, world: FakeWorld, arm: FakeArm, clock: Clock) -> None:
         self.occluded_regions: list[Box] = []
-        self._corners = np.array([(x, y, 0.0) for x in config.table.x for y in config.table.y])
+        self._config = next(iter(config.cameras.values()))
+        self._matrix, self._X_MC = compute_calibration(self._config)
+        # T is the frame of the tool, F the frame of the flange.
+        self._X_TF = Pose.of((0.0, 0.0, -config.tool.length))
+        self._world = world
+        self._arm = arm
+        self._clock = clock
 
-    def sees_table(self) -> bool:
-        return compute_hull_mask(self._corners, self.matrix, self._compute_pose(), self._size) is not None
-
-    def _capture_images(self) -> tuple[NDArray[np.uint8], None]:
-        return np.zeros((self.config.height, self.config.width, 3), dtype=np.uint8), None
-
-    def _compute_visibility_mask(self, X_WC: Pose) -> NDArray[np.bool_]:
-        del X_WC
-        mask = np.ones((self.config.height, self.config.width), dtype=bool)
+    def capture(self) -> CameraImage:
+        size = (self._config.height, self._config.width)
+        visible = np.ones(size, dtype=bool)
         for left, top, right, bottom in self.occluded_regions:
-            mask[int(top) : int(bottom), int(left) : int(right)] = False
-        return mask
+            visible[int(top) : int(bottom), int(left) : int(right)] = False
+        detections = tuple(self._find_true_detections())
+        return CameraImage(np.zeros((*size, 3), np.uint8), None, self._clock.now, visible, detections)
 
-
-@dataclass(eq=False)
-class FakeDetector:
-    """A detector that finds every object in a view, unless a test replaces `make_answer`.
-
-    Attributes:
-        name: Name of the detector in the cell file.
-        config: Section of the detector in the cell file.
-        world: The world with the true objects.
-        clock: Clock of the run.
-        get_view_region: Returns the image region [pixel] of a view, which is `table` or `full`.
-        make_answer: Returns the detections, or a message if the detector is unavailable. Its arguments are
-            the number of the request (from 1) and the true detections.
-        request_count: Number of requests so far.
-    """
-
-    name: str
-    config: DetectorConfig
-    world: FakeWorld
-    clock: Clock
-    get_view_region: Callable[[str], Box]
-    make_answer: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = field(
-        default=lambda _request_number, true_detections: true_detections
-    )
-    request_count: int = 0
-
-    def request(self, frame: Frame, view: str) -> PendingSearch:
-        self.request_count += 1
-        left, top, right, bottom = self.get_view_region(view)
-        true_detections = []
-        for fake_object in self.world.objects:
-            x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
-            column = x / depth
-            row = y / depth
-            is_inside = depth > 0 and left <= column < right and top <= row < bottom
-            if is_inside and fake_object is not self.world.held_object:
-                half_side = frame.matrix[0, 0] / depth * self.world.classes[fake_object.label].radius
+    def _find_true_detections(self) -> Iterator[Detection]:
+        X_WC = self._X_MC
+        if self._config.mount == "wrist":
+            X_WC = self._arm.tool_pose @ self._X_TF @ self._X_MC
+        for fake_object in self._world.objects:
+            x, y, depth = self._matrix @ X_WC.inverse().apply(fake_object.position)
+            if depth > 0 and fake_object is not self._world.held_object:
+                column = x / depth
+                row = y / depth
+                half_side = self._matrix[0, 0] / depth * self._world.classes[fake_object.label].radius
                 box = (column - half_side, row - half_side, column + half_side, row + half_side)
-                confidence = max(DEFAULT_CONFIDENCE, self.config.threshold)
-                true_detections.append(Detection(fake_object.label, confidence, box))
-        answer = self.make_answer(self.request_count, true_detections)
-        future: Future[list[Detection]] = Future()
-        if isinstance(answer, str):
-            future.set_exception(Unavailable(answer))
-        else:
-            future.set_result(list(answer))
-        answer_time = self.clock.now + self.config.latency
-        return PendingSearch(future, answer_time, self.clock, self.name, self.config.error_rates)
+                yield Detection(fake_object.label, 1.0, box)
 
 
 def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
@@ -272,44 +224,55 @@ def list_grid_points(config: CellConfig) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x in xs for y in ys]
 
 
-class FakeArm(PlanningArm[StraightMotion]):
-    """An arm that moves on straight joint paths, stops without braking, and never hits an obstacle by itself.
+class FakeArm:
+    """An arm that follows motions exactly, stops without braking, and never hits an obstacle by itself.
 
     Attributes:
-        q: Joint positions `(n,)` [rad].
-        poses: Joint positions `(n,)` [rad] of each named pose; a run begins at `home`.
-        tool_velocity: Velocity zero `(3,)` [m/s]: a released object falls straight down.
+        q: Joint positions `(n,)` [rad]; a run begins at `home`.
+        qd: Joint velocities zero `(n,)` [rad/s]: a released object falls straight down.
         collision: Description of the obstacle that stopped the last motion, or None.
         contact_point: Position of the tool `(x, y, z)` [m] at the last `next_obstacle`, or None.
         next_obstacle: Name of an obstacle in the middle of the next motion, or None; set by tests.
         commands: Names of the executed commands, `start` or `stop`, in order, for tests.
+        tool: The tool, whose sensors trigger guards.
     """
 
-    q = np.zeros(0)
+    tool: FakeTool
 
-    def __init__(self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit) -> None:
-        kinematics = build_planning_kinematics(config)
-        plan_motion = functools.partial(plan_straight_motion, config, kinematics)
-        super().__init__(config, kinematics, plan_motion, clock, emit)
-        self.q = self.poses["home"]
-        self.tool_velocity = np.zeros(3)
+    def __init__(self, world: FakeWorld, config: CellConfig) -> None:
+        self.q = np.radians(config.arm.poses_deg["home"])
+        self.qd = np.zeros_like(self.q)
+        self.collision: str | None = None
+        self.contact_point: Sequence[float] | None = None
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
+        self._kinematics = build_planning_kinematics(config)
         self._world = world
         self._path: list[Array] = []
         self._half_length = 0
+        self._guard = Guard()
+        self._has_been_free = False
+        """True if the tool has touched nothing at some time since the start of the motion."""
 
     @property
     def at_rest(self) -> bool:
         return not self._path
 
     @property
-    def _end_q(self) -> Array:
+    def end_q(self) -> Array:
         return self._path[-1] if self._path else self.q
 
-    def start(self, motion: Motion) -> None:
-        self._path = list(self._require_own_motion(motion, StraightMotion).qs)
+    @property
+    def tool_pose(self) -> Pose:
+        """Pose of the tool centre point in the world."""
+        return self._kinematics.compute_tool_pose(self.q)
+
+    def execute(self, motion: Motion, guard: Guard) -> None:
+        step_count = math.ceil(motion.duration / STEP - MAX_STEP_ERROR)
+        self._path = [motion.state_at((number + 1) * STEP).q for number in range(step_count)]
         self._half_length = len(self._path) // 2
+        self._guard = guard
+        self._has_been_free = not (guard.touch and self.tool.touching)
         self.commands.append("start")
         self._world.is_commanded = True
         self.collision = None
@@ -318,7 +281,7 @@ class FakeArm(PlanningArm[StraightMotion]):
     def set_tool_position(self, position: Array) -> None:
         """Move the tool, which then points down, to a position `(3,)` [m] at once."""
         x, y, z = map(float, position)
-        self.q = find_configuration_pairs(self.kinematics, Goal((x, y, z)), 0.0, self.q).lower_qs[0]
+        self.q = find_configuration_pairs(self._kinematics, Goal((x, y, z)), 0.0, self.q).lower_qs[0]
         self._path = []
 
     def stop(self) -> None:
@@ -327,11 +290,13 @@ class FakeArm(PlanningArm[StraightMotion]):
         self._path = []
 
     def stop_after_collision(self, message: str) -> None:
+        """Set `collision` to a message, and stop; do nothing at rest."""
         if self._path:
             self.collision = message
             self.stop()
 
     def advance(self) -> None:
+        """Move the arm by one step of `STEP`."""
         if not self._path:
             return
         self.q = self._path.pop(0)
@@ -342,100 +307,108 @@ class FakeArm(PlanningArm[StraightMotion]):
             self.contact_point = self.tool_pose.position.tolist()
             self.stop_after_collision(self.next_obstacle)
             self.next_obstacle = None
+        if self._guard.touch and self._path:
+            is_touching = self.tool.touching
+            if self._has_been_free and is_touching:
+                self.stop()
+            self._has_been_free |= not is_touching
+        if self._guard.lost_grip and not self.tool.holding:
+            self.stop()
 
 
-class FakeCell(CellWithoutHardware):
-    """The cell of a cell file without physics; by default the shipped cell `overhead` without objects.
+class FakeDriver:
+    """The devices of a cell without physics; implements `executive.cell.devices.Driver`.
 
-    The arm moves on straight joint paths, the tool always seals, and every detector finds all objects.
+    The arm follows motions exactly, the tool always holds what it touches, and images contain the true
+    detections of all objects.
+
+    Args:
+        config: The cell file.
+        options: Seed of the objects; the fake cell has no options.
+        clock: Clock of the devices; None: simulated time.
 
     Attributes:
         world: Objects and bins.
-        arm: The fake arm.
-        tool: The fake tool.
-        camera: The fake camera.
-        detectors: The fake detectors by name.
-        detector: The first detector.
-        ledger: The ledger of the run, the same object as `accounts`.
+        arm, tool, camera: The devices.
+        last_command_tick: Tick of the last start of a motion or command to the tool.
 
     Raises:
-        InputError: `options` request a window, or the state of a resumed run cannot be read.
+        InputError: The options contain an option.
     """
+
+    is_rehearsal = True
 
     def __init__(
         self,
-        config: CellConfig | None = None,
-        *,
-        seed: int = 0,
-        routes: Routes = SHIPPED_ROUTES,
-        emit: Emit = discard_event,
-        options: CellOptions | None = None,
+        config: CellConfig,
+        options: DriverOptions = DriverOptions(),
+        clock: StepClock | WallClock | None = None,
     ) -> None:
-        config = config or load_empty_cell()
-        options = options or CellOptions(SilentOperator(), cell_folder=Path())
-        if options.gui:
-            raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
-        super().__init__(config, seed=seed, routes=routes, emit=emit, options=options)
-        clock = self.cell.clock
-        self.ledger = self.accounts
-        self.world = FakeWorld(self.cell.classes, self.cell.bins.values())
-        put_random_objects(self.world, config, seed)
-        self.arm = FakeArm(self.world, config, clock, emit)
+        if options.values:
+            names = ", ".join(options.values)
+            raise InputError(f'cell {config.cell} is of kind "fake" and has no option {names}; leave it out')
+        classes = {label: section.build_class(label) for label, section in config.objects.items()}
+        self.world = FakeWorld(classes, config.build_bins().values())
+        put_random_objects(self.world, config, options.seed)
+        self.clock = clock or StepClock(config.clock.step)
+        self.clock.on_tick = self._advance
+        self.arm = FakeArm(self.world, config)
         self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position, config.tool.load_std)
-        self.camera = FakeCamera(config, self.arm, clock, self.ledger)
-        self.detectors = {
-            name: FakeDetector(name, detector, self.world, clock, self.camera.get_view_box)
-            for name, detector in config.detectors.items()
-        }
-        self.detector = next(iter(self.detectors.values()))
+        self.arm.tool = self.tool
+        self.camera = FakeCamera(config, self.world, self.arm, self.clock)
+        self.arms = {DEFAULT_ROLE: self.arm}
+        self.tools = {DEFAULT_ROLE: self.tool}
+        self.cameras = dict.fromkeys(config.cameras, self.camera)
+        self.last_command_tick = 0
+        self._tick_count = 0
+        self._step_count = 0
         self._log: LogFile | None = None
         self._log_length = 0
-        if options.resume is not None:
-            self._restore_state(options.resume.log_path)
-            self.log_to(options.resume.log_path)
-        localizer = CellLocalizer("plane", self.cell.classes, self.cell.bins.values())
-        self._connect(options, self.arm, self.tool, self.camera, self.detectors, localizer)
 
     @staticmethod
     def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
+        """Yield an error if the table has no room for the objects."""
         del cell_folder
-        if arm_errors := tuple(find_arm_errors(config)):
-            yield from arm_errors
-            return
-        yield from find_places_out_of_reach(config)
         place_count = len(list_grid_points(config))
         if config.table.objects[1] > place_count:
             message = f"the table has room for {place_count} objects, not for {config.table.objects[1]}"
             yield ("table", "objects"), message
-        yield from find_view_errors(config)
 
-    @staticmethod
-    def labels(config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
-        del cell_folder
-        return dict.fromkeys(config.detectors)
+    def _advance(self) -> None:
+        """Move the arm until the time of the clock."""
+        if self.world.is_commanded:
+            self.last_command_tick = self._tick_count
+            self.world.is_commanded = False
+        self._tick_count += 1
+        due_step_count = round(self.clock.now / STEP)
+        for _ in range(due_step_count - self._step_count):
+            self.arm.advance()
+        self._step_count = due_step_count
+        self.log_state()
 
     def log_to(self, path: Path) -> None:
         self._log = LogFile(path, "the state of the world")
         self.log_state()
 
     def log_state(self) -> None:
+        """Write the state of the world to the log."""
         if self._log is None:
             return
         held = self.world.held_object
         index = None if held is None else self.world.objects.index(held)
         objects = [_encode_object(each) for each in self.world.objects]
         removed_objects = [_encode_object(each) for each in self.world.removed_objects]
-        state = [self.steps, self.last_command_step, self.arm.q, index, objects, removed_objects]
+        state = [self._tick_count, self.last_command_tick, self.arm.q, index, objects, removed_objects]
         text = json.dumps(state, default=np.ndarray.tolist).encode()
         # Blanks pad the text to the length of the longest state so far, to overwrite all old text.
         self._log_length = max(self._log_length, len(text))
         self._log.write(text.ljust(self._log_length), 0)
 
-    def _restore_state(self, path: Path) -> None:
+    def rebuild(self, path: Path) -> int:
         try:
-            steps, last_command_step, q, held, objects, removed_objects = json.loads(path.read_bytes())
-            self.steps = int(steps)
-            self.last_command_step = int(last_command_step)
+            ticks, last_command_tick, q, held, objects, removed_objects = json.loads(path.read_bytes())
+            self._tick_count = int(ticks)
+            self.last_command_tick = int(last_command_tick)
             self.arm.q = np.array(q, dtype=float).reshape(self.arm.q.shape)
             restored = [_decode_object(body, *each) for body, each in enumerate(objects + removed_objects)]
             self.world.objects = restored[: len(objects)]
@@ -443,24 +416,38 @@ class FakeCell(CellWithoutHardware):
             self.world.held_object = None if held is None else self.world.objects[held]
         except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
             raise InputError(f'the world in "{path}" is damaged: {error}; run the mission again') from error
+        self.clock.tick_count = self._tick_count
+        self._step_count = round(self.clock.now / STEP)
+        self.log_to(path)
+        return self._tick_count
 
-    def advance(self) -> None:
-        if self.world.is_commanded:
-            self.last_command_step = self.steps
-            self.world.is_commanded = False
-        self.arm.advance()
-        super().advance()
-        self.log_state()
+    def list_objects(self) -> Sequence[TrueObject]:
+        return list(self.world.objects)
 
-    def _list_final_objects(self) -> Iterator[TrueObject]:
+    def list_final_objects(self) -> Iterator[TrueObject]:
         for each in (*self.world.objects, *self.world.removed_objects):
             bin = self.world.find_bin(each)
             is_held = each is self.world.held_object
             is_removed = each in self.world.removed_objects
             yield replace(each, bin=bin.name if bin else "", is_held=is_held, is_removed=is_removed)
 
+    def find_held_object(self) -> TrueObject | None:
+        return self.world.held_object
+
+    def remove_object(self, true_object: TrueObject) -> None:
+        self.world.remove(true_object)
+
+    def move_object(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
+        true_object.position[:2] += displacement
+        true_object.rest_positions.append(true_object.position.copy())
+
+    def drop_held_object(self) -> None:
+        self.tool.break_seal()
+
+    def collide(self, message: str) -> None:
+        self.arm.stop_after_collision(message)
+
     def close(self) -> None:
-        self.arm.close()
         if self._log is not None:
             self._log.close()
 
@@ -474,10 +461,3 @@ def _decode_object(body: int, label: object, is_dropped: object, *positions: obj
     """Return an object from the log: `positions` are the current position and the rest positions."""
     position, *rest_positions = np.array(positions, dtype=float).reshape(-1, 3)
     return TrueObject(str(label), Pose.of(position), body, rest_positions, bool(is_dropped))
-
-
-@functools.cache
-def load_empty_cell() -> CellConfig:
-    """Return the shipped cell `overhead` as a fake cell without objects, for tests of single skills."""
-    path = get_shipped_folder() / "cells" / "overhead.yaml"
-    return load_cell(path, {"cell.kind": "fake", "cell.table.objects": "[0, 0]"})

@@ -74,18 +74,20 @@ class LogFile:
             os.close(file)
 
 
-FILE_HEADER = b"executive world 3\n"
+FILE_HEADER = b"executive world 4\n"
 """First line of every log of commands, with the version of the format."""
 
 RUN_STEP = "step"
-"""Kind of a physics step inside of a control step of the run."""
+"""Kind of a physics step that belongs to the run."""
 IDLE_STEP = "idle"
-"""Kind of a physics step outside of the control steps."""
+"""Kind of a physics step that does not belong to the run."""
 JOINT_TARGETS = "joints"
 """Kind of new joint targets; the arguments are the time in the motion [s] and the joint positions [rad]."""
 MOTION = "motion"
 """Kind of the start of a motion; the arguments are its duration [s] and its samples as base64."""
 MOTION_END = "rest"
+CAPTURE = "capture"
+"""Kind of the capture of an image, whose noise depends on its number."""
 VACUUM_ON = "vacuum on"
 VACUUM_OFF = "vacuum off"
 SEAL_BREAK = "seal break"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Sequence
 from typing import TypeVar
 
-from executive.cell.arm import Arm, Goal, Motion, Task
+from executive.cell.arm import Arm, Goal, Guard, Motion, Task
 from executive.cell.frame import Detections, Observation
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
@@ -118,16 +118,23 @@ def plan(
         raise skill.failure(reason, str(error)) from error
 
 
-def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] = lambda: False) -> Steps:
+def follow(
+    skill: Skill,
+    cell: Cell,
+    motion: Motion,
+    guard: Guard = Guard(),
+    until: Callable[[], bool] = lambda: False,
+) -> Steps:
     """Yield while the arm executes `motion`, until the arm is at rest again.
 
-    The arm brakes along the path if `until` returns True, after a collision, and if the skill is halted.
+    The arm brakes along the path at an event of `guard`, if `until` returns True, after a collision, and if
+    the skill is halted. The arm itself watches for the events of `guard`, at its own rate.
 
     Raises:
         SkillFailed: The arm collided with an obstacle; the reason is `blocked`.
     """
     arm = cell.arm
-    arm.start(motion)
+    arm.start(motion, guard)
     try:
         while not arm.at_rest and not until():
             yield
@@ -150,7 +157,8 @@ def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, goal_name: str) 
     """
     try:
         motion = yield from plan(skill, cell.arm, lambda: (goal, make_transport_task(cell, item)))
-        yield from follow(skill, cell, motion, until=lambda: detect_and_record_drop(cell, item))
+        guard = Guard(lost_grip=True)
+        yield from follow(skill, cell, motion, guard, until=lambda: detect_and_record_drop(cell, item))
     except SkillFailed:
         # `dropped` has priority: handlers of the other reasons expect the item in the tool.
         if not detect_and_record_drop(cell, item):

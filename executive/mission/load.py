@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import cast
+from typing import Protocol, cast
 
 from pydantic import JsonValue
 
 from executive.behaviours import Skills
-from executive.cell.config import CellConfig
+from executive.cell.config import CellConfig, ObjectConfig
+from executive.text.validate import KeyPath
 from executive.cell.objects import Quotas
-from executive.cell.workcell import CellKind
 from executive.errors import InputError
 from executive.mission import check_flow, check_nodes, check_skills, check_variables
 from executive.mission.analysis import CheckContext, UnhandledFailure, find_unhandled_failures
@@ -158,8 +158,21 @@ def _add_library(
     return source.text
 
 
-CellKindFinder = Callable[[str], CellKind]
-"""Function that returns the kind of cell with a name; raises InputError if the kind is not installed."""
+class CellChecker(Protocol):
+    """Checks of cell files of one kind; `executive.station.check.CellChecker` implements them."""
+
+    def check(self, config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
+        """Yield key and message of each error that the validation of the cell file does not find."""
+
+    def labels(self, config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
+        """Return the labels that each detector can report, by name; None if they are unknown."""
+
+    def compute_mass(self, section: ObjectConfig) -> float:
+        """Return the mass of the objects of a class [kg], 0 if it is unknown."""
+
+
+CheckerFinder = Callable[[str], CellChecker]
+"""Function that returns the checker of a kind of cell; raises InputError if the kind is not installed."""
 
 
 @dataclass(frozen=True)
@@ -215,7 +228,7 @@ def load_mission(
     path: str | Path,
     skills: Mapping[str, type[Skill]],
     overrides: Mapping[str, str] | None = None,
-    find_cell_kind: CellKindFinder | None = None,
+    find_checker: CheckerFinder | None = None,
     recorded_cell: CellFile | None = None,
 ) -> LoadedMission:
     """Return a mission that has passed all checks.
@@ -224,7 +237,7 @@ def load_mission(
         path: A mission file, or the name of a shipped mission.
         skills: Installed skills by name.
         overrides: Values as text, by name of a param or by `cell.<key>.<key>` for a key of the cell.
-        find_cell_kind: Function that returns the kind of a cell; None to skip the checks by the cell kind.
+        find_checker: Function that returns the checker of a kind of cell; None to skip its checks.
         recorded_cell: Cell of a recorded run, which replaces the cell file, or None.
 
     Raises:
@@ -239,23 +252,23 @@ def load_mission(
     findings = list(files.findings)
     skills = {**skills, **files.behaviours}
     config = cell.config if cell else None
-    cell_kind = None
+    checker = None
     classes_by_detector = {}
     if cell is not None and config is not None:
         findings += _warn_about_calibration(cell, config)
-    if cell is not None and config is not None and find_cell_kind is not None:
+    if cell is not None and config is not None and find_checker is not None:
         try:
-            cell_kind = find_cell_kind(config.kind)
+            checker = find_checker(config.kind)
         except InputError as error:
             findings.append(cell.make_error(("kind",), "unknown-kind", str(error)))
         else:
             folder = cell.path.parent
-            errors = cell_kind.check(config, folder)
+            errors = checker.check(config, folder)
             cell_findings = [cell.make_error(keys, "robot", message) for keys, message in errors]
             findings += cell_findings
-            classes_by_detector = dict(cell_kind.labels(config, folder))
-            # Kinds of other packages may have no `compute_mass`; it would fail for an invalid model.
-            compute_mass = None if cell_findings else getattr(cell_kind, "compute_mass", None)
+            classes_by_detector = dict(checker.labels(config, folder))
+            # The computation would fail for an invalid model.
+            compute_mass = None if cell_findings else checker.compute_mass
             findings += check_skills.check_weights(cell, config, mission, compute_mass)
             findings += check_skills.check_slots(cell, config, mission)
     expansion = expand(mission, skills, _make_predefined_lists(mission, config) if config else {})
@@ -268,7 +281,7 @@ def load_mission(
     has_errors = expansion.tree is None or any(finding.severity == "error" for finding in findings)
     if config is None or cell is None or has_errors:
         raise MissionError(sort_findings(findings, files.source.path))
-    if cell_kind is not None:
+    if checker is not None:
         findings += _warn_about_unmeasured_detectors(cell)
     return LoadedMission(
         mission, tree, config, files.source.text, mission_path, cell.path, files.libraries,

@@ -19,10 +19,10 @@ import numpy as np
 from ruckig import InputParameter, Ruckig
 from ruckig import Trajectory as Profile
 
-from executive.cell.arm import Goal
+from executive.cell.arm import Goal, JointState
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose, make_tool_down_pose
-from executive.motion.joints import BranchKey, JointLimits, JointRange, JointState, Kinematics, wrap_angles
+from executive.motion.joints import BranchKey, JointLimits, JointRange, Kinematics, wrap_angles
 
 PREFERRED_LIMIT_DISTANCE = math.radians(1.0)
 """Preferred minimum distance of joint positions from their limits [rad]."""

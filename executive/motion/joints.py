@@ -20,19 +20,6 @@ In each branch, a tool pose has at most one solution, and a short path of the to
 """
 
 
-class JointState(NamedTuple):
-    """Position [rad], velocity [rad/s] and acceleration [rad/s²] of `n` joints, each `(n,)` or `(N, n)`."""
-
-    q: Array
-    qd: Array
-    qdd: Array
-
-    @staticmethod
-    def at_rest(q: Array) -> JointState:
-        """Return the state of rest at `q` `(n,)` [rad]."""
-        return JointState(q, np.zeros(len(q)), np.zeros(len(q)))
-
-
 class JointRange(NamedTuple):
     """Range of the joint positions: smallest and largest positions, `(n,)` each [rad]."""
 

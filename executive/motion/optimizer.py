@@ -16,12 +16,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from executive.cell.arm import JointState
+from executive.cell.device_config import STEP
 from executive.cell.objects import MIN_LIFT_ACCELERATION, SAFETY_FACTOR, ObjectClass
-from executive.cell.protocols import STEP
 from executive.geometry import GRAVITY, Array
 from executive.motion.clearance_model import ClearanceModel, NearestPairs
 from executive.motion.configurations import Candidate
-from executive.motion.joints import JointState, Kinematics
+from executive.motion.joints import Kinematics
 from executive.motion.trajectory import Connector, JointLimitError, PointToPoint, Trajectory
 from executive.motion.transcription import (
     SAMPLES_PER_STEP,

@@ -11,9 +11,9 @@ from operator import itemgetter
 
 import numpy as np
 
-from executive.cell.arm import Goal, Task
+from executive.cell.arm import Goal, JointState, Task
 from executive.cell.config import CellConfig
-from executive.cell.protocols import STEP
+from executive.cell.device_config import STEP
 from executive.errors import Unreachable
 from executive.geometry import Array, make_tool_down_pose
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
@@ -24,7 +24,7 @@ from executive.motion.configurations import (
     find_vertical_waypoints,
     solve_vertical_waypoints,
 )
-from executive.motion.joints import BranchKey, JointLimits, JointState, Kinematics
+from executive.motion.joints import BranchKey, JointLimits, Kinematics
 from executive.motion.optimizer import MotionProblem, Optimizer, PayloadLimit
 from executive.motion.trajectory import Connector, JointLimitError, MotionPiece, Trajectory, sample_pieces
 from executive.motion.transcription import SAMPLE_FRACTIONS

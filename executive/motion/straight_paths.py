@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.cell.arm import Goal, Task
+from executive.cell.arm import Goal, JointState, Task
 from executive.cell.config import CellConfig
-from executive.cell.protocols import STEP
+from executive.cell.device_config import STEP
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
@@ -27,14 +27,27 @@ JOINT_SPEED = 1.5
 
 @dataclass(frozen=True, eq=False)
 class StraightMotion:
-    """A motion on straight joint paths; `qs` `(N, n)` [rad] are the positions after each control step."""
+    """A motion on straight joint paths; implements `executive.cell.arm.Motion`.
 
+    Attributes:
+        start: Joint positions at the start `(n,)` [rad].
+        qs: Joint positions `(N, n)` [rad] after each interval of `STEP`.
+        guarded_start_time: Infinite: the arm of a cell without physics touches nothing by itself.
+    """
+
+    start: Array
     qs: Array
+    guarded_start_time: float = math.inf
 
     @property
     def duration(self) -> float:
         """Duration of the motion [s]."""
         return len(self.qs) * STEP
+
+    def state_at(self, time: float) -> JointState:
+        """Return the joint positions after the last interval before `time` [s], at rest."""
+        index = min(round(time / STEP), len(self.qs))
+        return JointState.at_rest(self.qs[index - 1] if index > 0 else self.start)
 
 
 def plan_straight_motion(
@@ -56,7 +69,7 @@ def plan_straight_motion(
         try:
             qs = _find_path(kinematics, start, goal, *attempt)
             _require_clearance(config, kinematics, np.vstack([start, qs]), task)
-            return StraightMotion(qs)
+            return StraightMotion(start, qs)
         except (Blocked, Unreachable) as error:
             errors.append(error)
     raise errors[0]

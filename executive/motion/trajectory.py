@@ -24,10 +24,11 @@ import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError
 from ruckig import Trajectory as Profile
 
-from executive.cell.protocols import STEP
+from executive.cell.arm import JointState
+from executive.cell.device_config import STEP
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array
-from executive.motion.joints import JointLimits, JointState
+from executive.motion.joints import JointLimits
 
 _RELATIVE_TOLERANCE = 1e-9  # fraction of a limit
 _MAX_STATE_DIFFERENCE = 1e-6

@@ -25,8 +25,9 @@ import daqp
 import numpy as np
 from numpy.typing import NDArray
 
+from executive.cell.arm import JointState
 from executive.geometry import Array
-from executive.motion.joints import JointLimits, JointState
+from executive.motion.joints import JointLimits
 
 STEP_COUNT = 8
 """Number of time steps of a motion."""

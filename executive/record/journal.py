@@ -21,7 +21,7 @@ from executive.errors import Fault, InputError, RecordLost, describe_os_error, e
 from executive.events import JOURNAL_FORMAT, Event, RunEnded, RunStarted, TimedEvent
 from executive.record.picture_recorder import PictureRecorder
 from executive.record.run_directory import RunDirectory
-from executive.replay.recording_cell import check_input
+from executive.station.border import check_input
 
 MAX_TICK = 10**9
 """Maximum number of control steps of a run; 48 days at 240 control steps per second."""

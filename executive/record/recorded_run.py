@@ -146,7 +146,7 @@ def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, fol
     name = f"{loaded.mission.name}_s{options.seed}"
     directory = RunDirectory(make_dated_folder(folder, name, datetime.now()))
     directory.save_inputs(texts, loaded.libraries)
-    run.workcell.log_to(directory.world_log)
+    run.station.log_to(directory.world_log)
     return directory
 
 
@@ -185,10 +185,10 @@ def execute_recorded(
                 observer(timed)
         run.add_recorder(recorder)
         run_end = run.execute()
-        audit = run.workcell.audit()
-    workcell = run.workcell
+        audit = run.station.audit()
+    station = run.station
     path = recorder.directory.path
-    item_counts = workcell.accounts.count_states()
+    item_counts = station.ledger.count_states()
     end_values = asdict(run_end)
     end_values["robot_time_s"] = end_values.pop("robot_time")
     result = Result(
@@ -196,15 +196,15 @@ def execute_recorded(
         mission=loaded.mission.name,
         seed=seed,
         items=ItemCounts(**item_counts),
-        unknown_labels=workcell.accounts.unknown_labels,
-        assumption_reasons=workcell.accounts.assumption_reasons,
+        unknown_labels=station.ledger.unknown_labels,
+        assumption_reasons=station.ledger.assumption_reasons,
         audit=None if audit is None else Audit.from_counts(item_counts, audit, run_end.is_table_empty),
         planning=timeline.planning,
         requests=list_requests(timeline),
         wall_time_s=round(time.perf_counter() - start_time, 3),
         trace=recorder.trace.hexdigest(),
         run=str(path),
-        diagnosis=diagnose(timeline, run_end, loaded, path, lambda: workcell.cell.arm.at_rest),
+        diagnosis=diagnose(timeline, run_end, loaded, path, lambda: station.cell.arm.at_rest),
     )
     problems = [recorder.problem] if recorder.problem else []
     try:

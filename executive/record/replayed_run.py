@@ -19,8 +19,8 @@ from executive.record.recorded_run import RecordOptions, execute_recorded
 from executive.record.result import Result, is_resumable, read_result
 from executive.record.run_directory import RunDirectory, read_mission_of_run
 from executive.record.timeline import get_skill_name
-from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import ResumedRun, RunOptions, assemble_replay, assemble_resumed
+from executive.run.replay import InputLog
 from executive.skill import Skill
 
 EVENTS_WITHOUT_REPLAY = (RunStarted, MotionPlanned, RequestGiven)
@@ -133,7 +133,7 @@ class _Comparison:
             self.result.decisions += 1
             return
         self._has_found_difference = True
-        self.result.unanswered = self.run.workcell.replayer.missing_input_message
+        self.result.unanswered = self.run.station.border.missing_input_message
         # After the last recorded step, the replay only halts its skills.
         self.result.is_complete = decision.tick > self._log.last_tick
         if self._has_recorded_end or any(map(self._is_in_complete_step, filter(None, (recorded, decision)))):
@@ -149,7 +149,7 @@ class _Comparison:
         self.result.is_complete = False
         if self._is_in_complete_step(recorded):
             self.result.recorded = recorded
-            self.result.unanswered = self.run.workcell.replayer.missing_input_message
+            self.result.unanswered = self.run.station.border.missing_input_message
 
     def _is_in_complete_step(self, decision: TimedEvent) -> bool:
         """Return True if the record contains all events of the control step of a decision."""
@@ -253,7 +253,7 @@ def resume_run(
         recorder.close(wait=False)
         raise
     with closing(run):
-        replayed_events = run.workcell.log.events
+        replayed_events = run.replay.log.events
         for timed in replayed_events:
             recorder.trace(timed)
         earlier_events = [each for each in replayed_events if isinstance(each.event, EVENTS_WITHOUT_REPLAY)]

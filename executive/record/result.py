@@ -10,13 +10,13 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from executive.cell.json_values import to_json
-from executive.cell.workcell import AUDIT_KEYS
 from executive.errors import ExecutiveError, ExitCode, explain_os_errors
 from executive.events import RunResumed, RunStatus, TimedEvent
 from executive.record.diagnosis import Diagnosis
 from executive.record.journal import find_run_end
 from executive.record.run_directory import RunDirectory, write_atomically
 from executive.record.timeline import PlanningTotals, Timeline
+from executive.station.audit import AUDIT_KEYS
 
 QUIT_REQUEST = "quit"
 """Request of the operator to end the run."""

@@ -10,18 +10,18 @@ from pathlib import Path
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from executive.cell.devices import Rebuildable
 from executive.cell.protocols import Cell, Operator
-from executive.cell.workcell import CellOptions, ResumePoint, Workcell, load_cell_kind
 from executive.errors import Fault, InputError
 from executive.events import Observer, RequestGiven, RunEnded, RunResumed, RunStarted
 from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission
 from executive.plugins import list_versions
-from executive.replay.replayed_cell import InputLog, Interruption, ReplayedCell
 from executive.run.operator import ScriptedOperator, TerminalOperator
-from executive.run.run import LookaheadPlanner, Run, brake_arm
+from executive.run.replay import InputLog, Interruption, Replay
+from executive.run.run import Run, brake_arm
 from executive.skill import Skill
-from executive.station.without_hardware import CellWithoutHardware
+from executive.station.station import CellOptions, Station
 from executive.tree.blackboard import Blackboard
 from executive.tree.tree_node import SkillLeaf, halt
 
@@ -34,21 +34,19 @@ class RunOptions:
         seed: Seed of all random numbers.
         requests: Requests of the operator, or None if a person gives requests at the terminal or in a view.
         has_keyboard: True if requests of the operator come from standard input.
-        gui: True to show the simulated world in a window.
         is_realtime: True to execute the run at the speed of the wall clock.
-        make_cell: Factory of the work cell, or None for the kind of cell that the cell file names.
+        make_cell: Factory of the station; by default `Station`.
         substitutes: Skill that replaces the skills of nodes, by a pattern for the node paths (`*/Grasp`).
-        scene: Scene file, which changes the world of a simulated cell, or None.
+        driver_options: Options of the driver by name; only the driver knows their meaning.
     """
 
     seed: int
     requests: Sequence[str] | None = None
     has_keyboard: bool = True
-    gui: bool = False
     is_realtime: bool = False
-    make_cell: Callable[..., Workcell] | None = None
+    make_cell: Callable[..., Station] = Station
     substitutes: Mapping[str, type[Skill]] = field(default_factory=dict)
-    scene: Path | None = None
+    driver_options: Mapping[str, str] = field(default_factory=dict)
 
 
 def assemble(loaded: LoadedMission, options: RunOptions, observers: Sequence[Observer] = ()) -> Run:
@@ -63,8 +61,8 @@ def assemble(loaded: LoadedMission, options: RunOptions, observers: Sequence[Obs
         InputError: The kind of the cell is not installed, or a request names no class of the mission.
     """
     run = Run(loaded.mission.name, observers, is_realtime=options.is_realtime)
-    workcell = _build_workcell(loaded, options, run)
-    _complete(run, loaded, options, workcell, workcell.cell)
+    station = _build_station(loaded, options, run)
+    _complete(run, loaded, options, station, station.driver.clock.step)
     run.start_event = RunStarted(
         mission=loaded.mission.name,
         file=str(loaded.path),
@@ -73,7 +71,7 @@ def assemble(loaded: LoadedMission, options: RunOptions, observers: Sequence[Obs
         overrides=loaded.overrides,
         requests=options.requests,
         base=str(loaded.cell_path.parent.resolve()),
-        step=workcell.cell.clock.step,
+        step=station.driver.clock.step,
         versions=dict(list_versions()),
     )
     return run
@@ -103,20 +101,19 @@ def assemble_resumed(
             commands to arm or tool.
     """
     run = ResumedRun(loaded.mission.name, is_realtime=options.is_realtime)
-    frame_count = len(log.inputs.get("camera.frame", ()))
-    pose_count = len(log.inputs.get("camera.next_pose", ()))
     request_count = sum(isinstance(timed.event, RequestGiven) for timed in log.events)
-    resume_point = ResumePoint(world_log, frame_count, pose_count)
-    workcell = _build_workcell(loaded, options, run, resume_point, request_count)
-    # A killed run loses no command: before the cell executes a command, the journal contains an event of the
-    # same control step, which is `ToolCommanded` or `MotionPlanned`.
-    if workcell.last_command_step > log.last_tick:
-        workcell.close()
+    station = _build_station(loaded, options, run, world_log, request_count)
+    if not isinstance(station.driver, Rebuildable):
+        station.tick_count = log.last_tick + 1
+    # A killed run loses no command: before the devices execute a command, the journal contains an event of
+    # the same tick, which is `ToolCommanded` or `MotionPlanned`.
+    elif station.driver.last_command_tick > log.last_tick:
+        station.close()
         text = f"the journal ends in control step {log.last_tick}, and lacks later commands to arm or tool"
         raise InputError(f"{text}; somebody changed it, or a disk lost its end; run the mission again")
-    interruption = log.make_final_interruption(workcell.steps, is_complete=is_complete)
-    replayed_cell = ReplayedCell(workcell, log, None if has_ended else interruption)
-    _complete(run, loaded, options, replayed_cell, workcell.cell)
+    interruption = log.make_final_interruption(station.tick_count, is_complete=is_complete)
+    run.replay = Replay(station, log, None if has_ended else interruption)
+    _complete(run, loaded, options, station, log.control_period)
     return run
 
 
@@ -124,53 +121,55 @@ def assemble_replay(
     loaded: LoadedMission, log: InputLog, seed: int, observers: Sequence[Observer] = ()
 ) -> ResumedRun:
     """Return a run that replays a recorded run without hardware or simulation."""
-    options = RunOptions(seed, requests=(), make_cell=CellWithoutHardware)
+    options = RunOptions(seed, requests=())
     run = ResumedRun(loaded.mission.name, observers)
-    inner = _build_workcell(loaded, options, run)
-    _complete(run, loaded, options, ReplayedCell(inner, log), inner.cell)
+    station = _build_station(loaded, options, run, has_devices=False)
+    run.replay = Replay(station, log)
+    _complete(run, loaded, options, station, log.control_period)
     return run
 
 
-def _build_workcell(
+def _build_station(
     loaded: LoadedMission,
     options: RunOptions,
     run: Run,
-    resume_point: ResumePoint | None = None,
+    world_log: Path | None = None,
     request_count: int = 0,
-) -> Workcell:
-    """Return the work cell of a run.
+    *,
+    has_devices: bool = True,
+) -> Station:
+    """Return the station of a run.
 
-    For a resumed run, `resume_point` is the state of the cell at the interruption, and `request_count` the
-    number of requests that the operator had given before.
+    For a resumed run, `world_log` is the log of its world, and `request_count` the number of requests that
+    the operator had given before.
     """
     operator: Operator = TerminalOperator(run.emit, run.control, has_keyboard=options.has_keyboard)
     if options.requests is not None:
         operator = ScriptedOperator(options.requests, tuple(loaded.routes), run.emit, request_count)
-    base = loaded.cell_path.parent
     cell_options = CellOptions(
-        operator, base, options.gui, resume=resume_point, scene=options.scene, quotas=loaded.quotas
+        operator, loaded.cell_path.parent, options.driver_options, world_log, has_devices, loaded.quotas
     )
-    config = loaded.cell_config
-    make_cell = options.make_cell or load_cell_kind(config.kind)
-    return make_cell(config, seed=options.seed, routes=loaded.routes, emit=run.emit, options=cell_options)
+    return options.make_cell(
+        loaded.cell_config, seed=options.seed, routes=loaded.routes, emit=run.emit, options=cell_options
+    )
 
 
 def _complete(
-    run: Run, loaded: LoadedMission, options: RunOptions, workcell: Workcell, real_cell: Cell
+    run: Run, loaded: LoadedMission, options: RunOptions, station: Station, control_period: float
 ) -> None:
-    """Give a run its work cell, its tree, and a planner that reads `real_cell` without a record."""
-    run.connect(workcell, LookaheadPlanner(real_cell))
+    """Give a run its station and its tree."""
+    run.connect(station, control_period)
     run.set_tree(build_tree(loaded, loaded.skills, run.cell, Blackboard(), run.emit, options.substitutes))
 
 
 class ResumedRun(Run):
-    """Run that replays an interrupted run, and then may continue on the inner cell.
+    """Run that replays an interrupted run, and then may continue on the devices.
 
     The replay includes earlier resumptions of the run. Observers receive all events; recorders receive only
     the events after the replay, during which the speed of the wall clock has no effect either.
     """
 
-    workcell: ReplayedCell
+    replay: Replay
 
     def __init__(
         self, mission: str, observers: Sequence[Observer] = (), *, is_realtime: bool = False
@@ -186,23 +185,31 @@ class ResumedRun(Run):
 
     def plan_ahead(self) -> None:
         """Plan the probable next motion, except during the replay."""
-        if self.workcell.is_live:
+        if self.replay.is_live:
             super().plan_ahead()
+
+    def advance(self) -> None:
+        """Wait for the next tick of the devices, or continue with the next tick of the record."""
+        if self.replay.is_live:
+            super().advance()
+        else:
+            self.replay.advance()
+            self.begin_step(self.replay.tick)
 
     def _execute_tree(self) -> RunEnded:
         """Execute the tree, and again after each resumption of an INCOMPLETE run; return the last end."""
         run_end = super()._execute_tree()
-        while run_end.status == "INCOMPLETE" and self.workcell.is_resumed_from_incomplete:
+        while run_end.status == "INCOMPLETE" and self.replay.is_resumed_from_incomplete:
             self.advance()
             run_end = super()._execute_tree()
         return run_end
 
     def _stop_or_resume(self) -> None:
         """Stop or resume the run in the same control step as the recorded run; called between two ticks."""
-        cell = self.workcell
-        while not cell.is_live and not cell.has_run_ended and cell.pending_interruption is not None:
-            self._resume(cell.pending_interruption)
-        if not cell.is_live and cell.has_run_ended:
+        replay = self.replay
+        while not replay.is_live and not replay.has_run_ended and replay.pending_interruption is not None:
+            self._resume(replay.pending_interruption)
+        if not replay.is_live and replay.has_run_ended:
             self.control.stop()
 
     def _resume(self, interruption: Interruption) -> None:
@@ -211,26 +218,25 @@ class ResumedRun(Run):
         Raises:
             Fault: The arm did not come to rest.
         """
-        cell = self.workcell
-        cell.resume()
-        if cell.is_live:
-            self._begin_on_inner_cell(interruption)
+        self.replay.resume()
+        if self.replay.is_live:
+            self._begin_on_devices(interruption)
         else:
-            self.begin_step(cell.steps)
+            self.begin_step(self.replay.tick)
         halt_running_skills(self.root)
         brake_arm(self.cell, self.advance)
         if interruption.restarts_tree:
-            cell.accounts.discard_rejected_and_skipped()
+            self.station.ledger.discard_rejected_and_skipped()
         reconcile_ledger(self.cell, interruption.last_action)
 
-    def _begin_on_inner_cell(self, interruption: Interruption) -> None:
+    def _begin_on_devices(self, interruption: Interruption) -> None:
         """Brake the arm, then emit `RunResumed`. A kill before this event leaves the journal unchanged."""
-        inner = self.workcell.inner
-        brake_arm(inner.cell, inner.advance)
+        station = self.station
+        brake_arm(station.unrecorded_cell, station.advance)
         for recorder in self._recorders:
             super().add_recorder(recorder)
         self._is_realtime = self._is_realtime_after_replay
-        self.begin_step(inner.steps)
+        self.begin_step(station.tick_count)
         self._wall_start = time.monotonic() - self.now
         versions = dict(list_versions())
         self.emit(RunResumed(interruption.kept_step_count, interruption.last_action, versions))

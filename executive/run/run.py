@@ -11,9 +11,9 @@ from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
 from executive import events
+from executive.cell.devices import sleep_on
 from executive.cell.objects import Item
-from executive.cell.protocols import Cell, StepClock
-from executive.cell.workcell import Accounts, Workcell
+from executive.cell.protocols import Cell, Steps
 from executive.errors import ExecutiveError, Fault, Stopped
 from executive.events import (
     Event,
@@ -23,6 +23,7 @@ from executive.events import (
     TimedEvent,
 )
 from executive.ledger.certainty import is_balanced
+from executive.ledger.tracker import Tracker
 from executive.manipulation.motions import make_transport_task
 from executive.manipulation.tool_goals import (
     make_approach,
@@ -31,8 +32,8 @@ from executive.manipulation.tool_goals import (
     sort_pickable_targets,
 )
 from executive.processes import shorten_collections
-from executive.replay.recording_cell import InputRecorder, make_recording_cell
 from executive.run.run_control import RunControl, halt_on_signals
+from executive.station.station import Station
 from executive.tree.tree_node import TreeNode, halt
 
 MAX_BRAKING_TIME = 2.0
@@ -64,11 +65,40 @@ _HALTED = _LoopEnd("HALTED", "halted", "halted by the user")
 """End of a tick loop that was halted by a person or by a signal."""
 
 
+@dataclass(eq=False)
+class RunClock:
+    """Clock of a run as skills see it, which shows the start of the tick; implements `Clock`.
+
+    Attributes:
+        step: Time between two ticks [s].
+        offset: Time of the clock of the devices minus the time of all ticks [s]; 0 in simulation.
+        tick: Number of the current tick.
+    """
+
+    step: float
+    offset: float = 0.0
+    tick: int = 0
+    is_simulated = True
+
+    @property
+    def now(self) -> float:
+        """Time since the start of the run [s]."""
+        return self.tick * self.step + self.offset
+
+    def sleep(self, duration: float) -> Steps:
+        """Yield until the time has advanced by `duration` [s]."""
+        return sleep_on(self, duration)
+
+    def wait_for_tick(self) -> None:
+        """Not allowed: the run waits for the next tick."""
+        raise Fault("a skill must not wait for the next tick; write `yield`")
+
+
 class Run:
     """One execution of a mission on a work cell: its events, its tick loop and its end.
 
-    A run is created before its work cell, which emits events during its creation. Then `connect` sets the
-    work cell, and `set_tree` the tree, whose skills use `cell`.
+    A run is created before its station, which emits events during its creation. Then `connect` sets the
+    station, and `set_tree` the tree, whose skills use `cell`.
 
     Args:
         mission: Name of the mission.
@@ -78,17 +108,16 @@ class Run:
     Attributes:
         mission: Name of the mission.
         control: Control with which other threads stop, pause and step the run.
-        tick: Number of the current control step.
         start_event: First event of the run; None for a run that continues an interrupted run.
-        workcell: Work cell of the run.
-        cell: Cell for the skills, which records each value that a skill reads; its clock shows the start of
-            the control step.
+        station: Station of the run.
+        cell: Cell for the skills; its clock shows the start of the tick.
+        clock: Clock of the cell.
         root: Root of the tree.
         behaviour_tree: The tree for py_trees; visitors and handlers that are added to it before `execute`
             are called at every tick.
     """
 
-    workcell: Workcell
+    station: Station
     cell: Cell
     root: TreeNode
     behaviour_tree: BehaviourTree
@@ -98,29 +127,23 @@ class Run:
     ) -> None:
         self.mission = mission
         self.control = RunControl()
-        self.tick = 0
+        self.clock = RunClock(0.0)
         self.start_event: RunStarted | None = None
         self._observers = list(observers)
         self._is_realtime = is_realtime
-        self._recorder = InputRecorder(self.emit)
-        self._control_period = 0.0
-        """Duration of a control step [s]."""
-        self._clock_offset = 0.0
-        """Time of the cell's clock minus the time of all control steps [s]; 0 in simulation."""
         self._wall_start = 0.0
         """Wall time at time 0 of the run's clock [s]."""
         # State of tool and table after the run; the initial values remain if a sensor fails.
         self._held_item = ""
         self._is_table_empty = False
 
-    def connect(self, workcell: Workcell, planner: LookaheadPlanner) -> None:
-        """Set the work cell of the run, and the planner of its probable next motion."""
-        self.workcell = workcell
-        self._planner = planner
-        self.add_observer(planner.on_event)
-        self._control_period = workcell.cell.clock.step
-        clock = StepClock(lambda: self.now, self._control_period)
-        self.cell = make_recording_cell(workcell.cell, self._recorder, clock, self.emit)
+    def connect(self, station: Station, control_period: float) -> None:
+        """Set the station of the run, and the time between two ticks [s]."""
+        self.station = station
+        self._planner = LookaheadPlanner(station.unrecorded_cell)
+        self.add_observer(self._planner.on_event)
+        self.clock = RunClock(control_period)
+        self.cell = replace(station.cell, clock=self.clock)
 
     def set_tree(self, root: TreeNode) -> None:
         """Set the tree, which uses `cell` and `emit` of this run."""
@@ -128,9 +151,14 @@ class Run:
         self.behaviour_tree = BehaviourTree(root)
 
     @property
+    def tick(self) -> int:
+        """Number of the current tick."""
+        return self.clock.tick
+
+    @property
     def now(self) -> float:
-        """Time on the run's clock at the start of the current control step [s]."""
-        return self.tick * self._control_period + self._clock_offset
+        """Time on the run's clock at the start of the current tick [s]."""
+        return self.clock.now
 
     def add_observer(self, observer: Observer) -> None:
         """Call `observer` with every later event, after all other observers."""
@@ -142,26 +170,28 @@ class Run:
 
     def emit(self, event: Event) -> None:
         """Pass an event with its control step and time to all observers."""
-        timed = TimedEvent(self.tick, round(self.now, 6), event)
+        timed = TimedEvent(self.clock.tick, round(self.clock.now, 6), event)
         for observer in self._observers:
             observer(timed)
 
     def begin_step(self, tick: int) -> None:
-        """Begin the control step number `tick`, and record the time of the cell's clock."""
-        self.tick = tick
-        self._recorder.begin_step()
-        clock = self.workcell.cell.clock
-        step_time = tick * self._control_period
-        self._clock_offset = self._recorder.read("clock", lambda: clock.now - step_time)
+        """Begin the tick number `tick`, and record the time of the clock of the devices."""
+        clock = self.clock
+        clock.tick = tick
+        border = self.station.border
+        border.tick = tick
+        if border.is_live and self.station.driver.clock.is_simulated:
+            return
+        clock.offset = border.read("clock", lambda: self.station.driver.clock.now - tick * clock.step)
 
     def plan_ahead(self) -> None:
         """Let the planner plan the probable next motion."""
-        self._planner.plan_next_motion(self.tick)
+        self._planner.plan_next_motion(self.clock.tick)
 
     def advance(self) -> None:
-        """Execute one control step of the work cell, and begin the next control step."""
-        self.workcell.advance()
-        self.begin_step(self.tick + 1)
+        """Wait for the next tick of the devices, and begin it."""
+        self.station.advance()
+        self.begin_step(self.clock.tick + 1)
 
     def execute(self) -> RunEnded:
         """Tick the tree until it ends, brake the arm, and return the end of the run.
@@ -174,8 +204,8 @@ class Run:
         return run_end
 
     def close(self) -> None:
-        """Release the work cell."""
-        self.workcell.close()
+        """Release the station."""
+        self.station.close()
 
     def _execute_tree(self) -> RunEnded:
         """Tick the tree until it ends, brake the arm, finalize the items, and return the end of the run.
@@ -190,13 +220,13 @@ class Run:
             problems += _catch_problems(lambda: self.emit(events.FaultRaised(loop_end.traceback)))
         has_succeeded = loop_end.status == "SUCCESS"
         problems += _catch_problems(self._store_final_state)
-        problems += _catch_problems(lambda: _finalize_items(self.workcell.accounts, has_succeeded))
+        problems += _catch_problems(lambda: _finalize_items(self.station.ledger, has_succeeded))
         if problems and loop_end.status == "FAULT":
             loop_end = replace(loop_end, message="; ".join([loop_end.message, *problems]))
         elif problems:
             loop_end = _LoopEnd("FAULT", "fault", "; ".join(problems))
         elif has_succeeded:
-            loop_end = _check_items(self.workcell.accounts)
+            loop_end = _check_items(self.station.ledger)
         cause = (loop_end.status, loop_end.reason, loop_end.message, loop_end.node)
         return RunEnded(*cause, self._is_table_empty, self._held_item, self.tick, round(self.now, 6))
 
@@ -210,7 +240,7 @@ class Run:
         try:
             if self.start_event is not None:
                 self.emit(self.start_event)
-            self.begin_step(self.tick)
+            self.begin_step(self.clock.tick)
             self._wall_start = time.monotonic() - self.now
             control.wait_while_paused()
             while not control.is_stopped:
@@ -258,12 +288,12 @@ def _catch_problems(action: Callable[[], None]) -> list[str]:
     return []
 
 
-def _check_items(accounts: Accounts) -> _LoopEnd:
+def _check_items(ledger: Tracker) -> _LoopEnd:
     """Return the end of a run whose tree succeeded, from the states of its items.
 
     The status is FAILURE if items were lost, else INCOMPLETE if items were rejected, else SUCCESS.
     """
-    items = accounts.list_items()
+    items = ledger.list_items()
     if lost := [item.item for item in items if item.state == "lost"]:
         message = f"{len(lost)} object(s) were lost and not found again: {', '.join(lost)}"
         return _LoopEnd("FAILURE", "lost", message)
@@ -273,14 +303,14 @@ def _check_items(accounts: Accounts) -> _LoopEnd:
     return _LoopEnd("SUCCESS")
 
 
-def _finalize_items(accounts: Accounts, has_tree_succeeded: bool) -> None:
+def _finalize_items(ledger: Tracker, has_tree_succeeded: bool) -> None:
     """Let the ledger set the final state of each item, and check the sum of the counts.
 
     Raises:
         Fault: The number of seen items is not the sum of the placed, rejected, skipped and lost items.
     """
-    accounts.set_final_states(completed=has_tree_succeeded)
-    counts = accounts.count_states()
+    ledger.set_final_states(completed=has_tree_succeeded)
+    counts = ledger.count_states()
     if not is_balanced(counts):
         text = ", ".join(f"{count} {state}" for state, count in counts.items())
         raise Fault(

@@ -17,19 +17,18 @@ from typing import Any, get_args
 
 import numpy as np
 
+from executive.cell.device_config import STEP
 from executive.cell.frame import Detections
 from executive.cell.objects import Item, Target
-from executive.cell.protocols import STEP
-from executive.cell.proxy import Access, intercept
-from executive.cell.workcell import CellOptions
-from executive.drivers.fake import SHIPPED_ROUTES, FakeCell
 from executive.manipulation.motions import capture_and_detect, complete, localize_and_observe
 from executive.mission.ports import describe_type, find_element_type, is_assignable
 from executive.skill import ANY, EMPTY, HALT, HOLDING, Direction, Param, Port, Skill
-from executive.station.without_hardware import SilentOperator
+from executive.station.border import Access
+from executive.station.station import CellOptions, SilentOperator
 from executive.testing import faults
-from executive.testing.faulty_cell import FaultyCell, ScheduledFault
-from executive.testing.run_skill import SkillResult, run_skill
+from executive.testing.fake_cell import SHIPPED_ROUTES, FakeCell
+from executive.testing.faulty_cell import FaultInjector, ScheduledFault
+from executive.testing.run_skill import SkillResult, observe_accesses, run_skill
 from executive.tree.keys import is_union
 
 MAX_TICKS = int(60.0 / STEP)
@@ -40,8 +39,6 @@ MAX_PROBLEMS = 5
 """Maximum number of violations that a check reports."""
 GENERATED_NUMBER = 0.1
 """Value generated for each numeric param, clipped to its bounds; small, so that durations [s] are short."""
-_OBSERVED_ROLES = ("arm", "tool", "camera", "detector", "ledger", "localizer", "operator")
-"""Parts of the cell whose calls are recorded."""
 _ACTIONS = ("arm.start", "arm.stop", "tool.open", "tool.close", "camera.capture")
 """Commands to parts of the cell; the part must be in `uses` of the skill."""
 _MEASUREMENTS = ("camera.capture", "operator.ask")
@@ -249,22 +246,21 @@ class SkillRuns:
     def _run(self, situation: Situation, halt_at: int | None = None) -> SkillTestRun:
         scene, values = _prepare_scene(self.skill, situation, self.arrange)
         fake = scene.cell
-        workcell = FaultyCell(fake, situation.script)
+        FaultInjector(situation.script).install(fake)
         calls: list[tuple[int, str]] = []
-        first_step = fake.steps
+        first_tick = fake.tick_count
 
-        def record_call(access: Access) -> Any:
+        def record_call(access: Access) -> None:
             if access.is_call:
-                calls.append((fake.steps - first_step, access.name))
-            return access.proceed()
+                calls.append((fake.tick_count - first_tick, access.path))
 
-        workcell.cell = intercept(workcell.cell, record_call, _OBSERVED_ROLES)
+        fake.cell = observe_accesses(fake.cell, record_call)
         initial_values = str(values)
         try:
-            result = run_skill(self.skill, workcell, inputs=values, max_ticks=MAX_TICKS, halt_at=halt_at)
+            result = run_skill(self.skill, fake, inputs=values, max_ticks=MAX_TICKS, halt_at=halt_at)
         except Exception as error:
             message = f"{type(error).__name__}: {error}"
-            result = SkillResult("FAULT", "", message, ticks=fake.steps - first_step)
+            result = SkillResult("FAULT", "", message, ticks=fake.tick_count - first_tick)
         ending = f"{result.status} at tick {result.ticks} {result.reason} {result.message}".rstrip()
         return SkillTestRun(
             situation=situation,

@@ -17,7 +17,7 @@ concerns the requests that a skill makes while the fault lasts. Two arguments be
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from typing import Any
 
@@ -25,11 +25,9 @@ import numpy as np
 
 from executive.cell.arm import Motion
 from executive.cell.frame import Answer
-from executive.cell.workcell import Workcell
 from executive.errors import InputError, NoDepth, Unavailable, Unreachable
-from executive.events import Emit, discard_event
 from executive.perception.detectors.requests import ChangedRequest
-from executive.testing.faulty_cell import Effect, FaultyCell, ObjectChoice, Occurrence, ScheduledFault
+from executive.testing.faulty_cell import Effect, ObjectChoice, Occurrence, ScheduledFault
 from executive.testing.oracle import WorldAccess
 
 UNSURE_CONFIDENCE_FRACTION = 0.9
@@ -68,20 +66,6 @@ def between(start: float, end: float, effect: Effect) -> ScheduledFault:
 def after(start: float, effect: Effect) -> ScheduledFault:
     """Return a fault that lasts from `start` on the run's clock [s] until the end of the run."""
     return between(start, math.inf, effect)
-
-
-def with_faults(
-    make_cell: Callable[..., Workcell], faults: Sequence[ScheduledFault], timeout: float = math.inf
-) -> Callable[..., FaultyCell]:
-    """Return a function that makes a `FaultyCell` of a cell of `make_cell`, for `RunOptions.make_cell`.
-
-    The cell must observe the run: `run.add_observer(run.workcell.on_event)`.
-    """
-
-    def make_faulty_cell(*args: Any, emit: Emit = discard_event, **options: Any) -> FaultyCell:
-        return FaultyCell(make_cell(*args, emit=emit, **options), faults, emit, timeout)
-
-    return make_faulty_cell
 
 
 def seal_fails() -> Effect:
@@ -155,7 +139,7 @@ def table_bumped() -> Effect:
 
 def _bump_table(occurrence: Occurrence) -> bool:
     occurrence.emit_event()
-    occurrence.context.cell.ledger.invalidate_positions()
+    occurrence.context.station.ledger.invalidate_positions()
     return True
 
 
@@ -166,7 +150,7 @@ def arm_collides(obstacle: str = "something", fraction: float = 0.5) -> Effect:
 
 def _collide_arm(occurrence: Occurrence, obstacle: str) -> bool:
     occurrence.emit_event()
-    occurrence.context.world.cell.arm.stop_after_collision(f"the arm ran into {obstacle}")
+    occurrence.context.world.driver.collide(f"the arm ran into {obstacle}")
     return True
 
 

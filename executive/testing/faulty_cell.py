@@ -1,4 +1,4 @@
-"""Cell with injected faults: effects, the occurrences of an effect, and the cell that causes them."""
+"""Injection of faults at the border of a run: effects, the occurrences of an effect, and their schedule."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from functools import cached_property, partial
 from typing import Any, Literal
 
 from executive.cell.arm import Motion
+from executive.cell.devices import TrueObject
 from executive.cell.json_values import round_values
-from executive.cell.proxy import Access, intercept
-from executive.cell.workcell import CellWrapper, TrueObject, Workcell
 from executive.errors import Fault, InputError
 from executive.events import Emit, FaultInjected, NodeEnded, NodeStarted, TimedEvent, discard_event
+from executive.station.border import Access
+from executive.station.station import Station
 from executive.testing.oracle import WorldAccess
 
 MAX_ITEM_POSITION_ERROR = 0.05
@@ -24,8 +25,6 @@ TIME_TOLERANCE = 1e-9
 """Tolerance for rounding errors in comparisons of times on the run's clock [s]."""
 ObjectChoice = int | Literal["node", "nearest", "held"]
 """Choice of an object; `executive.testing.faults` describes the values."""
-_INTERCEPTED_ROLES = ("arm", "tool", "camera", "detector", "localizer", "operator")
-"""Parts of the cell that effects can change or observe."""
 
 
 @dataclass(frozen=True)
@@ -72,24 +71,24 @@ class ScheduledFault:
         return f"{self.effect.name} from {self.start:g} s" if not self.pattern else self.effect.name
 
 
-class FaultyCell(CellWrapper):
-    """A work cell with injected faults; implements `Workcell`.
+class FaultInjector:
+    """Injects faults into the run of a station, at the border of the run.
 
     Faults of nodes occur only if `on_event` observes the events of the run. Each fault emits `FaultInjected`.
 
     Args:
-        inner: The cell without faults.
         faults: Fault script.
-        emit: Function that emits events of the run.
         timeout: Time on the run's clock after which the run ends as a fault [s].
+
+    Attributes:
+        station: The station; set by `install`.
+        emit: Function that emits events of the run; set by `install`.
     """
 
-    def __init__(
-        self, inner: Workcell, faults: Sequence[ScheduledFault],
-        emit: Emit = discard_event, timeout: float = math.inf,
-    ) -> None:  # fmt: skip
-        super().__init__(inner)
-        self.emit = emit
+    station: Station
+
+    def __init__(self, faults: Sequence[ScheduledFault], timeout: float = math.inf) -> None:
+        self.emit: Emit = discard_event
         self._timeout = timeout
         self._node_faults = [fault for fault in faults if fault.pattern]
         self._time_faults = [fault for fault in faults if not fault.pattern]
@@ -97,12 +96,28 @@ class FaultyCell(CellWrapper):
         self._occurrences: list[Occurrence] = []
         # Last motion of the arm and its start time [s]; None before a motion and after a stop.
         self._motion: tuple[Motion, float] | None = None
-        self.cell = intercept(inner.cell, self._intercept_access, _INTERCEPTED_ROLES)
+
+    def install(self, station: Station, emit: Emit = discard_event) -> None:
+        """Inject the faults into the run of a station."""
+        self.station = station
+        self.emit = emit
+        station.border.interceptor = self._intercept_access
+        station.tick_callbacks.append(self._advance)
+
+    def wrap(self, make_cell: Callable[..., Station]) -> Callable[..., Station]:
+        """Return a factory of stations with these faults, for `RunOptions.make_cell`."""
+
+        def make_faulty_cell(*args: Any, emit: Emit = discard_event, **options: Any) -> Station:
+            station = make_cell(*args, emit=emit, **options)
+            self.install(station, emit)
+            return station
+
+        return make_faulty_cell
 
     @cached_property
     def world(self) -> WorldAccess:
-        """Access to the world of the cell, opened at the first use."""
-        return WorldAccess(self.inner)
+        """Access to the world of the station, opened at the first use."""
+        return WorldAccess(self.station)
 
     @property
     def motion_progress(self) -> float:
@@ -110,11 +125,11 @@ class FaultyCell(CellWrapper):
         if self._motion is None or self._motion[0].duration == 0.0:
             return 0.0
         motion, start_time = self._motion
-        fraction = (self.cell.clock.now - start_time) / motion.duration
+        fraction = (self.station.driver.clock.now - start_time) / motion.duration
         return fraction if fraction <= 1.0 else 0.0
 
     def on_event(self, timed: TimedEvent) -> None:
-        """Begin or end the faults of a node; must be called with each event of the run on this cell."""
+        """Begin or end the faults of a node; must be called with each event of the run."""
         match timed.event:
             case NodeStarted(node, _, item):
                 for index, fault in enumerate(self._node_faults):
@@ -136,22 +151,21 @@ class FaultyCell(CellWrapper):
                     f"the paths are: {', '.join(paths)}"
                 )
 
-    def advance(self) -> None:
-        """Advance the cell by one control step, and inject the faults that are due.
+    def _advance(self) -> None:
+        """Inject the faults that are due after a tick.
 
         Raises:
             Fault: The timeout has expired; later calls do not raise it again, so that the arm can brake.
         """
-        self.inner.advance()
         self._update_occurrences()
-        if self.cell.clock.now > self._timeout:
+        if self.station.driver.clock.now > self._timeout:
             timeout = self._timeout
             self._timeout = math.inf
             raise Fault(f"the mission has not ended after {timeout:g} s on its clock")
 
     def _update_occurrences(self) -> None:
         """Begin and end the faults with a time span, and run the actions of the active faults."""
-        now = self.cell.clock.now + TIME_TOLERANCE
+        now = self.station.driver.clock.now + TIME_TOLERANCE
         due_faults = [fault for fault in self._time_faults if fault.start <= now]
         self._time_faults = [fault for fault in self._time_faults if fault.start > now]
         for fault in due_faults:
@@ -178,9 +192,9 @@ class FaultyCell(CellWrapper):
                 if interceptor := occurrence.effect.interceptors.get(access.member):
                     proceed = partial(interceptor, proceed, occurrence, *occurrence.effect.arguments)
         result = proceed()
-        if access.name == "arm.start":
-            self._motion = (access.arguments[0], self.cell.clock.now)
-        elif access.name == "arm.stop":
+        if access.path == "arm.execute":
+            self._motion = (access.arguments[0], self.station.driver.clock.now)
+        elif access.path == "arm.stop":
             self._motion = None
         return result
 
@@ -191,7 +205,7 @@ class Occurrence:
 
     Attributes:
         effect: The effect.
-        context: The faulty cell.
+        context: The injector.
         node: Path of the node during which the effect occurs, or "".
         item: Item that the node handles, or "".
         end: Time on the run's clock at which the effect ends [s].
@@ -201,7 +215,7 @@ class Occurrence:
     """
 
     effect: Effect
-    context: FaultyCell
+    context: FaultInjector
     node: str = ""
     item: str = ""
     end: float = math.inf
@@ -223,8 +237,8 @@ class Occurrence:
         if choice == "held":
             return world.held_object
         if choice == "nearest" or not self.item:
-            return world.find_nearest_object(self.context.cell.arm.tool_pose.position)
-        entries = self.context.accounts.list_items()
+            return world.find_nearest_object(self.context.station.unrecorded_cell.arm.tool_pose.position)
+        entries = self.context.station.ledger.list_items()
         summary = next((entry for entry in entries if entry.item == self.item), None)
         if summary is None or summary.state == "placed":
             return None
@@ -234,7 +248,7 @@ class Occurrence:
 
     def emit_event(self, affected: TrueObject | None = None) -> None:
         """Emit a `FaultInjected` event with the affected object; at most one event per control step."""
-        now = self.context.cell.clock.now
+        now = self.context.station.driver.clock.now
         if self._last_event_time == now:
             return
         self._last_event_time = now

@@ -19,17 +19,16 @@ import numpy as np
 
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.device_config import CameraConfig
+from executive.cell.devices import TrueObject
 from executive.cell.frame import Detection, Frame
 from executive.cell.objects import UNKNOWN_LABEL
 from executive.cell.protocols import Clock
-from executive.cell.workcell import TrueObject, Workcell, find_innermost_cell
-from executive.drivers.fake import FakeCell
 from executive.drivers.sim.camera import Image, SimCamera
 from executive.drivers.sim.cell import SimCell
 from executive.drivers.sim.models import compute_bounding_box, load_mesh
 from executive.drivers.sim.world import World
 from executive.errors import InputError
-from executive.geometry import Array, Pose
+from executive.geometry import Array
 from executive.perception.camera_model import NEAR_PLANE, project
 from executive.perception.detectors.requests import PendingSearch
 
@@ -41,33 +40,31 @@ class WorldAccess:
     """Access of tests to the true state of a fake or simulated world; skills have no such access.
 
     Attributes:
-        cell: The parts of the fake or simulated cell, whose arm and tool have methods for tests.
-        world: The `FakeWorld` or the simulated `World` of the cell.
+        station: The station of the world.
+        driver: The devices of the station.
 
     Raises:
-        InputError: The cell is neither fake nor simulated.
+        InputError: The world of the driver is not known.
     """
 
-    def __init__(self, workcell: Workcell) -> None:
-        inner: Any = find_innermost_cell(workcell)
-        self.cell = inner.cell
-        self._is_fake = isinstance(inner, FakeCell)
-        self.world: Any = getattr(inner, "world" if self._is_fake else "_world", None)
-        if self.world is None:
-            raise InputError(f"tests can change only fake and simulated worlds, not a {type(inner).__name__}")
+    def __init__(self, station: Station) -> None:
+        self.station = station
+        driver: Any = station.driver
+        if not isinstance(driver, TrueWorld):
+            raise InputError(
+                f"tests can change only known worlds, not the world of a {type(driver).__name__}"
+            )
+        self.driver = driver
 
     @property
     def objects(self) -> Sequence[TrueObject]:
         """All loose objects, in the order of their creation."""
-        if self._is_fake:
-            return list(self.world.objects)
-        return list(map(self.world.describe_object, self.world.labels))
+        return self.driver.list_objects()
 
     @property
     def held_object(self) -> TrueObject | None:
         """The object at the tool, or None."""
-        held = self.world.held_object if self._is_fake else self.cell.tool.held_body
-        return held if self._is_fake or held is None else self.world.describe_object(held)
+        return self.driver.find_held_object()
 
     def find_nearest_object(
         self, position: Sequence[float] | Array, max_distance: float = math.inf
@@ -77,7 +74,7 @@ class WorldAccess:
         candidates = [
             true_object
             for true_object in self.objects
-            if not any(bin.contains(true_object.position) for bin in self.cell.bins.values())
+            if not any(bin.contains(true_object.position) for bin in self.station.cell.bins.values())
             and (held_object is None or true_object.body != held_object.body)
             and math.dist(true_object.position[:2], position[:2]) <= max_distance
         ]
@@ -85,7 +82,7 @@ class WorldAccess:
 
     def is_free(self, position: Array, moved_object: TrueObject) -> bool:
         """Return True if `moved_object` would touch no other object at a horizontal `position` [m]."""
-        classes = self.cell.classes
+        classes = self.station.cell.classes
         radius = classes[moved_object.label].radius
         return all(
             math.dist(position, other.position[:2]) - classes[other.label].radius > radius
@@ -96,26 +93,17 @@ class WorldAccess:
     def remove(self, true_object: TrueObject) -> None:
         """Remove an object from the world; a held object is released first."""
         self.release(true_object)
-        if self._is_fake:
-            self.world.remove(true_object)
-        else:
-            self.world.remove_object(true_object.body)
+        self.driver.remove_object(true_object)
 
     def move(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
         """Displace an object by `(x, y)` [m]; a held object is released first."""
         self.release(true_object)
-        if self._is_fake:
-            true_object.position[:2] += displacement
-            true_object.rest_positions.append(true_object.position.copy())
-        else:
-            X_WO = self.world.get_object_pose(true_object.body)
-            position = X_WO.position + np.array([*displacement, 0.0])
-            self.world.place_object(true_object.body, Pose(X_WO.rotation, position))
+        self.driver.move_object(true_object, displacement)
 
     def release(self, true_object: TrueObject) -> None:
-        """Break the seal on an object if the tool holds it."""
+        """Let the tool lose an object if it holds the object."""
         if self.held_object is not None and self.held_object.body == true_object.body:
-            self.cell.tool.break_seal()
+            self.driver.drop_held_object()
 
 
 @dataclass(frozen=True, eq=False)

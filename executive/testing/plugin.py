@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from executive.drivers.fake import FakeCell
+    from executive.testing.fake_cell import FakeCell
     from executive.testing.run_mission import MissionResult
     from executive.testing.run_skill import SkillResult
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @pytest.fixture
 def fake_cell() -> FakeCell:
     """A fake cell with an empty table."""
-    from executive.drivers.fake import FakeCell
+    from executive.testing.fake_cell import FakeCell
 
     return FakeCell()
 

@@ -19,17 +19,17 @@ from py_trees.visitors import VisitorBase
 
 from executive.behaviours import load_skills
 from executive.cell.protocols import Cell, Steps
-from executive.cell.workcell import Accounts, Workcell, find_innermost_cell
-from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.events import FaultInjected, NodeEnded, NodeStarted, Observer, RunEnded, TimedEvent
+from executive.ledger.tracker import Tracker
 from executive.mission.load import load_mission
 from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.skill import Skill
-from executive.testing.faults import with_faults
-from executive.testing.faulty_cell import FaultyCell, ScheduledFault
+from executive.station.station import Station
+from executive.testing.fake_cell import FakeCell
+from executive.testing.faulty_cell import FaultInjector, ScheduledFault
 from executive.tree.tree_node import SkillLeaf
 
 MISSION_TIMEOUT = 600.0
@@ -45,14 +45,14 @@ class MissionResult(RunEnded):
     Attributes:
         events: All events of the run, in order.
         items: Number of items of the ledger by final state; `seen` counts all items except phantoms.
-        accounts: The ledger, with the final state of each item.
+        ledger: The ledger, with the final state of each item.
         audit: True number of objects by final place; None if the cell has no ground truth.
-        cell: The closed cell of the run, without wrappers.
+        cell: The closed station of the run.
     """
 
     events: Sequence[TimedEvent]
     items: Mapping[str, int]
-    accounts: Accounts
+    ledger: Tracker
     audit: Mapping[str, int] | None
     cell: Any
 
@@ -79,7 +79,7 @@ class MissionResult(RunEnded):
 
 def run_mission(
     mission: str | Path,
-    make_cell: Callable[..., Workcell] = FakeCell,
+    make_cell: Callable[..., Station] = FakeCell,
     *,
     seed: int = 0,
     set: Mapping[str, str] | None = None,
@@ -95,7 +95,7 @@ def run_mission(
 
     Args:
         mission: Mission file, or name of a shipped mission.
-        make_cell: Function that makes the work cell, instead of the kind in the cell file.
+        make_cell: Function that makes the station, instead of the kind in the cell file.
         seed: Random seed.
         set: Values of params by name, and of keys of the cell file by `cell.<key>.<key>`.
         requests: Requests of the operator, in order.
@@ -113,26 +113,25 @@ def run_mission(
     """
     loaded = load_mission(mission, load_skills(), set)
     events: list[TimedEvent] = []
-    make_faulty_cell = with_faults(make_cell, faults, timeout=timeout)
-    options = RunOptions(seed, requests, make_cell=make_faulty_cell, substitutes=substitutes or {})
+    injector = FaultInjector(faults, timeout)
+    options = RunOptions(seed, requests, make_cell=injector.wrap(make_cell), substitutes=substitutes or {})
     run = assemble(loaded, options, [events.append, *observers])
-    workcell = run.workcell
-    assert isinstance(workcell, FaultyCell)
+    station = run.station
     try:
         if arrange is not None:
-            arrange(workcell.inner)
-        workcell.check_patterns([getattr(node, "path", node.name) for node in run.root.iterate()])
+            arrange(station)
+        injector.check_patterns([getattr(node, "path", node.name) for node in run.root.iterate()])
         _check_substitutes(run, loaded.skills)
-        run.add_observer(workcell.on_event)
+        run.add_observer(injector.on_event)
         for visitor in visitors:
             run.behaviour_tree.add_visitor(visitor)
         return MissionResult(
             **asdict(run.execute()),
             events=events,
-            items=workcell.accounts.count_states(),
-            accounts=workcell.accounts,
-            audit=workcell.audit(),
-            cell=find_innermost_cell(workcell),
+            items=station.ledger.count_states(),
+            ledger=station.ledger,
+            audit=station.audit(),
+            cell=station,
         )
     finally:
         run.close()

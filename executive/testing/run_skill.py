@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,20 +10,36 @@ from executive.cell.arm import Goal
 from executive.cell.frame import Detections, Frame
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell
-from executive.cell.proxy import Access, intercept
-from executive.cell.workcell import Workcell
 from executive.errors import InputError
-from executive.replay.recording_cell import COMMANDS
+from executive.events import discard_event
 from executive.run.run import MAX_BRAKING_TIME
 from executive.skill import Skill, SkillFailed
+from executive.station.border import Access, Border
+from executive.station.station import Station
 from executive.tree.tree_node import SkillRun
 
-_INTERCEPTED_ROLES = ("arm", "tool", "camera", "detector", "ledger", "operator")
-_LOGGED_CALLS = COMMANDS | {
+_ROLES = ("arm", "tool", "camera", "ledger", "localizer", "operator")
+"""Parts of a cell whose accesses tests observe, beside the detectors."""
+_LOGGED_CALLS = frozenset({
+    "arm.plan", "arm.plan_ahead", "arm.start", "arm.stop", "tool.close", "tool.open", "detector.request",
     "camera.capture", "camera.next_pose", "operator.ask", "ledger.observe", "ledger.record_touch",
     "ledger.record_failed_pick", "ledger.record_grasp", "ledger.record_drop", "ledger.record_placement",
     "ledger.record_put_down", "ledger.reject", "ledger.defer", "ledger.invalidate_positions",
-}  # fmt: skip
+})  # fmt: skip
+
+
+def observe_accesses(cell: Cell, on_access: Callable[[Access], None]) -> Cell:
+    """Return a copy of a cell that calls `on_access` before each access to one of its parts."""
+
+    def handle(access: Access) -> Any:
+        on_access(access)
+        return access.proceed()
+
+    border = Border(discard_event)
+    border.interceptor = handle
+    parts: dict[str, Any] = {role: border.wrap(role, getattr(cell, role)) for role in _ROLES}
+    detectors = {name: border.wrap("detector", each, name) for name, each in cell.detectors.items()}
+    return replace(cell, detectors=detectors, **parts)
 
 
 @dataclass(frozen=True)
@@ -51,7 +67,7 @@ class SkillResult:
 
 def run_skill(
     skill: Skill | type[Skill],
-    workcell: Workcell,
+    station: Station,
     *,
     inputs: Mapping[str, Any] | None = None,
     max_ticks: int = 20_000,
@@ -64,7 +80,7 @@ def run_skill(
 
     Args:
         skill: The skill, or the class of the skill.
-        workcell: Cell in which the skill runs.
+        station: Station in whose cell the skill runs.
         inputs: Values of params and inputs by name, if `skill` is a class.
         max_ticks: Maximum number of control steps.
         halt_at: Control step before which the skill is halted; None: no halt.
@@ -78,11 +94,11 @@ def run_skill(
     if isinstance(skill, Skill) and inputs is not None:
         raise InputError(f"an instance of {type(skill).__name__} takes no `inputs`; pass its class")
     instance = skill(**(inputs or {})) if isinstance(skill, type) else skill
-    run = SkillRun(instance, log_commands(workcell.cell, commands))
+    run = SkillRun(instance, log_commands(station.cell, commands))
     for tick in range(max_ticks):
         if tick == halt_at:
             run.halt()
-            braking_steps = _count_braking_steps(workcell)
+            braking_steps = _count_braking_steps(station)
             return SkillResult("HALTED", ticks=tick, commands=commands, braking_steps=braking_steps)
         try:
             has_succeeded = run.step()
@@ -90,21 +106,21 @@ def run_skill(
             return SkillResult("FAILURE", failure.reason, failure.message, ticks=tick, commands=commands)
         if has_succeeded:
             return SkillResult("SUCCESS", outputs=run.read_outputs(), ticks=tick, commands=commands)
-        workcell.advance()
+        station.advance()
     return SkillResult("RUNNING", ticks=max_ticks, commands=commands)
 
 
-def _count_braking_steps(workcell: Workcell) -> int | None:
+def _count_braking_steps(station: Station) -> int | None:
     """Wait until the arm is at rest; return the number of control steps, or None after `MAX_BRAKING_TIME`."""
-    arm = workcell.cell.arm
-    clock = workcell.cell.clock
-    first_step = workcell.steps
+    arm = station.cell.arm
+    clock = station.cell.clock
+    first_step = station.tick_count
     deadline = clock.now + MAX_BRAKING_TIME
     while not arm.at_rest:
         if clock.now >= deadline:
             return None
-        workcell.advance()
-    return workcell.steps - first_step
+        station.advance()
+    return station.tick_count - first_step
 
 
 def log_commands(cell: Cell, commands: list[str]) -> Cell:
@@ -117,16 +133,15 @@ def log_commands(cell: Cell, commands: list[str]) -> Cell:
     def log(command: str, *arguments: Any) -> None:
         commands.append(" ".join([command, *filter(None, map(describe_argument, arguments))]))
 
-    def log_access(access: Access) -> Any:
-        if access.name in _LOGGED_CALLS:
-            log(f"{access.detector or access.role}.{access.member}", *access.arguments)
-        return access.proceed()
+    def log_access(access: Access) -> None:
+        if access.path in _LOGGED_CALLS:
+            log(f"{access.name or access.role}.{access.member}", *access.arguments)
 
     def log_selection(target: Target, bin: str) -> None:
         log("decided", target, bin)
         cell.report_selection(target, bin)
 
-    return replace(intercept(cell, log_access, _INTERCEPTED_ROLES), report_selection=log_selection)
+    return replace(observe_accesses(cell, log_access), report_selection=log_selection)
 
 
 def describe_argument(argument: object) -> str:

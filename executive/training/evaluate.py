@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig, DetectorConfig
-from executive.cell.device_config import CameraConfig
+from executive.cell.device_config import STEP, CameraConfig
+from executive.cell.devices import StepClock
 from executive.cell.frame import Answer, Box, Detection, Frame
-from executive.cell.protocols import STEP, Localizer, StepClock
+from executive.cell.protocols import Localizer
 from executive.errors import Unavailable
 from executive.perception.detectors.detector_registry import build_detectors
 from executive.perception.detectors.envelope import FrameRange, compute_frame_statistics

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig
+from executive.cell.devices import TrueObject
 from executive.cell.frame import Box
 from executive.cell.objects import UNKNOWN_LABEL
-from executive.cell.workcell import TrueObject
 from executive.drivers.sim import arrangements
 from executive.drivers.sim.camera import (
     CELL_LIGHT,

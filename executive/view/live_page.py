@@ -21,8 +21,8 @@ from importlib.util import find_spec
 
 import numpy as np
 
+from executive.cell.devices import Shape, Visuals
 from executive.cell.frame import Frame, FrameCaptured
-from executive.cell.workcell import Shape, Visuals
 from executive.errors import InputError
 from executive.events import FrameSearched, InputRead, TimedEvent
 from executive.geometry import Pose
@@ -160,7 +160,7 @@ class LivePage:
         nodes = make_outline(run.root)
         self._run = run
         with self._catch_errors():
-            self._visuals = run.workcell.visuals()
+            self._visuals = run.station.visuals()
         # In the empty line of each node, the page writes how often the node succeeded, failed and was halted.
         empty_results = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()

@@ -12,7 +12,7 @@ import trimesh
 import viser
 import websockets.asyncio.server
 
-from executive.cell.workcell import Shape
+from executive.cell.devices import Shape
 
 CAMERA_POSITION = (1.35, -0.68, 0.95)
 """Initial position of the virtual camera in the world frame [m]."""

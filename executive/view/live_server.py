@@ -31,7 +31,7 @@ from aiohttp import WSMsgType, web
 from aiohttp.typedefs import Handler
 
 from executive import events
-from executive.cell.workcell import Shape
+from executive.cell.devices import Shape
 from executive.record.picture_recorder import encode_jpeg
 from executive.record.timeline import STATUS_TEXTS, Timeline
 from executive.view.live_page import LOOPBACK, CameraImage, Message, PageChange, PageCommand

@@ -25,7 +25,7 @@ from executive.record.journal import find_run_start, read_journal
 from executive.record.picture_recorder import split_picture_name
 from executive.record.run_directory import RunDirectory, read_cell, replace_atomically
 from executive.record.timeline import Timeline, get_skill_name
-from executive.replay.replayed_cell import InputLog
+from executive.run.replay import InputLog
 
 FRAME_RATE = 10
 """Frames per second of a video."""

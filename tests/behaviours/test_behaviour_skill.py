@@ -12,9 +12,9 @@ from py_trees.blackboard import Blackboard
 from py_trees.decorators import Inverter
 
 from executive.behaviours import RunBlackboard, make_behaviour_skill
-from executive.drivers.fake import FakeCell
 from executive.errors import Fault, InputError
 from executive.skill import Direction
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import SkillResult, run_skill
 
 

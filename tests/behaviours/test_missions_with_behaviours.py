@@ -12,7 +12,6 @@ from guide_blocks import blocks
 from py_trees.blackboard import Blackboard
 
 from executive.behaviours import load_skills
-from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.events import NodeEnded, TimedEvent
 from executive.mission.load import load_mission
@@ -22,6 +21,7 @@ from executive.record.replayed_run import replay_run, resume_run
 from executive.record.result import Result
 from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import MissionResult, run_mission
 from executive.text.findings import MissionError
 

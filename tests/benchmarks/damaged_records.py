@@ -29,8 +29,8 @@ from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replayed_run import replay_and_compare, resume_run
 from executive.record.result import Result
 from executive.record.run_directory import LATEST_LINK, RunDirectory, find_run
-from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions
+from executive.run.replay import InputLog
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.hostile_input import find_problems, run_in_child, summarize
 from tests.benchmarks.kills import RESUME_TIMEOUT, run_and_kill

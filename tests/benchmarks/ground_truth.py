@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from executive.cell.workcell import load_cell_kind
+from executive.drivers.sim.cell import SimCell, list_final_objects
 
 from executive.behaviours import load_skills
+from executive.cell.devices import TrueObject
 from executive.cell.objects import UNKNOWN_LABEL
-from executive.cell.workcell import TrueObject, load_cell_kind
-from executive.drivers.sim.cell import SimCell, list_final_objects
 from executive.events import ItemChanged
 from executive.ledger.item import State
 from executive.mission.load import load_mission
@@ -21,7 +22,7 @@ from executive.perception.detectors.requests import ClosableDetector
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
-from executive.station.without_hardware import count_outcomes
+from executive.station.audit import count_outcomes
 from tests.benchmarks.forks import ForkRunner
 
 HUNG = "HUNG"

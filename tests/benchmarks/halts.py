@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from executive.cell.workcell import CellWrapper, Workcell
 from py_trees.common import Status
 
 from executive.campaign.jobs import MissionUnderTest
-from executive.cell.protocols import STEP
-from executive.cell.workcell import CellWrapper, Workcell
+from executive.cell.device_config import STEP
 from executive.drivers.sim.arm import SimArm
 from executive.errors import ExecutiveError
 from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent

@@ -26,8 +26,8 @@ from executive.record.recorded_run import RecordOptions
 from executive.record.replayed_run import replay_and_compare, resume_run
 from executive.record.result import Result
 from executive.record.run_directory import LATEST_LINK, find_run, read_mission_of_run
-from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions
+from executive.run.replay import InputLog
 from executive.testing.oracle import WorldAccess
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_subject, run_command, show_progress

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from executive.cell.workcell import load_cell_kind
 
 from executive.cell.frame import Answer
-from executive.cell.workcell import load_cell_kind
 from executive.errors import Fault
 from executive.testing.faults import (
     after,

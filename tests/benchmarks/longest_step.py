@@ -11,15 +11,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from executive.cell.proxy import intercept
+from executive.cell.workcell import Workcell
 from py_trees.trees import BehaviourTree
 
 from executive.campaign.jobs import MissionUnderTest
-from executive.cell.proxy import Access, intercept
-from executive.cell.workcell import Workcell
 from executive.geometry import Array
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
 from executive.run.run import Run
+from executive.station.border import Access
 from tests.benchmarks.report import Figures, SilentView, describe, run_command, show_progress
 
 MAX_STEP_TIME = 0.005

@@ -22,13 +22,13 @@ from toppra import SplineInterpolator
 from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
-from executive.cell.arm import Goal
+from executive.cell.arm import Goal, JointState
 from executive.cell.config import CellConfig
-from executive.cell.protocols import STEP
+from executive.cell.device_config import STEP
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.configurations import find_configuration_pairs, find_vertical_waypoints
-from executive.motion.joints import JointLimits, JointState, Kinematics
+from executive.motion.joints import JointLimits, Kinematics
 from executive.motion.planner import Planner
 from executive.motion.trajectory import Connector, Trajectory, compute_peak_fractions, plan_braking
 from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world

@@ -14,7 +14,6 @@ import numpy as np
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass, Obstacle
-from executive.drivers.sim.collision import ClearanceChecker
 from executive.drivers.sim.models import build_simulated_class, load_mesh
 from executive.drivers.sim.scene import spawn_objects
 from executive.drivers.sim.tool import TOUCH_DISTANCE, compute_breakaway_force, measure_contact
@@ -24,6 +23,7 @@ from executive.geometry import make_tool_down_pose
 from executive.manipulation.tool_goals import make_object_goal, make_slot_goal
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.planner import Planner
+from executive.physics.collision import ClearanceChecker
 
 MAX_TRIES = 50
 """Maximum number of scenes drawn to find one whose object can be held and reached."""

@@ -23,11 +23,11 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.cell.protocols import Cell
-from executive.drivers.fake import FakeCell
 from executive.events import Event, Observer, TimedEvent
 from executive.record.journal import Recorder
 from executive.record.run_directory import RunDirectory
 from executive.skill import Skill
+from executive.testing.fake_cell import FakeCell
 from executive.tree.blackboard import Blackboard, NodeContext
 from executive.tree.decorators import Timeout
 from executive.tree.retry import Retry

@@ -17,12 +17,12 @@ from executive.campaign import faults as campaigns
 from executive.campaign.fault_list import INJECTED_MESSAGE, FaultLister, PlannedFault, SkillFault
 from executive.campaign.faults import Campaign, Trial, run_trial
 from executive.campaign.jobs import JobOptions, MissionUnderTest
-from executive.cell.workcell import AUDIT_KEYS
-from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.events import RunEnded
 from executive.mission.analysis import UnhandledFailure
 from executive.mission.load import load_mission
+from executive.station.audit import AUDIT_KEYS
+from executive.testing.fake_cell import FakeCell
 from executive.testing.faulty_cell import ScheduledFault
 
 SLOW = pytest.mark.slow

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from executive.cell.proxy import intercept
+
 from executive.cell.arm import Task
-from executive.cell.proxy import Access, intercept
-from executive.drivers.fake import FakeCell
+from executive.station.border import Access
+from executive.testing.fake_cell import FakeCell
 
 
 def test_every_access_goes_through_the_interceptor_and_so_do_those_to_what_a_call_returns(

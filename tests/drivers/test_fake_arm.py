@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from executive.cell.arm import Goal, Motion, Task
+from executive.cell.device_config import STEP
 from executive.cell.objects import BIN_THICKNESS, Obstacle
-from executive.cell.protocols import STEP
-from executive.drivers.fake import FakeCell, load_empty_cell
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Event, MotionPlanned
 from executive.geometry import Array
 from executive.motion.straight_paths import JOINT_SPEED
+from executive.testing.fake_cell import FakeCell, load_empty_cell
 
 LATENCY = load_empty_cell().motion.planning_time
 BESIDE = Goal((0.5, 0.2, 0.03), guarded_length=0.02, guarded_speed=0.05)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from executive.cell.arm import Goal
-from executive.drivers.fake import load_empty_cell
 from executive.drivers.world_log import (
     IDLE_STEP,
     JOINT_TARGETS,
@@ -20,6 +19,7 @@ from executive.drivers.world_log import (
 )
 from executive.errors import InputError
 from executive.motion.planner import Planner
+from executive.testing.fake_cell import load_empty_cell
 
 
 @pytest.fixture

@@ -8,11 +8,11 @@ from at_hand import pick
 
 from executive.cell.arm import Goal, Task
 from executive.cell.objects import Obstacle, Target
-from executive.drivers.fake import FakeCell
 from executive.geometry import GRAVITY
 from executive.manipulation.drops import MAX_PREDICTABLE_SPEED, detect_and_record_drop, predict_landing
 from executive.manipulation.motions import plan
 from executive.manipulation.tool_goals import list_obstacles
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.move_to_scan import MoveToScan
 from skills.transit import Transit

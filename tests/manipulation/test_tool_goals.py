@@ -10,7 +10,7 @@ from at_hand import look, pick
 
 from executive.cell.arm import Goal
 from executive.cell.objects import BIN_THICKNESS, ObjectClass, Target
-from executive.drivers.fake import FakeArm, FakeCell
+from executive.drivers.fake import FakeArm
 from executive.manipulation.motions import make_task, make_transport_task
 from executive.manipulation.tool_goals import (
     DROP_HEIGHT,
@@ -26,6 +26,7 @@ from executive.manipulation.tool_goals import (
     sort_by_tour,
     sort_pickable_targets,
 )
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 from skills.put_down import PutDown

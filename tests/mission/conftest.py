@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
+from executive.drivers.sim.kind import SIM_CELL_KIND
 
 import executive.mission.load
 from executive.cell.config import CellConfig
-from executive.drivers.sim.kind import SIM_CELL_KIND
 from executive.mission import cell_file
 from executive.mission.load import LoadedMission, load_mission
 from executive.skill import In, Metres, Out, Skill, param, port

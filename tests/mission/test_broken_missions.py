@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import pytest
 from click.testing import CliRunner
+from executive.cell.workcell import load_cell_kind
 
 from executive.behaviours import load_skills
-from executive.cell.workcell import load_cell_kind
 from executive.cli.main import main
 from executive.cli.streams import keep_stdout_clean
 from executive.mission.load import CellKindFinder, load_mission

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from executive.behaviours import load_skills
-from executive.drivers.fake import FakeCell
 from executive.events import NodeEnded
 from executive.mission.load import load_mission
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import MissionResult, run_mission
 from executive.text.findings import MissionError
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from executive.cell.workcell import load_cell_kind
 
 from executive.behaviours import load_skills
-from executive.cell.workcell import load_cell_kind
 from executive.errors import InputError
 from executive.mission.load import load_mission
 

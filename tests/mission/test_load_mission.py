@@ -10,9 +10,9 @@ from unittest.mock import Mock
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.mission.load import LoadedMission
+from executive.testing.fake_cell import FakeCell
 from executive.text.findings import MissionError
 from executive.text.yaml_files import find_mission, get_shipped_folder
 from executive.tree.specification import Reference, SkillNode

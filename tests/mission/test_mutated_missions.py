@@ -14,10 +14,10 @@ import pytest
 import yaml
 
 from executive.behaviours import load_skills
-from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.run.assembly import RunOptions, assemble
+from executive.testing.fake_cell import FakeCell
 from executive.text.findings import MissionError
 
 MISSIONS = Path(__file__).parents[2] / "missions"

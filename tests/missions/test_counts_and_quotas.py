@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from executive.drivers.fake import FakeCell
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import MissionResult, run_mission
 
 

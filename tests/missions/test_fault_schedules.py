@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from executive.cell.workcell import load_cell_kind
 
 from executive.cell.frame import Answer
-from executive.cell.workcell import load_cell_kind
-from executive.drivers.fake import FakeCell
+from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import (
     after,
     during,

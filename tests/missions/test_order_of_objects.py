@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from executive.cell.protocols import Cell, Steps
-from executive.drivers.fake import FakeCell
 from executive.events import ItemChanged, NodeEnded
+from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import during, seal_fails
 from executive.testing.run_mission import MissionResult, run_mission
 from skills.approach import Approach

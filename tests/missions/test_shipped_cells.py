@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from executive.cell.workcell import load_cell_kind
 
 from executive.cell.config import CellConfig
-from executive.cell.workcell import load_cell_kind
-from executive.drivers.fake import FakeCell
 from executive.mission.cell_file import load_cell
 from executive.perception.detectors.envelope import find_unmeasured_detectors
+from executive.testing.fake_cell import FakeCell
 
 CELLS = sorted((Path(__file__).parents[2] / "missions" / "cells").glob("*.yaml"))
 

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from executive.cell.workcell import Workcell, load_cell_kind
 
 from executive.behaviours import load_skills
-from executive.cell.workcell import Workcell, load_cell_kind
-from executive.drivers.fake import FakeCell
 from executive.events import ItemChanged, MotionPlanned, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
+from executive.testing.fake_cell import FakeCell
 from executive.testing.oracle import make_oracle_kind
 
 MISSIONS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "missions").glob("*.yaml"))}

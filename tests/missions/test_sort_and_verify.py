@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from executive.drivers.fake import FakeCell
 from executive.events import ItemChanged
+from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import during, object_moved
 from executive.testing.run_mission import MissionResult, run_mission
 

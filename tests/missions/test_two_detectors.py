@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from executive.cell.frame import Detection
-from executive.drivers.fake import FakeCell
 from executive.events import FrameSearched
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import MissionResult, run_mission
 
 Answers = Callable[[int, Sequence[Detection]], Sequence[Detection] | str]

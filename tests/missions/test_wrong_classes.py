@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from executive.cell.frame import Detection
-from executive.drivers.fake import FakeCell
 from executive.events import ItemChanged
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import MissionResult, run_mission
 
 OBJECTS = (("cube", 0.46, -0.12), ("sphere", 0.58, 0.0), ("cube", 0.5, 0.14), ("duck", 0.6, 0.16))

@@ -6,10 +6,10 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
-from executive.cell.arm import Goal
+from executive.cell.arm import Goal, JointState
 from executive.geometry import Array
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.joints import JointLimits, JointRange, JointState, Kinematics
+from executive.motion.joints import JointLimits, JointRange, Kinematics
 from executive.motion.trajectory import MotionPiece
 
 POSITION_LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])

@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import positions
 
+from executive.cell.arm import JointState
 from executive.geometry import Array
-from executive.motion.joints import JointState
 from executive.motion.trajectory import Trajectory, plan_braking
 
 STEP = 1 / 240

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, shares
 
-from executive.motion.joints import JointLimits, JointState
+from executive.cell.arm import JointState
+from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Connector
 
 CONNECTOR = Connector(LIMITS)

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, positions
 
+from executive.cell.arm import JointState
 from executive.cell.objects import Obstacle
 from executive.geometry import Array, make_tool_down_pose
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
-from executive.motion.joints import JointState
 from executive.motion.optimizer import MotionProblem
 
 POST = Obstacle(0.5, 0.0, 0.04, 0.22, "the post")

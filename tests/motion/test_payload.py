@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from executive.cell.arm import JointState
 from executive.cell.objects import SAFETY_FACTOR, ObjectClass
 from executive.geometry import GRAVITY
-from executive.motion.joints import JointState
 from executive.motion.optimizer import DISTANCE_PER_ACCELERATION, SAMPLE_STRIDE, PayloadLimit
 from executive.motion.trajectory import Trajectory
 from executive.motion.transcription import SAMPLE_FRACTIONS, SAMPLES_PER_STEP, STEP_COUNT

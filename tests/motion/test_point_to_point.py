@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, passed, peaks, states
 
+from executive.cell.arm import JointState
 from executive.errors import Fault
-from executive.motion.joints import JointState
 from executive.motion.trajectory import Connector, JointLimitError
 
 CONNECTOR = Connector(LIMITS)

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, positions, states
 
-from executive.cell.protocols import STEP
+from executive.cell.arm import JointState
+from executive.cell.device_config import STEP
 from executive.errors import Fault, Unreachable
-from executive.motion.joints import JointState
 from executive.motion.trajectory import (
     Connector,
     JointLimitError,

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, positions, shares
 
+from executive.cell.arm import JointState
 from executive.geometry import Array
-from executive.motion.joints import JointState
 from executive.motion.trajectory import Connector
 from executive.motion.transcription import (
     SAMPLE_FRACTIONS,

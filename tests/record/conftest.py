@@ -8,7 +8,7 @@ from typing import NoReturn
 
 import pytest
 
-from executive.drivers.fake import FakeCell
+from executive.testing.fake_cell import FakeCell
 
 MISSION = """\
 mission: bring_one

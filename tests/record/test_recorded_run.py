@@ -10,11 +10,11 @@ from unittest.mock import Mock
 import py_trees
 import pytest
 from click.testing import CliRunner, Result
+from executive.station.without_hardware import CellWithoutHardware
 
 from executive.behaviours import load_skills
 from executive.cell.json_values import to_json
 from executive.cli.main import main
-from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.events import RunEnded, RunStarted, TargetSelected
 from executive.mission.load import load_mission
@@ -22,7 +22,7 @@ from executive.record.journal import Journal, read_journal
 from executive.record.picture_recorder import PictureRecorder
 from executive.record.recorded_run import GuardedView, RecordOptions, record_run
 from executive.run.assembly import RunOptions
-from executive.station.without_hardware import CellWithoutHardware
+from executive.testing.fake_cell import FakeCell
 
 
 class Watcher:

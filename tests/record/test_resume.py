@@ -15,7 +15,6 @@ import pytest
 
 from executive.behaviours import load_skills
 from executive.cell.json_values import to_json
-from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.events import InputRead, ItemChanged, TimedEvent, ToolCommanded
 from executive.mission.load import LoadedMission, load_mission
@@ -24,8 +23,9 @@ from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replayed_run import ReplayResult, replay_and_compare, replay_run, resume_run
 from executive.record.result import Result
 from executive.record.run_directory import find_run
-from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions
+from executive.run.replay import InputLog
+from executive.testing.fake_cell import FakeCell
 from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_mission import make_raising, run_mission
 

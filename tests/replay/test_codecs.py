@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 import numpy as np
+from executive.replay.recording_cell import BOX, FRAME, MOTION, POSE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -13,18 +14,7 @@ from hypothesis.extra.numpy import arrays
 from executive.cell.frame import Answer, Detection, ErrorRates, Frame, Observation
 from executive.cell.protocols import BehaviourStep
 from executive.geometry import Pose, rotate_about_z
-from executive.replay.recording_cell import (
-    ANSWER,
-    ARRAY,
-    BEHAVIOUR_STEP,
-    BOX,
-    FRAME,
-    MOTION,
-    OBSERVATIONS,
-    POSE,
-    Codec,
-    RecordedMotion,
-)
+from executive.station.codecs import ANSWER, ARRAY, BEHAVIOUR_STEP, OBSERVATIONS, Codec, RecordedMotion
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 few = settings(max_examples=25)

@@ -6,7 +6,7 @@ import pytest
 from events import at, read, run_ended, run_started
 
 from executive.events import RunHalted, RunResumed, TimedEvent, ToolCommanded
-from executive.replay.replayed_cell import InputLog
+from executive.run.replay import InputLog
 
 
 def sense(tick: int, value: object, name: str = "tool.holding", nth: int = 1) -> TimedEvent:

@@ -6,14 +6,7 @@ from typing import Any
 
 import pytest
 from events import at, read
-from hypothesis import given
-from hypothesis import strategies as st
-
-from executive.cell.protocols import StepClock
 from executive.cell.proxy import IS_METHOD
-from executive.drivers.fake import FakeCell
-from executive.errors import Fault, Unreachable
-from executive.events import Event, TimedEvent, ToolCommanded
 from executive.replay.recording_cell import (
     COMMANDS,
     INPUT_FORMATS,
@@ -21,7 +14,15 @@ from executive.replay.recording_cell import (
     InputRecorder,
     make_recording_cell,
 )
-from executive.replay.replayed_cell import InputLog, InputReplayer
+from executive.replay.replayed_cell import InputReplayer
+from hypothesis import given
+from hypothesis import strategies as st
+
+from executive.cell.devices import StepClock
+from executive.errors import Fault, Unreachable
+from executive.events import Event, TimedEvent, ToolCommanded
+from executive.run.replay import InputLog
+from executive.testing.fake_cell import FakeCell
 
 
 def test_every_member_of_a_part_is_a_question_or_a_command() -> None:

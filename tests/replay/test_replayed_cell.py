@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 from events import STEP, at, read, run_started
+from executive.replay.replayed_cell import ReplayedCell
 
-from executive.drivers.fake import FakeCell
 from executive.errors import Stopped
 from executive.events import RunHalted, TimedEvent
-from executive.replay.replayed_cell import InputLog, Interruption, ReplayedCell
+from executive.run.replay import InputLog, Interruption
+from executive.testing.fake_cell import FakeCell
 
 
 def sense(tick: int, name: str, value: object, raised: str = "") -> TimedEvent:

@@ -11,7 +11,6 @@ import pytest
 
 from executive.cell.arm import Goal
 from executive.cell.objects import Target
-from executive.drivers.fake import FakeCell
 from executive.errors import Unreachable
 from executive.events import FrameSearched, MotionPlanned, TargetSelected, TimedEvent
 from executive.manipulation.tool_goals import sort_pickable_targets
@@ -19,6 +18,7 @@ from executive.motion.configurations import ConfigurationPairs, find_configurati
 from executive.motion.joints import Kinematics
 from executive.run.run import LookaheadPlanner, Run
 from executive.skill import Skill, SkillFailed
+from executive.testing.fake_cell import FakeCell
 from skills.approach import Approach
 from skills.grasp import Grasp
 from skills.put_down import PutDown

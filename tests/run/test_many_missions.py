@@ -12,10 +12,10 @@ import pytest
 from py_trees.blackboard import Blackboard
 
 from executive.behaviours import load_skills
-from executive.drivers.fake import FakeCell
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.journal import Trace
 from executive.run.assembly import RunOptions, assemble
+from executive.testing.fake_cell import FakeCell
 from executive.testing.oracle import make_oracle_kind
 
 pytestmark = pytest.mark.slow

@@ -14,15 +14,15 @@ from typing import Any
 import pytest
 
 from executive.behaviours import load_skills
-from executive.drivers.fake import FakeCell
 from executive.errors import InputError, Stopped
 from executive.events import Event, NodeEnded, NodeStarted, OperatorAsked, RequestGiven, TimedEvent
 from executive.mission.load import load_mission
 from executive.record.replayed_run import replay_and_compare
-from executive.replay.replayed_cell import InputLog
 from executive.run.assembly import RunOptions, assemble
 from executive.run.operator import ScriptedOperator, TerminalOperator, parse_request
+from executive.run.replay import InputLog
 from executive.run.run_control import RunControl
+from executive.testing.fake_cell import FakeCell
 
 CHOICES = ("cube", "sphere", "duck")
 

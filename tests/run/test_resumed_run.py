@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from at_hand import look
 
-from executive.drivers.fake import FakeCell
 from executive.run.assembly import reconcile_ledger
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 

@@ -8,11 +8,11 @@ from typing import Any
 from py_trees.common import Status
 
 from executive.behaviours import load_skills
-from executive.drivers.fake import FakeCell
 from executive.events import Event, RequestGiven, RunEnded, TimedEvent, ToolCommanded
 from executive.mission.load import load_mission
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
+from executive.testing.fake_cell import FakeCell
 
 
 def make(

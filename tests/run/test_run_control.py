@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from executive.behaviours import load_skills
-from executive.drivers.fake import FakeCell
 from executive.errors import Fault
 from executive.events import Event, FaultRaised, ItemChanged, RunEnded, TimedEvent
 from executive.mission.load import load_mission
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.run.run_control import RunControl
+from executive.testing.fake_cell import FakeCell
 
 
 def make(missions: Path, observer) -> Run:

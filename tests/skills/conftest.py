@@ -8,7 +8,7 @@ import at_hand
 import pytest
 
 from executive.cell.objects import Target
-from executive.drivers.fake import FakeCell
+from executive.testing.fake_cell import FakeCell
 
 
 @pytest.fixture(autouse=True)

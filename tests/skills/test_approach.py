@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from at_hand import look
 
-from executive.drivers.fake import FakeCell, load_empty_cell
+from executive.testing.fake_cell import FakeCell, load_empty_cell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from executive.cell.objects import Target
-from executive.drivers.fake import FakeCell
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.conditions import HasCounted, HasElapsed, IsFresh, IsHolding, IsPlaced, IsReachable
 from skills.confirm_grasp import ConfirmGrasp

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from executive.cell.frame import Detection, Frame
-from executive.drivers.fake import FakeCell
 from executive.errors import NoDepth
 from executive.skill import SkillFailed
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
 from skills.localize import Localize

@@ -7,8 +7,8 @@ import pytest
 
 from executive.cell.frame import Detections
 from executive.cell.objects import Target
-from executive.drivers.fake import FakeCell
 from executive.errors import NoDepth
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import SkillResult, run_skill
 from skills.look_at import LookAt
 from skills.release import Release

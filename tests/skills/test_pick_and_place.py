@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from executive.cell.objects import Target
-from executive.drivers.fake import FakeCell, FakeTool
+from executive.drivers.fake import FakeTool
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 from skills.grasp import Grasp

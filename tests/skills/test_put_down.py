@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import pytest
 
-from executive.drivers.fake import FakeCell
 from executive.errors import Blocked, Unreachable
 from executive.motion.straight_paths import StraightMotion
 from executive.skill import SkillFailed
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.put_down import PutDown
 

@@ -9,9 +9,8 @@ import pytest
 from at_hand import look
 
 from executive.cell.arm import Goal
-from executive.cell.workcell import CellOptions
-from executive.drivers.fake import FakeCell
-from executive.station.without_hardware import SilentOperator
+from executive.station.station import CellOptions, SilentOperator
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import SkillResult, run_skill
 from skills.items import Defer, ListItems
 from skills.select_target import SelectTarget

@@ -7,9 +7,10 @@ import math
 import at_hand
 import pytest
 
-from executive.drivers.fake import FakeCell, FakeTool, load_empty_cell
+from executive.drivers.fake import FakeTool
 from executive.geometry import GRAVITY
 from executive.skill import SkillFailed
+from executive.testing.fake_cell import FakeCell, load_empty_cell
 from executive.testing.run_skill import SkillResult, run_skill
 from skills.select_target import SelectTarget
 from skills.transit import Transit

@@ -13,10 +13,10 @@ from events import at
 
 from executive.cell.frame import Observation
 from executive.cell.protocols import Request
-from executive.drivers.fake import FakeCell
 from executive.errors import InputError, NoDepth, Unavailable, Unreachable
 from executive.events import FaultInjected, NodeEnded, NodeStarted, ToolCommanded
 from executive.testing import faults as effects
+from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import after, between, during
 from executive.testing.faulty_cell import Effect, FaultyCell, ScheduledFault
 from executive.testing.run_mission import run_mission

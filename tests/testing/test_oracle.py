@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.cell.workcell import CellOptions
-from executive.drivers.fake import SHIPPED_ROUTES
 from executive.events import discard_event
 from executive.geometry import Pose
 from executive.mission.cell_file import load_cell
-from executive.station.without_hardware import SilentOperator
+from executive.station.station import CellOptions, SilentOperator
+from executive.testing.fake_cell import SHIPPED_ROUTES
 from executive.testing.oracle import make_oracle_kind
 
 

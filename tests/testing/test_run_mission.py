@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from executive.drivers.fake import FakeCell
 from executive.errors import Fault, InputError
 from executive.events import RunEnded, RunStarted, TimedEvent
+from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import after, detector_dead, during, seal_fails
 from executive.testing.faulty_cell import FaultyCell
 from executive.testing.run_mission import make_failing, run_mission

@@ -10,9 +10,9 @@ import pytest
 from executive.cell.arm import Goal
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
-from executive.drivers.fake import FakeCell
 from executive.errors import Fault, InputError
 from executive.skill import In, Out, Skill, param, port
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import make_failing, make_raising
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach

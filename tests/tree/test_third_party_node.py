@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from executive.cell.workcell import load_cell_kind
 
 from executive.behaviours import load_skills
-from executive.cell.workcell import load_cell_kind
 from executive.cli.main import main
 from executive.events import NodeEnded
 from executive.mission.load import load_mission

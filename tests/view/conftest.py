@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from executive.behaviours import load_skills
-from executive.drivers.fake import FakeCell
 from executive.mission.load import load_mission
 from executive.record.recorded_run import record_run
 from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions
+from executive.testing.fake_cell import FakeCell
 
 MISSION = """\
 mission: trial

@@ -17,11 +17,11 @@ from events import at
 
 from executive.behaviours import load_skills
 from executive.cell.frame import FrameCaptured
-from executive.drivers.fake import FakeCell
 from executive.mission.load import load_mission
 from executive.record.result import Result
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
+from executive.testing.fake_cell import FakeCell
 from executive.view.live_page import LivePage
 from tests.record.conftest import MISSION
 

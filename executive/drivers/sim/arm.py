@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from executive.cell.arm import Goal, Motion, Task
-from executive.cell.config import CellConfig
-from executive.cell.protocols import STEP, Clock
+from executive.drivers.sim.tool import SuctionTool
+from executive.motion.joints import JointLimits
+from executive.cell.arm import Guard, Motion
+from executive.cell.device_config import STEP
 from executive.drivers import world_log
-from executive.drivers.sim.rebuild import WorldRebuilder
 from executive.drivers.sim.tool import LIP_LENGTH
-from executive.drivers.sim.world import BODY_B, LINK_A, NORMAL_FORCE, POSITION_A, World, name_load
+from executive.drivers.sim.world import World
 from executive.errors import Fault
-from executive.events import Emit, discard_event
 from executive.geometry import Array, format_point
-from executive.motion.planner import Planner, PlanningArm
 from executive.motion.trajectory import Trajectory, plan_braking, plan_retreat
+from executive.physics.cell_world import BODY_B, LINK_A, NORMAL_FORCE, POSITION_A, name_load
 
 MIN_CONTACT_FORCE = 2.0
 """Minimum force of a detected contact [N], an assumption for joint torque sensors."""
@@ -31,12 +30,12 @@ class ContactMonitor:
 
     Args:
         world: The world of the arm.
-        get_held_body: Returns the body that the tool holds, or None.
+        tool: The tool, which may hold a body.
     """
 
-    def __init__(self, world: World, get_held_body: Callable[[], int | None]) -> None:
+    def __init__(self, world: World, tool: SuctionTool) -> None:
         self._world = world
-        self._get_held_body = get_held_body
+        self._tool = tool
         self._last_contact_steps: dict[tuple[str, int], int] = {}
         """Physics step of the last contact of each ignored pair of a robot part and a body."""
 
@@ -68,7 +67,7 @@ class ContactMonitor:
     def _iterate_contacts(self) -> Iterator[tuple[str, int, Sequence[float], float]]:
         """Yield part of the robot, touched body, contact point [m] and normal force [N] of each contact."""
         world = self._world
-        held_body = self._get_held_body()
+        held_body = self._tool.held_body
         robot = (world.arm,) if held_body is None else (world.arm, held_body)
         for body in robot:
             for point in world.client.getContactPoints(bodyA=body) or ():
@@ -78,8 +77,6 @@ class ContactMonitor:
                     yield part, point[BODY_B], point[POSITION_A], point[NORMAL_FORCE]
 
 
-DIFFERENTIATION_STEP = 1e-4
-"""Time step of the numerical derivative of the tool position [s]."""
 START_TOLERANCE = math.radians(0.2)
 """Maximum difference between the position of a joint and its position at the start of a motion [rad]."""
 TRACKING_TOLERANCE = math.radians(0.5)
@@ -87,8 +84,8 @@ TRACKING_TOLERANCE = math.radians(0.5)
 the sign of a collision: something holds or pushes the arm."""
 
 
-class SimArm(PlanningArm[Trajectory]):
-    """The arm of a PyBullet world; implements `executive.cell.arm.Arm`.
+class SimArm:
+    """The arm of a PyBullet world; implements `executive.cell.devices.ArmDevice`.
 
     Call `advance` before each physics step; it commands the joint positions for the end of that step. After a
     collision, the arm brakes and moves back along its path. A collision is a new contact, or a disturbance
@@ -96,68 +93,53 @@ class SimArm(PlanningArm[Trajectory]):
 
     Args:
         world: The world of the arm.
-        planner: Motion planner of the arm.
-        config: The cell file.
-        clock: Clock of the run.
-        get_held_body: Returns the held body, or None; contacts of this body count as contacts of the arm.
-        emit: Receives the events of the arm.
-        rebuilder: Rebuilder of the world of an interrupted run; the arm brakes on its motion. None: new run.
+        tool: The tool, whose sensors trigger guards. Contacts of the body that it holds count as contacts of
+            the arm.
+        limits: Limits of the joints.
+
+    Attributes:
+        at_rest: True while the arm neither follows a motion nor brakes.
+        collision: Description of the collision that ended the last motion, or None.
+        contact_point: Point of the collision in the world `(x, y, z)` [m]; None: unknown, or no collision.
     """
 
-    def __init__(
-        self,
-        world: World,
-        planner: Planner,
-        config: CellConfig,
-        clock: Clock,
-        get_held_body: Callable[[], int | None] = lambda: None,
-        emit: Emit = discard_event,
-        rebuilder: WorldRebuilder | None = None,
-    ) -> None:
-        super().__init__(config, planner.kinematics, planner.plan, clock, emit)
-        self._limits = planner.limits
+    def __init__(self, world: World, tool: SuctionTool, limits: JointLimits) -> None:
+        self.at_rest = True
+        self.collision: str | None = None
+        self.contact_point: Sequence[float] | None = None
         self._world = world
-        self._contact_monitor = ContactMonitor(world, get_held_body)
+        self._tool = tool
+        self._limits = limits
+        self._contact_monitor = ContactMonitor(world, tool)
         self._motion: Trajectory | None = None
         self._motion_time = 0.0
+        self._guard = Guard()
+        self._has_been_free = False
+        """True if the tool has touched nothing at some time since the start of the motion."""
         self._braking_times: list[float] | None = None
         self._commanded_q = self.q
-        # A run may be interrupted before the first joint command is logged.
-        if rebuilder is None or not rebuilder.braking_start[0].size:
-            self.send_command()
-        else:
-            self._commanded_q, self._motion_time = rebuilder.braking_start
-            self._motion = rebuilder.motion
-            self.stop()
+        self.send_command()
 
     @property
     def q(self) -> Array:
         return self._world.get_joint_positions()
 
     @property
-    def tool_velocity(self) -> Array:
+    def qd(self) -> Array:
         states = self._world.client.getJointStates(self._world.arm, self._world.joints)
-        q, q_change = np.array([(state[0], state[1] * DIFFERENTIATION_STEP) for state in states]).T
-        compute_pose = self.kinematics.compute_tool_pose
-        return (compute_pose(q + q_change).position - compute_pose(q).position) / DIFFERENTIATION_STEP
+        return np.array([state[1] for state in states])
 
     @property
-    def at_rest(self) -> bool:
-        return self._motion is None
+    def end_q(self) -> Array:
+        return self._commanded_q if self._motion is None else self._motion.end
 
-    def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
-        """Plan the next motion from the end of the running motion; while the arm brakes, do nothing."""
-        if self._braking_times is None:
-            super().plan_ahead(goal, task)
-
-    def start(self, motion: Motion) -> None:
-        """Begin to follow a motion; if something has pushed the arm off its start, report a collision.
-
-        Raises:
-            Fault: The arm is moving, was not sent to the start, or did not plan the motion.
-        """
-        trajectory = self._require_own_motion(motion, Trajectory)
-        if error := _describe_difference(self._commanded_q, trajectory.start, START_TOLERANCE):
+    def execute(self, motion: Motion, guard: Guard) -> None:
+        """Begin to follow a motion; if something has pushed the arm off its start, report a collision."""
+        if not self.at_rest:
+            raise Fault("the arm cannot start a motion while moving; wait for `at_rest`")
+        if not isinstance(motion, Trajectory):
+            raise Fault(f"the simulated arm follows trajectories, not a {type(motion).__name__}")
+        if error := _describe_difference(self._commanded_q, motion.start, START_TOLERANCE):
             raise Fault(f"the start of the motion is not at the end of the last motion: {error}")
         self.collision = self._describe_disturbance(START_TOLERANCE) or None
         self.contact_point = None
@@ -165,10 +147,13 @@ class SimArm(PlanningArm[Trajectory]):
             self._commanded_q = self.q
             self.send_command()
             return
-        self._motion = trajectory
+        self._motion = motion
         self._motion_time = 0.0
+        self._guard = guard
+        self._has_been_free = not (guard.touch and self._tool.touching)
+        self.at_rest = False
         self._contact_monitor.reset()
-        self._world.log.append_motion(trajectory)
+        self._world.log.append_motion(motion)
 
     def stop(self) -> None:
         if self._motion is not None and self._braking_times is None:
@@ -182,17 +167,27 @@ class SimArm(PlanningArm[Trajectory]):
             retreat_times = plan_retreat(self._motion_time, float(braking_times[-1]))
             self._braking_times = [*braking_times.tolist(), *retreat_times.tolist()]
 
+    def resume_braking(self, motion: Trajectory | None, commanded_q: Array, motion_time: float) -> None:
+        """Brake on the interrupted motion of a rebuilt world, from its last command `(n,)` [rad]."""
+        self._commanded_q = commanded_q
+        self._motion_time = motion_time
+        self._motion = motion
+        self.at_rest = motion is None
+        self.stop()
+
     def send_command(self) -> None:
         """Send the current command to the motors."""
         self._world.command_arm(self._commanded_q, self._motion_time)
 
     def advance(self) -> None:
-        """Check for disturbances and collisions, and send the command for the next physics step."""
+        """Check guards, disturbances and collisions, and send the command for the next physics step."""
         if self._motion is None:
             return
         if self._braking_times is None:
-            lip_may_touch = self._motion_time >= self._motion.guarded_start_time
-            message, self.contact_point = self._contact_monitor.find_new_contact(lip_may_touch)
+            self._check_guard()
+        if self._braking_times is None:
+            may_touch = self._motion_time >= self._motion.guarded_start_time
+            message, self.contact_point = self._contact_monitor.find_new_contact(may_touch)
             if message := message or self._describe_disturbance(TRACKING_TOLERANCE):
                 self.stop_after_collision(message)
         if self._braking_times is None:
@@ -201,16 +196,23 @@ class SimArm(PlanningArm[Trajectory]):
         else:
             self._motion_time = self._braking_times.pop(0)
             has_ended = not self._braking_times
-        self._commanded_q = self._motion.state_at(self._motion_time)[0]
+        self._commanded_q = self._motion.state_at(self._motion_time).q
         self.send_command()
         if has_ended:
             self._motion = None
             self._braking_times = None
+            self.at_rest = True
             self._world.log.append(world_log.MOTION_END)
 
-    @property
-    def _end_q(self) -> Array:
-        return self._commanded_q if self._motion is None else self._motion.end
+    def _check_guard(self) -> None:
+        """Begin to brake at an event of the guard."""
+        if self._guard.lost_grip and not self._tool.holding:
+            self.stop()
+        elif self._guard.touch:
+            is_touching = self._tool.touching
+            if self._has_been_free and is_touching:
+                self.stop()
+            self._has_been_free |= not is_touching
 
     def _describe_disturbance(self, tolerance: float) -> str:
         error = _describe_difference(self.q, self._commanded_q, tolerance)

@@ -16,8 +16,8 @@ from numpy.random import Generator
 
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import CameraConfig, Colour, NoiseConfig, Range
+from executive.cell.devices import TrueObject
 from executive.cell.objects import BIN_THICKNESS, UNKNOWN_LABEL, Bin
-from executive.cell.workcell import TrueObject
 from executive.drivers.sim.camera import Light, Region
 from executive.drivers.sim.models import (
     DAMAGED_MODEL_NUMBER,
@@ -29,9 +29,10 @@ from executive.drivers.sim.models import (
     locate_object,
     scale_model,
 )
-from executive.drivers.sim.world import PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE, World, add_bin
+from executive.drivers.sim.world import PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE, World
 from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
 from executive.perception.camera_model import intersect_plane
+from executive.physics.cell_world import add_bin
 
 MAX_FOV_CHANGE = 0.27
 """Maximum relative change of the field of view."""

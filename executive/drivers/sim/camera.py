@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,20 +14,16 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from executive.cell.config import CellConfig
+from executive.cell.devices import CameraImage
+from executive.drivers import world_log
 from executive.cell.device_config import CameraConfig, Colour, DepthConfig, NoiseConfig, Section
-from executive.cell.frame import Frame
-from executive.cell.objects import Bin
 from executive.cell.protocols import Clock
 from executive.drivers.sim.world import World
 from executive.geometry import Array, Pose
-from executive.motion.arms import build_kinematics
-from executive.perception.camera_check import describe_displacement
 from executive.perception.camera_model import (
     FAR_PLANE,
-    MountedCamera,
     compute_calibration,
     compute_depths,
-    compute_hull_mask,
     compute_projection_matrix,
     compute_view_matrix,
 )
@@ -227,122 +222,64 @@ def find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, st
             yield ("localization",), message + 'section "depth: {}", or use "plane"'
 
 
-MAX_LOAD_OFFSET = 0.015
-"""Maximum distance of the centre of a held object from the axis of the suction cup [m]."""
-TOOL_SPHERE_RADIUS = 0.02
-"""Radius of the spheres that enclose the tool, including tube and fittings [m]."""
-SPHERES_PER_SEGMENT = 9
-"""Number of spheres that cover the segment between two points on the axis of a part of the arm."""
-DEPTH_SEED = 1
-"""Last number of the seed of the depth noise; the other numbers are the seed of the image noise."""
-
-
 def get_camera_pose(world: World, config: CameraConfig) -> Pose:
     """Return the current pose `X_WC` of a camera; frame M is the mount, i.e. the world or the flange."""
     _, X_MC = compute_calibration(config)
     return X_MC if config.mount == "fixed" else world.get_flange_pose() @ X_MC
 
 
-class SimCamera(MountedCamera):
-    """A camera of the simulated world; implements `executive.cell.protocols.Camera`.
+DEPTH_SEED = 1
+"""Last number of the seed of the depth noise; the other numbers are the seed of the image noise."""
 
-    The cell file of the world contains the true extrinsics, intrinsics and noise of the camera. The frames
-    contain the matrix and the pose of `config`. The noise of a frame depends only on the seed and on the
-    number of the frame. A depth sensor does not change the image noise.
+
+class SimCamera:
+    """A camera of the simulated world; implements `executive.cell.devices.CameraDevice`.
+
+    The cell file of the world contains the true extrinsics, intrinsics and noise of the camera. The noise of
+    an image depends only on the seed and on the number of the image. A depth sensor does not change the image
+    noise.
 
     Args:
         world: The observed world.
         config: The cell file.
-        clock: Clock for the time stamps of the frames.
+        clock: Clock for the time stamps of the images.
         seed: Seed of the noise.
-        is_loaded: Returns True if the tool holds an object, which is assumed to be of the largest class.
-        get_change_count: Returns the number of changes of the objects on the table so far.
         light: Light of the scene.
-        bins: Bins that serve as landmarks for the detection of a displaced camera.
+
+    Attributes:
+        image_count: Number of captured images.
     """
 
-    def __init__(
-        self,
-        world: World,
-        config: CellConfig,
-        clock: Clock,
-        seed: int,
-        *,
-        is_loaded: Callable[[], bool] = lambda: False,
-        get_change_count: Callable[[], int] = lambda: 0,
-        light: Light = CELL_LIGHT,
-        bins: Sequence[Bin] = (),
-    ) -> None:
-        name, camera = next(iter(config.cameras.items()))
-        super().__init__(name, camera, world.get_flange_pose, clock, get_change_count)
+    def __init__(self, world: World, config: CellConfig, clock: Clock, seed: int, light: Light) -> None:
+        name, self.config = next(iter(config.cameras.items()))
+        self.image_count = 0
         self._true_config = world.config.cameras[name]
         self._world = world
+        self._clock = clock
         self._seed = seed
-        self._is_loaded = is_loaded
-        self._bins = bins
-        self._kinematics = build_kinematics(config)
-        # T is the frame of the tool, F the frame of the flange.
-        self._X_TF = Pose.of([0.0, 0.0, -config.tool.length])
-        self._load_radius = max(model.radius for model in config.objects.values()) + MAX_LOAD_OFFSET
-        self._load_height = config.max_object_height
-        heights = (0.0, config.max_pile_height)
-        self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
-        region = (0, 0, *self._size)
+        region = (0, 0, self.config.width, self.config.height)
         self._render: Callable[[Array, Pose], RenderedImage]
-        if camera.mount == "fixed" and not light.shadow:
+        if self.config.mount == "fixed" and not light.shadow:
             self._render = FixedViewRenderer(world, region, light).render
         else:
             self._render = partial(render, world, region=region, light=light)
 
-    def sees_table(self) -> bool:
-        """Return True if the workspace, up to the height of a pile, is in the image and not occluded."""
-        X_WC = self._compute_pose()
-        mask = compute_hull_mask(self._workspace_corners, self.matrix, X_WC, self._size)
-        return mask is not None and bool(np.all(self._compute_visibility_mask(X_WC)[mask]))
-
-    def describe_displacement(self, frame: Frame) -> str:
-        return describe_displacement(frame, self._bins)
-
     def get_true_view(self) -> tuple[Array, Pose]:
+        """Return the camera matrix `(3, 3)` [pixel] and the pose `X_WC` of the true camera now."""
         return compute_calibration(self._true_config)[0], get_camera_pose(self._world, self._true_config)
+
+    def capture(self) -> CameraImage:
+        """Render an image with noise."""
+        self.image_count += 1
+        self._world.log.append(world_log.CAPTURE)
+        image, depth = self._capture_images()
+        return CameraImage(image, depth, self._clock.now)
 
     def _capture_images(self) -> tuple[Image, Array | None]:
         rendered = self._render(*self.get_true_view())
-        rng = np.random.default_rng([self._seed, self._frame_count])
+        rng = np.random.default_rng([self._seed, self.image_count])
         image = add_noise(rendered.image, self._true_config.noise, rng)
         if self.config.depth is None:
             return image, None
-        rng = np.random.default_rng([self._seed, self._frame_count, DEPTH_SEED])
+        rng = np.random.default_rng([self._seed, self.image_count, DEPTH_SEED])
         return image, add_depth_noise(rendered.depth, self.config.depth, rng)
-
-    def _compute_visibility_mask(self, X_WC: Pose) -> NDArray[np.bool_]:
-        """Return the mask `(H, W)` of the pixels that no sphere around arm, tool or held object occludes."""
-        q = self._world.get_joint_positions()
-        X_WT = self._kinematics.compute_tool_pose(q)
-        X_WF = X_WT @ self._X_TF
-        joint_frames = self._kinematics.compute_joint_frames(q)
-        joints = [np.zeros(3), *(frame.position for frame in joint_frames), X_WF.position]
-        parts = [
-            (joints, self._world.robot.link_radius),
-            ([X_WF.position, X_WT.position], TOOL_SPHERE_RADIUS),
-        ]
-        if self._is_loaded():
-            load_end = X_WT.apply(np.array([0.0, 0.0, self._load_height]))
-            parts.append(([X_WT.position, load_end], self._load_radius))
-        width, height = self._size
-        occluded = np.zeros((height, width), dtype=np.uint8)
-        for points, radius in parts:
-            for start, end in itertools.pairwise(points):
-                centres = X_WC.inverse().apply(np.linspace(start, end, SPHERES_PER_SEGMENT))
-                for x, y, z in (centres @ self.matrix.T).tolist():
-                    # A sphere behind the camera is invisible. The link that carries a wrist camera has a
-                    # sphere around the camera, which would occlude the whole image.
-                    if z <= radius:
-                        continue
-                    column = round(x / z)
-                    row = round(y / z)
-                    # OpenCV cannot draw circles with very large coordinates.
-                    if abs(column) <= 4 * width and abs(row) <= 4 * height:
-                        size = max(1, round(self.matrix[0, 0] * radius / z))
-                        cv2.circle(occluded, (column, row), size, 1, -1)
-        return occluded == 0

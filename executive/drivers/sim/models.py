@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
 
@@ -20,13 +20,12 @@ from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.config import CellConfig, ObjectConfig
+from executive.cell.device_config import STEP
 from executive.cell.frame import Box
-from executive.cell.objects import ObjectClass
-from executive.cell.protocols import STEP
-from executive.drivers.sim import model_files
-from executive.drivers.sim.model_files import find_model, make_rotation
 from executive.errors import InputError
 from executive.geometry import Array, Pose
+from executive.physics import model_files
+from executive.physics.model_files import find_model, make_rotation
 from executive.processes import build_command
 from executive.text.validate import KeyPath
 from executive.text.yaml_files import get_shipped_folder
@@ -156,11 +155,6 @@ def compute_mass(config: ObjectConfig) -> float:
         problem = f"the <inertial> of the model {path.name} has a mass of {mass:g} kg"
         raise InputError(f"{problem}; write {MIN_MASS:g} to {MAX_MASS:g} kg, or give the class a mass")
     return mass
-
-
-def build_simulated_class(label: str, config: ObjectConfig) -> ObjectClass:
-    """Return the object class of a section of a cell file, with the mass of the simulated objects."""
-    return replace(config.build_class(label), mass=compute_mass(config))
 
 
 def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from executive.cell.protocols import STEP
+from executive.cell.arm import JointState
+from executive.cell.device_config import STEP
 from executive.drivers import world_log
 from executive.drivers.sim.tool import SuctionTool
 from executive.drivers.sim.world import World
 from executive.drivers.world_log import Command
 from executive.errors import InputError
 from executive.geometry import Array, Pose
-from executive.motion.joints import JointState
 from executive.motion.trajectory import Trajectory
 
 
@@ -31,8 +31,10 @@ class WorldRebuilder:
         motion: Motion of the arm, or None if the arm is at rest.
         braking_start: Joint targets of the last physics step `(n,)` [rad], empty before the first step, and
             their time since the start of the motion [s]; the arm brakes from there.
-        step_count: Number of control steps of the run.
-        last_command_step: Number of control steps before the last motion or vacuum command; 0: no command.
+        step_count: Number of physics steps of the run.
+        last_command_step: Number of physics steps of the run before the last motion or vacuum command; 0: no
+            command.
+        image_count: Number of captured images.
     """
 
     def __init__(self, world: World, tool: SuctionTool) -> None:
@@ -40,6 +42,7 @@ class WorldRebuilder:
         self.braking_start: tuple[Array, float] = (np.zeros(0), 0.0)
         self.step_count = 0
         self.last_command_step = 0
+        self.image_count = 0
         self._world = world
         self._tool = tool
         self._next_targets = self.braking_start
@@ -87,6 +90,8 @@ class WorldRebuilder:
             tool.advance()
         elif kind == world_log.JOINT_TARGETS:
             self._next_targets = (numbers[1:], float(numbers[0]))
+        elif kind == world_log.CAPTURE:
+            self.image_count += 1
         elif kind == world_log.MOTION_END:
             self.motion = None
         elif kind == world_log.SET_POSE:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field
 
+from executive.cell.devices import derive_seeds
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import (
     POSE_AND_FOV_KEYS,
@@ -279,11 +280,6 @@ PUSH_SPEED = 0.1
 """Horizontal speed given to an upper object to test a stack [m/s]; a stable object stops within 1 mm."""
 MAX_DISPLACEMENT = 0.005
 """Maximum distance of an object in a stable stack from its goal position [m]."""
-
-
-def derive_seeds(seed: int) -> tuple[int, ...]:
-    """Return the random seeds of objects, camera noise, detectors and load noise for the seed of a run."""
-    return tuple(int(child.generate_state(1)[0]) for child in np.random.SeedSequence(seed).spawn(4))
 
 
 def build_initial_world(

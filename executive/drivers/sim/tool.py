@@ -13,8 +13,9 @@ import pybullet
 
 from executive.cell.device_config import ToolConfig
 from executive.drivers import world_log
-from executive.drivers.sim.world import POSITION_A, World
+from executive.drivers.sim.world import World
 from executive.geometry import Array, Pose
+from executive.physics.cell_world import POSITION_A
 
 RIM_RAY_COUNT = 16
 """Number of rays on the rim of the cup; the ring at half the radius has half of this number of rays."""

@@ -6,15 +6,16 @@ from collections import deque
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.protocols import STEP, StepClock
+from executive.cell.device_config import STEP
+from executive.cell.devices import StepClock
 from executive.drivers.sim.arm import SimArm
-from executive.drivers.sim.collision import ClearanceChecker
 from executive.drivers.sim.tool import SuctionTool
 from executive.drivers.sim.world import World
 from executive.events import Event
 from executive.geometry import Array, Pose
 from executive.motion.planner import Planner
 from executive.motion.trajectory import Trajectory
+from executive.physics.collision import ClearanceChecker
 
 WHITE = (1.0, 1.0, 1.0)
 

@@ -10,7 +10,7 @@ from rig import Rig
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.protocols import STEP
+from executive.cell.device_config import STEP
 from executive.motion.trajectory import Trajectory
 from tests.benchmarks.halts import measure_distance
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from executive.drivers.sim.kind import SIM_CELL_KIND
 
 from executive.cell.config import CellConfig
-from executive.drivers.fake import FakeCell
-from executive.drivers.sim.kind import SIM_CELL_KIND, find_pose_errors
 from executive.motion.arms import build_kinematics
+from executive.station.check import find_pose_errors
+from executive.testing.fake_cell import FakeCell
 from tests.motion.joint_states import reach
 
 

@@ -11,9 +11,9 @@ import pytest
 
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.drivers.sim import models
-from executive.drivers.sim.model_files import read_mesh
 from executive.drivers.sim.models import find_model_errors, load_mesh, try_model
 from executive.errors import InputError
+from executive.physics.model_files import read_mesh
 
 CORNERS = 0.025 * np.array([*product((-1, 1), repeat=3)])
 FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6),

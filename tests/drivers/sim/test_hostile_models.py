@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from executive.cell.config import ObjectConfig
-from executive.drivers.sim.model_files import find_model
 from executive.drivers.sim.models import compute_mass, load_mesh
 from executive.errors import InputError
+from executive.physics.model_files import find_model
 
 LEVELS = "".join(f"<!ENTITY a{number + 1} '{f'&a{number};' * 10}'>" for number in range(9))
 BOMB = f"<!DOCTYPE r [<!ENTITY a0 'ha'>{LEVELS}]><robot name='&a9;'/>"

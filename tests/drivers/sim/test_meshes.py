@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig, ObjectConfig
-from executive.drivers.sim.model_files import read_mesh
 from executive.drivers.sim.models import find_model_errors, load_mesh
 from executive.drivers.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Pose, rotate_about_z
+from executive.physics.model_files import read_mesh
 
 Build = Callable[[CellConfig], World]
 

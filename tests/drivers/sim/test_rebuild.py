@@ -9,11 +9,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from executive.cell.workcell import ResumePoint
+from executive.drivers.sim.cell import SimCell
 
 from executive.behaviours import load_skills
-from executive.cell.protocols import STEP
-from executive.cell.workcell import CellOptions, ResumePoint
-from executive.drivers.sim.cell import SimCell
+from executive.cell.device_config import STEP
 from executive.drivers.world_log import JOINT_TARGETS, CommandLog
 from executive.errors import InputError
 from executive.events import discard_event
@@ -21,7 +21,7 @@ from executive.mission.load import load_mission
 from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.run.assembly import RunOptions, assemble
-from executive.station.without_hardware import SilentOperator
+from executive.station.station import CellOptions, SilentOperator
 from executive.testing.oracle import WorldAccess, make_oracle_kind
 from tests.meanwhile import meanwhile
 

@@ -12,14 +12,12 @@ import cv2
 import numpy as np
 import pytest
 import yaml
+from executive.drivers.sim.cell import SimCell
 
 from executive.cell.config import CellConfig
 from executive.cell.frame import Frame
 from executive.cell.objects import UNKNOWN_LABEL
-from executive.cell.workcell import CellOptions
-from executive.drivers.fake import SHIPPED_ROUTES
 from executive.drivers.sim.camera import CELL_LIGHT
-from executive.drivers.sim.cell import SimCell
 from executive.drivers.sim.models import load_mesh
 from executive.drivers.sim.scene import (
     DECLARED_SCENE,
@@ -33,7 +31,8 @@ from executive.errors import InputError
 from executive.events import discard_event
 from executive.geometry import Pose
 from executive.perception.camera_model import compute_calibration
-from executive.station.without_hardware import SilentOperator
+from executive.station.station import CellOptions, SilentOperator
+from executive.testing.fake_cell import SHIPPED_ROUTES
 from executive.testing.oracle import TrueFrame, make_oracle_kind
 from executive.text.findings import MissionError
 

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.drivers.sim.scene import derive_seeds, spawn_objects
+from executive.cell.devices import derive_seeds
+from executive.drivers.sim.scene import spawn_objects
 from executive.drivers.sim.world import World
 from executive.errors import InputError
 

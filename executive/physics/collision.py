@@ -17,9 +17,9 @@ import pybullet
 from executive.cell.arm import Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
-from executive.drivers.sim.world import DISTANCE, LINK_A, POSITION_B, World, name_load
 from executive.errors import Blocked
 from executive.geometry import Array, format_point
+from executive.physics.cell_world import DISTANCE, LINK_A, POSITION_B, CellWorld, name_load
 
 ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
@@ -89,7 +89,7 @@ class ClearanceChecker:
     """
 
     def __init__(self, config: CellConfig) -> None:
-        self.world = World(config, visuals=False)
+        self.world = CellWorld(config, visuals=False)
         self._margin = config.motion.margin
         self._get_cylinder = functools.cache(self._add_cylinder)
         """Returns the body of the load (number 0) or of an obstacle, by radius [m], height [m] and number."""

@@ -1,0 +1,183 @@
+"""The camera as skills see it: frames with the pose of the camera, and the pixels that the arm hides."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Collection
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.cell.config import CellConfig
+from executive.cell.devices import ArmDevice, CameraDevice
+from executive.cell.frame import Box, Frame
+from executive.cell.objects import Bin
+from executive.cell.protocols import Tool
+from executive.geometry import Array, Pose
+from executive.motion.joints import Kinematics
+from executive.perception.camera_check import describe_displacement
+from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, compute_hull_mask
+from executive.testing.oracle import TrueFrame
+
+MAX_LOAD_OFFSET = 0.015
+"""Maximum distance of the centre of a held object from the axis of the tool [m]."""
+TOOL_SPHERE_RADIUS = 0.02
+"""Radius of the spheres that enclose the tool, including tube and fittings [m]."""
+SPHERES_PER_SEGMENT = 9
+"""Number of spheres that cover the segment between two points on the axis of a part of the arm."""
+
+
+class Robot(NamedTuple):
+    """An arm and the tool at its flange."""
+
+    arm: ArmDevice
+    tool: Tool
+
+
+class CellCamera:
+    """A camera of a cell, with frames numbered from 1; implements `executive.cell.protocols.Camera`.
+
+    Args:
+        config: The cell file.
+        name: Name of the camera in the cell file.
+        device: The camera of the driver.
+        robot: The arm, whose flange is the mount of a wrist camera, and the tool. An object that the tool holds
+            is assumed to be of the largest class.
+        unrecorded_robot: The same arm and tool, whose reads are not recorded, for `sees_table`: the answer
+            itself is recorded.
+        kinematics: Kinematics of the arm.
+        bins: Bins that serve as landmarks for the detection of a displaced camera.
+        get_change_count: Returns the number of changes of the objects on the table so far.
+        is_hidden_by_arm: False if the arm hides nothing, as in a cell without physics.
+
+    Attributes:
+        name: Name of the camera in the cell file.
+        config: Section of the camera in the cell file.
+        matrix: Camera matrix `(3, 3)` [pixel].
+        scan_poses: Names of the arm poses from which the camera sees the table; the first has the best view.
+    """
+
+    def __init__(
+        self,
+        config: CellConfig,
+        name: str,
+        device: CameraDevice,
+        robot: Robot,
+        unrecorded_robot: Robot,
+        kinematics: Kinematics,
+        *,
+        bins: Collection[Bin] = (),
+        get_change_count: Callable[[], int] = lambda: 0,
+        is_hidden_by_arm: bool = True,
+    ) -> None:
+        self.name = name
+        self.config = config.cameras[name]
+        self.scan_poses = self.config.scan_poses
+        self.matrix, self._X_MC = compute_calibration(self.config)
+        self._device = device
+        self._robot = robot
+        self._unrecorded_robot = unrecorded_robot
+        self._kinematics = kinematics
+        self._bins = tuple(bins)
+        self._get_change_count = get_change_count
+        self._is_hidden_by_arm = is_hidden_by_arm
+        # T is the frame of the tool, F the frame of the flange.
+        self._X_TF = Pose.of((0.0, 0.0, -config.tool.length))
+        self._size = (self.config.width, self.config.height)
+        self._link_radius = config.arm.link_radius
+        self._load_radius = max(section.radius for section in config.objects.values()) + MAX_LOAD_OFFSET
+        self._load_height = config.max_object_height
+        heights = (0.0, config.max_pile_height)
+        self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
+        self._frame_count = 0
+        self._pose_count = 0
+        self._content_mask = np.ones((self.config.height, self.config.width), dtype=bool)
+        """Mask `(H, W)` of the pixels that are not in the ignored border of an image with a partial view."""
+        if self.config.partial_views:
+            width = round(BORDER_FRACTION * self.config.height)
+            self._content_mask = np.pad(self._content_mask[width:-width, width:-width], width)
+
+    def next_pose(self) -> str:
+        """Advance to the next scan pose, and return its name."""
+        self._pose_count += 1
+        return self.scan_poses[self._pose_count % len(self.scan_poses)]
+
+    def get_view_box(self, view: str) -> Box:
+        """Return the region of a view."""
+        return self.config.get_view_box(view)
+
+    def sees_table(self) -> bool:
+        """Return True if the workspace, up to the height of a pile, is in the image and not occluded."""
+        robot = self._unrecorded_robot
+        X_WC = self._compute_pose(robot.arm.q)
+        mask = compute_hull_mask(self._workspace_corners, self.matrix, X_WC, self._size)
+        return mask is not None and bool(np.all(self._compute_visibility_mask(robot, X_WC)[mask]))
+
+    def capture(self) -> Frame:
+        """Capture an image, and return the frame."""
+        self._frame_count += 1
+        X_WC = self._compute_pose(self._robot.arm.q)
+        image = self._device.capture()
+        visible = image.visible
+        if visible is None:
+            visible = self._compute_visibility_mask(self._robot, X_WC)
+        frame = Frame(
+            id=self._frame_count,
+            camera=self.name,
+            image=image.colour,
+            depth=image.depth,
+            matrix=self.matrix,
+            X_WC=X_WC,
+            stamp=image.stamp,
+            visible=visible & self._content_mask,
+            change_count=self._get_change_count(),
+        )
+        if image.true_detections is None:
+            return frame
+        return TrueFrame(**vars(frame), true_detections=image.true_detections)
+
+    def describe_displacement(self, frame: Frame) -> str:
+        """Return a sentence if the bins in a frame are not where the declared pose shows them, else ""."""
+        return describe_displacement(frame, self._bins) if self._is_hidden_by_arm else ""
+
+    def _compute_pose(self, q: Array) -> Pose:
+        """Return the pose `X_WC` of the camera at joint positions `q` `(n,)` [rad]."""
+        if self.config.mount == "fixed":
+            return self._X_MC
+        return self._kinematics.compute_tool_pose(q) @ self._X_TF @ self._X_MC
+
+    def _compute_visibility_mask(self, robot: Robot, X_WC: Pose) -> NDArray[np.bool_]:
+        """Return the mask `(H, W)` of the pixels that no sphere around arm, tool or held object occludes."""
+        width, height = self._size
+        occluded = np.zeros((height, width), dtype=np.uint8)
+        if not self._is_hidden_by_arm:
+            return occluded == 0
+        q = robot.arm.q
+        X_WT = self._kinematics.compute_tool_pose(q)
+        X_WF = X_WT @ self._X_TF
+        joint_frames = self._kinematics.compute_joint_frames(q)
+        joints = [np.zeros(3), *(frame.position for frame in joint_frames), X_WF.position]
+        parts = [
+            (joints, self._link_radius),
+            ([X_WF.position, X_WT.position], TOOL_SPHERE_RADIUS),
+        ]
+        if robot.tool.holding:
+            load_end = X_WT.apply(np.array([0.0, 0.0, self._load_height]))
+            parts.append(([X_WT.position, load_end], self._load_radius))
+        for points, radius in parts:
+            for start, end in itertools.pairwise(points):
+                centres = X_WC.inverse().apply(np.linspace(start, end, SPHERES_PER_SEGMENT))
+                for x, y, z in (centres @ self.matrix.T).tolist():
+                    # A sphere behind the camera is invisible. The link that carries a wrist camera has a
+                    # sphere around the camera, which would occlude the whole image.
+                    if z <= radius:
+                        continue
+                    column = round(x / z)
+                    row = round(y / z)
+                    # OpenCV cannot draw circles with very large coordinates.
+                    if abs(column) <= 4 * width and abs(row) <= 4 * height:
+                        size = max(1, round(self.matrix[0, 0] * radius / z))
+                        cv2.circle(occluded, (column, row), size, 1, -1)
+        return occluded == 0

@@ -1,0 +1,260 @@
+"""The station: everything above the devices of a cell, and the cell as skills see it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from executive.cell.config import CellConfig
+from executive.cell.devices import (
+    Driver,
+    DriverKind,
+    DriverOptions,
+    RayCaster,
+    Rebuildable,
+    TrueWorld,
+    Visible,
+    Visuals,
+    derive_seeds,
+    is_rehearsal,
+    load_driver_kind,
+)
+from executive.cell.objects import Quotas
+from executive.cell.protocols import Behaviours, Cell, Clock, Operator, Routes
+from executive.events import Emit, TargetSelected
+from executive.ledger.tracker import Tracker
+from executive.motion.arms import build_planning_kinematics
+from executive.motion.joints import Kinematics
+from executive.motion.planner import Planner
+from executive.motion.straight_paths import plan_straight_motion
+from executive.perception.detectors.cell_detector import build_cell_detectors
+from executive.perception.detectors.detector_registry import KindMaker, make_installed_kind
+from executive.perception.detectors.simulated import TruthDetector
+from executive.perception.localization import CellLocalizer
+from executive.physics.collision import ClearanceChecker
+from executive.station.audit import count_outcomes
+from executive.station.border import Border
+from executive.station.camera import CellCamera, Robot
+from executive.station.planner_service import PlannedArm, PlannerService
+from executive.text.yaml_files import get_shipped_folder
+from executive.training.evaluate import CellDetector
+
+
+class SilentOperator:
+    """Operator without a terminal, who requests the classes of a list in order."""
+
+    def __init__(self, requests: Sequence[str] = ()) -> None:
+        self._requests = list(requests)
+
+    def ask(self, choices: Sequence[str]) -> str | None:
+        del choices
+        return self._requests.pop(0) if self._requests else None
+
+
+@dataclass(frozen=True)
+class CellOptions:
+    """Options of a run for its cell.
+
+    Attributes:
+        operator: The person or script that requests classes of objects.
+        cell_folder: Folder of the cell file, to which paths in the file are relative.
+        driver_options: Options of the driver by name; only the driver knows their meaning.
+        world_log: Log from which the driver rebuilds its world, for a resumed run; None for a new run.
+        has_devices: False for a replay, in which all values come from the record.
+        quotas: Maximum numbers of objects in the bins, from the mission.
+    """
+
+    operator: Operator
+    cell_folder: Path
+    driver_options: Mapping[str, str] = field(default_factory=dict)
+    world_log: Path | None = None
+    has_devices: bool = True
+    quotas: Quotas = field(default_factory=dict)
+
+
+class Station:
+    """What is built from the devices of a cell, its cell file and a mission.
+
+    Args:
+        config: The cell file.
+        kind: Kind of the driver; None: the kind that the cell file names.
+        seed: Random seed of the run.
+        routes: Names of the permitted bins of each class.
+        emit: Receives the events of the cell.
+        options: Options of the run.
+        make_detector: Makes the kind of each detector; None: the kind that the cell file names, or the truth
+            in a cell without physics.
+
+    Attributes:
+        config: The cell file.
+        routes: Names of the permitted bins of each class.
+        driver: The devices; a replay has none.
+        border: Border between the run and the devices, detectors, planner and operator.
+        ledger: The ledger of the run.
+        cell: The cell as skills see it.
+        unrecorded_cell: The cell with an arm and a tool whose reads are not recorded.
+        tick_count: Number of ticks since the start of the run, including those before a resumption.
+        tick_callbacks: Functions that are called after each tick of the devices.
+
+    Raises:
+        InputError: The driver does not support the cell file or an option, or a detector cannot be built.
+    """
+
+    driver: Driver
+
+    def __init__(
+        self,
+        config: CellConfig,
+        kind: DriverKind | None = None,
+        *,
+        seed: int,
+        routes: Routes,
+        emit: Emit,
+        options: CellOptions,
+        make_detector: KindMaker | None = None,
+    ) -> None:
+        self.config = config
+        self.routes = dict(routes)
+        self.border = Border(emit)
+        self.tick_count = 0
+        self.tick_callbacks: list[Callable[[], None]] = []
+        self._detectors: dict[str, CellDetector] = {}
+        bins = config.build_bins()
+        classes = {label: section.build_class(label) for label, section in config.objects.items()}
+        ignored_labels = set(config.unknown.ignore).difference(classes)
+        self.ledger = Tracker(
+            config.ledger, config.table, bins, classes, self.routes, options.quotas, emit, ignored_labels
+        )
+        # In a replay, the border needs none of these parts, because all values come from the record.
+        clock: Any = None
+        arm: Any = None
+        tool: Any = None
+        camera_device: Any = None
+        self._planner: Any = None
+        cast_ray = None
+        is_without_physics = kind is not None and is_rehearsal(kind)
+        if options.has_devices:
+            kind = kind or load_driver_kind(config.kind)
+            is_without_physics = is_rehearsal(kind)
+            if (compute_mass := getattr(kind, "compute_mass", None)) is not None:
+                masses = {label: compute_mass(section) for label, section in config.objects.items()}
+                classes = {label: replace(each, mass=masses[label]) for label, each in classes.items()}
+            driver_options = DriverOptions(seed, options.cell_folder, options.driver_options)
+            self.driver = kind(config, driver_options)
+            clock = self.driver.clock
+            arm = next(iter(self.driver.arms.values()))
+            tool = next(iter(self.driver.tools.values()))
+            camera_device = next(iter(self.driver.cameras.values()))
+            if isinstance(self.driver, RayCaster):
+                cast_ray = self.driver.cast_ray
+            if options.world_log is not None and isinstance(self.driver, Rebuildable):
+                self.tick_count = self.driver.rebuild(options.world_log)
+        kinematics = build_planning_kinematics(config)
+        poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
+        if options.has_devices:
+            self._planner = _build_planner(config, kinematics, clock, emit, is_without_physics)
+            # Detectors are built last, because their processes would outlive an exception in a later statement.
+            truth = TruthDetector.from_config if is_without_physics else make_installed_kind
+            self._detectors = build_cell_detectors(
+                config,
+                clock=clock,
+                cell_folder=options.cell_folder,
+                seed=derive_seeds(seed)[2],
+                classes=classes,
+                folders=(options.cell_folder, get_shipped_folder() / "cells"),
+                make_kind=make_detector or truth,
+            )
+        recorded_arm = self.border.wrap("arm", arm)
+        recorded_tool = self.border.wrap("tool", tool)
+        camera = CellCamera(
+            config,
+            next(iter(config.cameras)),
+            self.border.wrap("image", camera_device),
+            Robot(recorded_arm, recorded_tool),
+            Robot(arm, tool),
+            kinematics,
+            bins=bins.values(),
+            get_change_count=lambda: self.ledger.change_count,
+            is_hidden_by_arm=not is_without_physics,
+        )
+        method = "plane" if is_without_physics else config.localization
+        localizer = CellLocalizer(method, classes, tuple(bins.values()), cast_ray)
+        detectors: Mapping[str, Any] = self._detectors or dict.fromkeys(config.detectors)
+        self.cell = Cell(
+            clock=clock,
+            arm=PlannedArm(recorded_arm, self.border.wrap("planner", self._planner), kinematics, poses),
+            tool=recorded_tool,
+            camera=self.border.wrap("camera", camera),
+            detectors={name: self.border.wrap("detector", each, name) for name, each in detectors.items()},
+            ledger=self.ledger,
+            operator=self.border.wrap("operator", options.operator),
+            bins=bins,
+            classes=classes,
+            routes=self.routes,
+            localizer=self.border.wrap("localizer", localizer),
+            safe_place=np.array(config.safe_place),
+            descent=config.motion.descent,
+            slow_descent=config.motion.slow_descent,
+            descent_speed=config.motion.descent_speed,
+            report_selection=lambda target, bin: emit(
+                TargetSelected(target.item, target.label, target.frame, bin)
+            ),
+            quotas=options.quotas,
+            behaviours=self.border.wrap("behaviours", Behaviours()),
+        )
+        self.unrecorded_cell = replace(
+            self.cell, arm=PlannedArm(arm, self._planner, kinematics, poses), tool=tool
+        )
+
+    def advance(self) -> None:
+        """Wait for the next tick of the devices."""
+        self.driver.clock.wait_for_tick()
+        self.tick_count += 1
+        for callback in self.tick_callbacks:
+            callback()
+
+    def log_to(self, path: Path) -> None:
+        """Start a log of the world if the driver can rebuild its world; called before the first tick."""
+        if isinstance(self.driver, Rebuildable):
+            self.driver.log_to(path)
+
+    def visuals(self) -> Visuals | None:
+        """Return the shapes and poses of the bodies for displays, or None if the driver has no visuals."""
+        return self.driver.visuals() if isinstance(self.driver, Visible) else None
+
+    def audit(self) -> Mapping[str, int] | None:
+        """Return the number of objects by true place, by `AUDIT_KEYS`; None without ground truth."""
+        if not isinstance(self.driver, TrueWorld):
+            return None
+        objects = self.driver.list_final_objects()
+        gate = self.config.ledger.gate
+        ignored_positions = self.ledger.ignored_positions
+        return count_outcomes(
+            objects, self.ledger.records, self.cell.bins, self.routes, gate, ignored_positions
+        )
+
+    def close(self) -> None:
+        """Release all resources; the station is unusable afterwards."""
+        for detector in self._detectors.values():
+            detector.close()
+        if self._planner is not None:
+            self._planner.close()
+            self.driver.close()
+
+
+def _build_planner(
+    config: CellConfig, kinematics: Kinematics, clock: Clock, emit: Emit, is_without_physics: bool
+) -> PlannerService:
+    """Return the planner service of a cell; without physics, motions have straight joint paths."""
+    planning_time = config.motion.planning_time
+    if is_without_physics:
+        plan_straight = partial(plan_straight_motion, config, kinematics)
+        return PlannerService(plan_straight, clock, planning_time, emit)
+    checker = ClearanceChecker(config)
+    planner = Planner(config, checker.check, kinematics)
+    return PlannerService(planner.plan, clock, planning_time, emit, checker.close)
