@@ -323,7 +323,7 @@ class SimCamera(MountedCamera):
         joint_frames = self._kinematics.compute_joint_frames(q)
         joints = [np.zeros(3), *(frame.position for frame in joint_frames), X_WF.position]
         parts = [
-            (joints, self._world.robot.link_radius),
+            (joints, self._world.config.arm.simulation.link_radius),
             ([X_WF.position, X_WT.position], TOOL_SPHERE_RADIUS),
         ]
         if self._is_loaded():

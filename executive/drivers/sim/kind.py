@@ -19,13 +19,15 @@ from executive.drivers.sim.scene import find_object_count_errors
 from executive.drivers.sim.world import World
 from executive.events import Emit
 from executive.geometry import Array
-from executive.motion.arms import find_arm_errors, find_places_out_of_reach
+from executive.motion.arms import build_kinematics, find_arm_errors, find_places_out_of_reach
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 from executive.station.view_check import find_view_errors
 from executive.text.validate import KeyPath
 
 POINTS_PER_SIDE = 9
 """Number of positions of the flattest object along each side of the workspace for the check of occlusion."""
+MAX_KINEMATICS_ERROR = 1e-4
+"""Maximum difference between the kinematics of the solver and of the model, in position [m] and rotation."""
 
 
 def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
@@ -36,12 +38,30 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     partial views must see it from all its scan poses together.
     """
     with contextlib.closing(ClearanceChecker(config)) as checker:
+        if error := _describe_wrong_solver(config, checker.world):
+            yield ("arm", "solver"), error
+            return
         for name, pose in config.arm.poses_deg.items():
             if violation := checker.find_violation(np.radians(pose)):
                 margin = f"the minimum clearance is {config.motion.margin:.3f} m"
                 message = f'the pose "{name}" brings {violation}; {margin}'
                 yield ("arm", "poses_deg", name), message
         yield from _find_occluding_poses_and_bins(config, checker.world)
+
+
+def _describe_wrong_solver(config: CellConfig, world: World) -> str:
+    """Return a message if the kinematics of the solver differ from the model of the arm, or ""."""
+    lower, upper = np.radians(config.arm.limits.position_ranges_deg).T
+    q = lower + 0.7 * (upper - lower)  # No joint is at 0, so that the axis of each joint matters.
+    world.set_joint_positions(q)
+    difference = world.get_tool_pose().inverse() @ build_kinematics(config).compute_tool_pose(q)
+    distance = float(np.linalg.norm(difference.position))
+    if max(distance, np.abs(difference.rotation - np.eye(3)).max()) < MAX_KINEMATICS_ERROR:
+        return ""
+    return (
+        f'the solver "{config.arm.solver}" does not describe the model {config.arm.urdf}: its tool is '
+        f"{distance:.3f} m away from the tool of the model, or turned; correct urdf, flange or solver"
+    )
 
 
 def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:

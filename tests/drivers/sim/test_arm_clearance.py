@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from executive.arms.iiwa14 import Iiwa14, interpolate_max_joint_6_angle
 from executive.cell.arm import Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass, Obstacle
 from executive.drivers.sim.collision import ClearanceChecker
 from executive.errors import Blocked
 from executive.motion.arms import build_kinematics
-from executive.motion.iiwa14_kinematics import Iiwa14, interpolate_max_joint_6_angle
 from tests.motion.joint_states import reach
 
 DUCK = Task(ObjectClass("duck", 0.05, 0.04))

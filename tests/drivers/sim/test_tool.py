@@ -5,12 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 import pybullet
 import pytest
-from tests.drivers.sim.conftest import shipped_cell
 
 from executive.drivers.sim.tool import SuctionTool
 from executive.drivers.sim.world import World
 from executive.geometry import GRAVITY, Array, Pose
 from executive.motion.arms import build_kinematics
+from tests.drivers.sim.conftest import shipped_cell
 from tests.motion.joint_states import reach
 
 X, Y = 0.5, 0.05
