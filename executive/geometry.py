@@ -107,7 +107,7 @@ def rotate_about_z(angle: float) -> Array:
 def make_tool_down_pose(position: ArrayLike, yaw: float = 0.0) -> Pose:
     """Return the tool pose `X_WT` at `position` `(3,)` [m] with the z axis vertically down.
 
-    At `yaw` 0 [rad], the y axes of tool and world are parallel, and their x axes are opposite. An iiwa whose
+    At `yaw` 0 [rad], the y axes of tool and world are parallel, and their x axes are opposite. An arm whose
     joints 3 and 5 are at zero has this orientation if joints 1 and 7 have equal angles.
     """
     return Pose(rotate_about_z(yaw) @ np.diag([-1.0, 1.0, -1.0]), np.asarray(position, dtype=float))

@@ -29,6 +29,7 @@ from executive.campaign.jobs import SweepJob
 from executive.campaign.results import RunRecord
 from executive.cell.devices import DRIVER_GROUP
 from executive.errors import InputError, explain_os_errors
+from executive.motion.arms import IK_SOLVER_GROUP
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.detectors.envelope import MEASUREMENT_SUFFIX
 from executive.record.run_directory import FOLDER_ADVICE, make_unique_folder
@@ -39,12 +40,12 @@ if TYPE_CHECKING:
     from distributed import Worker
 
 PACKAGES_FOLDER = ".packages"
-"""Folder of the packages with skills, control nodes, detectors and kinds of cells, in an unpacked bundle."""
+"""Folder of the packages with plugins (`PLUGIN_GROUPS`), in an unpacked bundle."""
 TEXT_SUFFIXES = (".yaml", ".yml", ".urdf", ".obj", ".mtl")
 """Suffixes of files that name further files: libraries, cells, weights, labels, meshes and textures."""
 _FILE_NAME_PATTERN = re.compile(r""""([^"\n]+)"|'([^'\n]+)'|([^\s"'<>,\[\]{}]+)""")
 """Pattern of a possible file name in a text: a quoted text or a word."""
-PLUGIN_GROUPS = (SKILL_GROUP, CONTROL_NODE_GROUP, DETECTOR_GROUP, DRIVER_GROUP)
+PLUGIN_GROUPS = (SKILL_GROUP, CONTROL_NODE_GROUP, DETECTOR_GROUP, DRIVER_GROUP, IK_SOLVER_GROUP)
 """Groups of entry points with which a package extends this project."""
 PROJECT_PACKAGES = ("executive", "skills")
 """Top-level packages of this project, which each worker has."""

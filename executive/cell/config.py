@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
+from executive.cell.arm_config import ArmConfig
 from executive.cell.device_config import (
     Angles,
-    ArmConfig,
     CameraConfig,
     ClockConfig,
     Colour,

@@ -1,4 +1,4 @@
-"""Sections of a cell file about devices: arm, tool, motion, cameras with calibration, noise and depth.
+"""Sections of a cell file about devices: tool, motion, cameras with calibration, noise and depth.
 
 Each field is a key of `missions/cells/*.yaml`, in SI units. Values of keys that end in `_deg` are in degrees.
 The loader writes every matrix of a calibration as the list of its entries, row by row.
@@ -86,86 +86,6 @@ class Section(BaseModel):
     """A section of a cell file: unknown keys are errors, and the values are immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-MIN_JOINT_RANGE = 2.0
-"""Minimum range of a joint's positions [degree]; a joint with a smaller range is regarded as fixed."""
-Speed = Annotated[float, Field(ge=1, le=1000)]
-"""Joint velocity [degree/s]; the fastest arms reach 1000 degree/s."""
-Acceleration = Annotated[float, Field(ge=0.1, le=1000)]
-"""Joint acceleration [rad/s²]; at 0.1 rad/s², a motion takes minutes; the fastest arms reach 100 rad/s²."""
-Jerk = Annotated[float, Field(ge=1, le=1e5)]
-"""Joint jerk [rad/s³]; the minimum reaches 0.1 rad/s² in 0.1 s, the maximum 1000 rad/s² in 0.01 s."""
-
-
-class LimitsConfig(Section):
-    """Joint limits of the arm, one value for each joint, and their source."""
-
-    source: str
-    """Source of the limits, for instance a data sheet."""
-    min_position_deg: tuple[Angle, ...] = ()
-    """Minimum joint positions [degree]; if empty, the negatives of `position_deg`."""
-    position_deg: tuple[Angle, ...] = Field(min_length=1)
-    """Maximum joint positions [degree]."""
-    velocity_deg: tuple[Speed, ...]
-    """Maximum joint velocities [degree/s]."""
-    acceleration: tuple[Acceleration, ...]
-    """Maximum joint accelerations [rad/s²]."""
-    jerk: tuple[Jerk, ...]
-    """Maximum joint jerks [rad/s³]."""
-    stop_acceleration: tuple[Acceleration, ...]
-    """Maximum joint accelerations while the arm brakes [rad/s²]."""
-    stop_jerk: tuple[Jerk, ...]
-    """Maximum joint jerks while the arm brakes [rad/s³]."""
-
-    @property
-    def position_ranges_deg(self) -> tuple[tuple[float, float], ...]:
-        """Minimum and maximum position of each joint [degree]."""
-        lower = self.min_position_deg or tuple(-upper for upper in self.position_deg)
-        return tuple(zip(lower, self.position_deg, strict=True))
-
-    @model_validator(mode="after")
-    def _check_joints(self) -> LimitsConfig:
-        count = len(self.position_deg)
-        for name, values in self:
-            is_default = name == "min_position_deg" and not values
-            if isinstance(values, tuple) and len(values) != count and not is_default:
-                problem = f"has {len(values)} values in {name} and {count} in position_deg"
-                raise ValueError(f"{problem}; both need one value for each joint")
-        for joint, (lower, upper) in enumerate(self.position_ranges_deg, start=1):
-            if upper - lower < MIN_JOINT_RANGE:
-                problem = f"allows joint {joint} the positions {lower:g} to {upper:g} degrees"
-                limit = f"the range of a joint must be at least {MIN_JOINT_RANGE:g} degrees"
-                raise ValueError(f"{problem}; {limit}")
-        return self
-
-
-class ArmConfig(Section):
-    """The arm, its limits and its named poses."""
-
-    urdf: str = "kuka_iiwa/model.urdf"
-    """Model of the arm, in pybullet_data. Another arm needs kinematics in `executive/motion/arms.py` and a
-    model in `executive/drivers/sim/world.py`; supported: `kuka_iiwa/model.urdf` (KUKA LBR iiwa 14)."""
-    limits: LimitsConfig
-    """Joint limits of the arm."""
-    poses_deg: dict[Name, tuple[Angle, ...]] = Field(min_length=1)
-    """Named joint configurations, one position for each joint [degree]; a run starts in `home`."""
-
-    @property
-    def joint_count(self) -> int:
-        """Number of joints."""
-        return len(self.limits.position_deg)
-
-    @model_validator(mode="after")
-    def _check_poses(self) -> ArmConfig:
-        if "home" not in self.poses_deg:
-            raise ValueError(f'needs a pose named "home"; there are: {", ".join(self.poses_deg)}')
-        for name, pose in self.poses_deg.items():
-            if len(pose) != self.joint_count:
-                angles = f'{len(pose)} angles in the pose "{name}"'
-                limits = f"limits of {self.joint_count} joints"
-                raise ValueError(f"has {angles} and {limits}; each needs one value for each joint")
-        return self
 
 
 class ToolConfig(Section):

@@ -144,26 +144,34 @@ def tree_command(
 
 @click.command(name="schema")
 @click.option("--cell", is_flag=True, help="Print the schema of cell files instead.")
+@click.option("--arm", is_flag=True, help="Print the schema of arm files instead.")
 @click.option("--library", is_flag=True, help="Print the schema of library files instead.")
 @click.option("--journal", is_flag=True, help="Print the schema of the lines of a journal instead.")
-def schema_command(cell: bool, library: bool, journal: bool) -> None:
+def schema_command(cell: bool, arm: bool, library: bool, journal: bool) -> None:
     """Print the JSON Schema of mission files.
 
     The schema includes the installed skills. Save it as mission.schema.json beside the missions: an editor
     with the YAML language server uses it in files that begin with
     `# yaml-language-server: $schema=mission.schema.json`.
     """
-    if cell + library + journal > 1:
-        raise click.UsageError("--cell, --library and --journal exclude each other; give one of them")
+    if cell + arm + library + journal > 1:
+        raise click.UsageError("--cell, --arm, --library and --journal exclude each other; give one of them")
     with keep_stdout_clean():
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.behaviours import load_skills
-        from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
+        from executive.mission.schema import (
+            make_arm_schema,
+            make_cell_schema,
+            make_library_schema,
+            make_mission_schema,
+        )
         from executive.record.journal import make_journal_schema
         from executive.tree.node import load_control_nodes
 
         if cell:
             schema = make_cell_schema()
+        elif arm:
+            schema = make_arm_schema()
         elif journal:
             schema = make_journal_schema()
         else:

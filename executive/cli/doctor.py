@@ -84,13 +84,16 @@ def check_packages() -> Iterator[CheckResult]:
 
 
 def check_plugins() -> Iterator[CheckResult]:
-    """Load all installed skills, kinds of cells and kinds of detectors."""
+    """Load all installed skills, kinds of cells, kinds of detectors and solvers of arms."""
     from executive.behaviours import load_skills
     from executive.cell.devices import DRIVER_GROUP
+    from executive.motion.arms import IK_SOLVER_GROUP
     from executive.perception.detectors.detector_registry import find_detector_kinds
     from executive.plugins import list_entries
 
-    for entry in (*list_entries(DRIVER_GROUP, "kind of cell").values(), *find_detector_kinds().values()):
+    drivers = list_entries(DRIVER_GROUP, "driver")
+    solvers = list_entries(IK_SOLVER_GROUP, "solver")
+    for entry in (*drivers.values(), *find_detector_kinds().values(), *solvers.values()):
         entry.load()
     yield CheckResult("ok", "plugins", f"{len(load_skills())} skills")
 

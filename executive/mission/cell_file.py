@@ -1,4 +1,4 @@
-"""Loading of cell files: merging with their base files, validation, and checks of names and overlaps."""
+"""Loading of cell files: merging with base and arm file, validation, and checks of names and overlaps."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from executive.cell.arm_config import DEFAULT_ARM_FILE, ArmFile
 from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.objects import BIN_THICKNESS
 from executive.errors import InputError
@@ -23,6 +24,7 @@ from executive.text.yaml_files import (
     YamlScalar,
     YamlSequence,
     find_file_below,
+    get_shipped_folder,
     has_outside_link,
     is_outside_path,
     list_scalars,
@@ -54,7 +56,7 @@ class CellFile:
         config: Validated content, or None if the file has errors.
         source: Text of the cell file.
         root: Merged YAML tree, for positions of findings; None for invalid YAML and for a recorded cell.
-        findings: Errors in the file and its bases.
+        findings: Errors in the file, its bases and its arm file.
     """
 
     path: Path
@@ -86,7 +88,7 @@ def load_cell(path: Path, overrides: Mapping[str, str] | None = None) -> CellCon
 
 
 def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
-    """Return the content of a cell file merged with its bases, and all errors.
+    """Return the content of a cell file merged with its bases and its arm file, and all errors.
 
     Raises:
         InputError: The file does not exist.
@@ -97,8 +99,8 @@ def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
     if root is None:
         return CellFile(path, None, source, findings=tuple(reader.findings))
     root, override_findings = override_cell(root, overrides)
-    root = reader.arrange_matrices(root)
-    config, validation_errors = validate(root, CellConfig)
+    root = reader.insert_arm_file(reader.arrange_matrices(root))
+    config, validation_errors = validate(root, CellConfig) if root else (None, [])
     findings = (*reader.findings, *override_findings, *validation_errors)
     file = CellFile(path, config, source, root, findings)
     if config is None:
@@ -112,11 +114,12 @@ def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
 
 
 class _CellFileReader:
-    """Reader of a cell file and its bases.
+    """Reader of a cell file, its bases and its arm file.
 
     Attributes:
         folders: Folder of each file that was read.
-        findings: Syntax errors of the files, and errors of the values of `base`.
+        findings: Syntax errors of the files, errors of the values of `base` and `file`, and all errors of the
+            arm file.
     """
 
     def __init__(self) -> None:
@@ -161,6 +164,44 @@ class _CellFileReader:
             self.findings.append(make_error(reference.span, "no-base", str(problem)))
             return None
         return root
+
+    def insert_arm_file(self, root: YamlNode) -> YamlNode | None:
+        """Return the tree of a cell whose arm is completed by its arm file, or None if this is impossible.
+
+        An arm without a file is completed by the default arm file, except by its limits.
+        """
+        arm = root.get("arm") if isinstance(root, YamlMapping) else None
+        if not isinstance(root, YamlMapping) or not isinstance(arm, YamlMapping):
+            return root
+        file = arm.get("file")
+        # Validation reports a file that is not a string.
+        reference = file if isinstance(file, YamlScalar) and isinstance(file.value, str) else None
+        try:
+            path = get_shipped_folder() / DEFAULT_ARM_FILE
+            if reference is not None:
+                folder = self.folders.get(reference.span.source, next(iter(self.folders.values())))
+                path = find_file_below(folder, reference.text)
+            source = read_source(path)
+        except InputError as problem:
+            self.findings.append(make_error((file or arm).span, "no-arm", str(problem)))
+            return None
+        self.folders[source] = path.parent
+        arm_root, findings = parse_yaml(source)
+        self.findings += findings
+        arm_file, errors = validate(arm_root, ArmFile) if arm_root else (None, [])
+        self.findings += errors
+        if arm_file is None or not isinstance(arm_root, YamlMapping):
+            return None
+        urdf = arm.get("urdf")
+        if file is None and urdf is not None and urdf.python_value != arm_file.urdf:
+            message = f'an arm other than {arm_file.arm} needs the key "file" with the path of an arm file'
+            self.findings.append(make_error(urdf.span, "no-arm", message))
+            return None
+        complete_arm = _merge_sections(arm, arm_root, excluded=() if file else ("limits",))
+        entries = (
+            replace(entry, value=complete_arm) if entry.value is arm else entry for entry in root.entries
+        )
+        return replace(root, entries=tuple(entries))
 
     def arrange_matrices(self, node: YamlNode, keys: KeyPath = ()) -> YamlNode:
         """Return a tree whose calibrations contain the entries of files, and each matrix as one list.
@@ -238,6 +279,22 @@ def _merge_detector(detector: YamlNode, base_detector: YamlNode | None) -> YamlN
     return _inherit_entries(detector, base_detector) if is_same_kind else detector
 
 
+def _merge_sections(arm: YamlMapping, arm_file: YamlMapping, excluded: tuple[str, ...]) -> YamlMapping:
+    """Return the section of an arm, with the missing keys of the section and of each of its sections."""
+    entries = []
+    for entry in arm.entries:
+        base = arm_file.get(entry.key.text)
+        if (
+            isinstance(entry.value, YamlMapping)
+            and isinstance(base, YamlMapping)
+            and entry.key.text not in excluded
+        ):
+            entries.append(replace(entry, value=_inherit_entries(entry.value, base)))
+        else:
+            entries.append(entry)
+    return _inherit_entries(replace(arm, entries=tuple(entries)), arm_file, excluded)
+
+
 def _inherit_entries(mapping: YamlMapping, base: YamlMapping, excluded: tuple[str, ...] = ()) -> YamlMapping:
     """Return a mapping, completed by entries of the base except those with a key in `excluded`."""
     keys = {*mapping.keys, *excluded}
@@ -284,23 +341,30 @@ def _resolve_model_files(
 ) -> tuple[CellConfig, list[Finding]]:
     """Return the cell with absolute paths of existing model files, and errors about files outside the folder.
 
-    A path is relative to the folder of the cell file or base that contains the path.
+    A path is relative to the folder of the cell file, base or arm file that contains the path.
     """
-    objects = dict(config.objects)
     errors = []
-    for label, model in config.objects.items():
-        for key, path in (("urdf", model.urdf), ("mesh", model.mesh)):
-            key_path = ("objects", label, key)
-            folder = folders.get(file.find_span(key_path).source, folders[file.source])
-            if path and is_outside_path(path):
-                message = f'"{path}" must be a relative path without ".."'
+
+    def resolve(path: str, *key_path: str) -> str:
+        folder = folders.get(file.find_span(key_path).source, folders[file.source])
+        if is_outside_path(path):
+            errors.append(
+                file.make_error(key_path, "outside", f'"{path}" must be a relative path without ".."')
+            )
+        elif path and os.path.isfile(folder / path):
+            if has_outside_link(folder, path):
+                message = f'"{path}" is a link to a file outside {folder}'
                 errors.append(file.make_error(key_path, "outside", message))
-            elif path and os.path.isfile(folder / path):
-                objects[label] = objects[label].model_copy(update={key: str((folder / path).resolve())})
-                if has_outside_link(folder, path):
-                    message = f'"{path}" is a link to a file outside {folder}'
-                    errors.append(file.make_error(key_path, "outside", message))
-    return config.model_copy(update={"objects": objects}), errors
+            return str((folder / path).resolve())
+        return path
+
+    objects = {}
+    for label, model in config.objects.items():
+        urdf = resolve(model.urdf, "objects", label, "urdf")
+        mesh = resolve(model.mesh, "objects", label, "mesh")
+        objects[label] = model.model_copy(update={"urdf": urdf, "mesh": mesh})
+    arm = config.arm.model_copy(update={"urdf": resolve(config.arm.urdf, "arm", "urdf")})
+    return config.model_copy(update={"objects": objects, "arm": arm}), errors
 
 
 MAX_OVERLAP = 0.0005

@@ -1,4 +1,4 @@
-"""JSON Schemas (draft-07, for most editors) of mission, library and cell files."""
+"""JSON Schemas (draft-07, for most editors) of mission, library, cell and arm files."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TypeAlias, cast, get_origin
 
-from pydantic import TypeAdapter
+from pydantic import BaseModel, TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema, to_jsonable_python
 
 from executive.behaviours import Skills
+from executive.cell.arm_config import ArmFile
 from executive.cell.config import CellConfig
 from executive.mission import grammar
 from executive.mission.grammar import BehaviourKeys, FileKeys, LibraryKeys, MissionKeys, NodeKeys, UseKeys
@@ -81,10 +82,26 @@ def make_type_schema(declared_type: object) -> Schema:
     return TypeAdapter(cast("type[object]", declared_type)).json_schema(schema_generator=Draft07)
 
 
+def make_arm_schema() -> Schema:
+    """Return the schema of an arm file."""
+    arm = _make_model_schema(ArmFile)
+    return {"$schema": DIALECT, "title": "An arm", **arm, "definitions": arm.pop("$defs")}
+
+
 def make_cell_schema() -> Schema:
-    """Return the schema of a cell file; with `base`, other keys and all keys of detectors are optional."""
-    cell = CellConfig.model_json_schema(schema_generator=Draft07, ref_template="#/definitions/{model}")
+    """Return the schema of a cell file; with `base`, other keys and all keys of detectors are optional.
+
+    The keys of an arm file are optional in `arm`, except `limits` if `arm` names no file.
+    """
+    cell = _make_model_schema(CellConfig)
     sections = cell.pop("$defs")
+    arm = sections["ArmConfig"]
+    limits = {"required": sections["LimitsConfig"].pop("required")}
+    for section in ("FlangeConfig", "ArmSimulationConfig"):
+        del sections[section]["required"]
+    arm["required"] = ["poses_deg"]
+    arm["if"] = {"required": ["file"]}
+    arm["else"] = {"required": ["limits"], "properties": {"limits": limits}}
     required = cell.pop("required")
     detector = sections["DetectorConfig"]
     complete_detector = {"type": detector["type"], "required": detector.pop("required")}
@@ -98,6 +115,10 @@ def make_cell_schema() -> Schema:
         "else": {"required": required, "properties": {"detectors": detectors}},
         "definitions": sections,
     }
+
+
+def _make_model_schema(model: type[BaseModel]) -> Schema:
+    return model.model_json_schema(schema_generator=Draft07, ref_template="#/definitions/{model}")
 
 
 def make_value_or_reference_schema(*alternatives: Schema) -> Schema:

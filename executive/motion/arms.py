@@ -1,52 +1,73 @@
-"""Supported arms: kinematics for each arm model that a cell file can name, and the check of its reach."""
+"""Kinematics of the arm of a cell, by the solver that the arm file names, and the check of the reach."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
+from typing import Protocol
 
 import numpy as np
 
 from executive.cell.arm import Goal
+from executive.cell.arm_config import ArmFile
 from executive.cell.config import CellConfig
-from executive.errors import Unreachable
+from executive.errors import InputError, Unreachable
 from executive.geometry import Array
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.iiwa14_kinematics import IIWA14_JOINT_COUNT, Iiwa14
-from executive.motion.joints import JointLimits, JointRange, Kinematics
+from executive.motion.joints import Kinematics
+from executive.plugins import list_entries
+from executive.text.findings import suggest_choice
 from executive.text.validate import KeyPath
 
-KinematicsFactory = Callable[[float, JointRange, float | None], Kinematics]
-"""Function that builds kinematics from tool length [m], joint range, and minimum link distance [m]."""
-
-ARMS_BY_URDF: Mapping[str, tuple[int, KinematicsFactory]] = {
-    "kuka_iiwa/model.urdf": (IIWA14_JOINT_COUNT, Iiwa14)
-}
-"""Number of joints and kinematics of each supported arm, by the key `arm.urdf` of cell files."""
+IK_SOLVER_GROUP = "executive.ik_solvers"
+"""Group of the entry points of the solvers that an arm file can name."""
 SAMPLING_MARGIN = 0.001
 """Addition to the margin of the cell, because only samples of a motion are checked [m]."""
 
 
+class KinematicsFactory(Protocol):
+    """A solver: function or class that builds the kinematics of an arm."""
+
+    def __call__(
+        self, arm: ArmFile, tool_length: float, min_link_distance: float | None = None
+    ) -> Kinematics:
+        """Return the kinematics of an arm with a tool.
+
+        Args:
+            arm: The arm file.
+            tool_length: Distance from the flange to the tool centre point [m].
+            min_link_distance: Minimum distance between links of the wrist [m], which may make the range of
+                the joints narrower than the limits, or None.
+
+        Raises:
+            InputError: The solver cannot solve this arm; the message begins with "it".
+        """
+
+
 def find_arm_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the key and the message of each error: unsupported arm, or wrong number of joints."""
-    if config.arm.urdf not in ARMS_BY_URDF:
-        supported_arms = ", ".join(sorted(ARMS_BY_URDF))
-        message = f'the arm model "{config.arm.urdf}" has no kinematics; supported: {supported_arms}'
-        yield ("arm", "urdf"), message
-        return
-    joint_count, _ = ARMS_BY_URDF[config.arm.urdf]
-    if config.arm.joint_count != joint_count:
-        message = (
-            f"the arm {config.arm.urdf} has {joint_count} joints, but the limits of {config.arm.joint_count} "
-            f"joints are given; write {joint_count} values for each limit and pose"
-        )
-        yield ("arm", "limits"), message
+    """Yield the key and the message of an error if the solver is not installed or cannot solve the arm."""
+    try:
+        build_kinematics(config)
+    except InputError as error:
+        yield ("arm", "solver"), str(error)
 
 
 def build_kinematics(config: CellConfig, min_link_distance: float | None = None) -> Kinematics:
-    """Return the kinematics of the arm of a cell file, with a minimum distance [m] between its links."""
-    _, factory = ARMS_BY_URDF[config.arm.urdf]
-    joint_range = JointLimits.from_config(config.arm.limits).position
-    return factory(config.tool.length, joint_range, min_link_distance)
+    """Return the kinematics of the arm of a cell file, with a minimum distance [m] between its links.
+
+    Raises:
+        InputError: The solver is not installed, or cannot solve the arm.
+    """
+    arm = config.arm
+    solvers = list_entries(IK_SOLVER_GROUP, "solver")
+    if arm.solver not in solvers:
+        hint = suggest_choice(arm.solver, solvers, "Installed solvers")
+        raise InputError(f'the solver "{arm.solver}" of the arm {arm.arm} is not installed. {hint}')
+    factory: KinematicsFactory = solvers[arm.solver].load()
+    try:
+        return factory(arm, config.tool.length, min_link_distance)
+    except InputError as error:
+        message = f'the solver "{arm.solver}" does not fit the arm {arm.arm}: {error}'
+        raise InputError(message) from error
 
 
 def build_planning_kinematics(config: CellConfig) -> Kinematics:

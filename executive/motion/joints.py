@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from executive.cell.device_config import LimitsConfig
+from executive.cell.arm_config import LimitsConfig
 from executive.geometry import Array, Pose
 
 BranchKey = tuple[float, ...]

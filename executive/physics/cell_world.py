@@ -16,58 +16,12 @@ import numpy as np
 import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
+from executive.cell.arm_config import TOOL_LINK
 from executive.cell.config import NECK_LENGTH, TOOL_RADIUS, BinConfig, CellConfig
 from executive.cell.device_config import STEP
 from executive.cell.objects import BIN_THICKNESS
 from executive.geometry import Array, Pose
-from executive.motion.iiwa14_kinematics import FLANGE_OFFSET
 from executive.physics.model_files import find_model
-
-
-@dataclass(frozen=True)
-class RobotModel:
-    """PyBullet model of an arm in which each link up to the flange has its own joint.
-
-    Link indices are those of PyBullet. The tool is the link after the link of the flange.
-
-    Attributes:
-        flange_link: Name of the link with the flange.
-        flange_offset: Distance from the origin of the flange link to the flange along the link's z axis [m].
-        max_torques: Maximum torque of each joint [Nm].
-        first_collision_link: Index of the first link that can collide with other bodies.
-        wrist_link: Index of the first link of the wrist, whose links a held object is permitted to touch.
-        self_collision_pairs: Pairs of indices of links that can collide with each other.
-        link_radius: Radius of a cylinder around the housing of each link [m].
-        ik_seed_deg: Start of the numerical inverse kinematics: positions of joints 2 and higher [degree].
-    """
-
-    flange_link: str
-    flange_offset: float
-    max_torques: tuple[float, ...]
-    first_collision_link: int
-    wrist_link: int
-    self_collision_pairs: tuple[tuple[int, int], ...]
-    link_radius: float
-    ik_seed_deg: tuple[float, ...]
-
-
-ROBOT_MODELS: Mapping[str, RobotModel] = {
-    "kuka_iiwa/model.urdf": RobotModel(
-        flange_link="lbr_iiwa_link_7",
-        flange_offset=FLANGE_OFFSET,
-        # From the data sheet, as in iiwa_description of RobotLocomotion/models.
-        max_torques=(320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0),
-        # Link 1 (index 0) only turns about the axis of the base.
-        first_collision_link=1,
-        wrist_link=5,
-        # In 1500 random poses, 121 of 131 self-collisions were between links 5 and 7 (indices 4 and 6).
-        # A long tool (index 7) also collides with the lowest links (indices 0 to 2), mostly with the first.
-        self_collision_pairs=((4, 6), (7, 0), (7, 1), (7, 2)),
-        link_radius=0.09,
-        ik_seed_deg=(30, 0, -85, 0, 65, 0),
-    )
-}
-"""Model of each supported arm, by the value of `arm.urdf` in a cell file."""
 
 
 TABLE_HEIGHT = 0.625
@@ -85,6 +39,8 @@ POSITION_A = 5
 POSITION_B = 6
 DISTANCE = 8
 NORMAL_FORCE = 9
+LINK_NAME = 12
+"""Index of the name of the link in the information about a joint of PyBullet."""
 
 
 class CellWorld:
@@ -99,7 +55,6 @@ class CellWorld:
         config: The cell file.
         client: The connection to the physics server, which identifies bodies by integers.
         arm: Body of the arm, fixed at the origin.
-        robot: Model of the arm.
         joints: Indices of the joints of the arm, which are also the indices of the links up to the flange.
         flange_index: Index of the link with the flange.
         tool_index: Index of the link of the tool, whose frame is the frame of the flange.
@@ -109,10 +64,6 @@ class CellWorld:
 
     def __init__(self, config: CellConfig, *, gui: bool = False, visuals: bool = True) -> None:
         self.config = config
-        self.robot = ROBOT_MODELS[config.arm.urdf]
-        self.joints = range(len(self.robot.max_torques))
-        self.flange_index = self.joints[-1]
-        self.tool_index = len(self.joints)
         self.client = BulletClient(pybullet.GUI if gui else pybullet.DIRECT)
         self.client.setGravity(0, 0, -9.81)
         self.client.setTimeStep(STEP)
@@ -124,8 +75,19 @@ class CellWorld:
         quaternion = self.client.getQuaternionFromEuler([0, 0, np.pi / 2])
         self.table = self.client.loadURDF(urdf, position, quaternion, useFixedBase=True, flags=flags)
         self.arm = self._load_arm(flags)
+        self._link_indices = {
+            self.client.getJointInfo(self.arm, index)[LINK_NAME].decode(): index
+            for index in range(self.client.getNumJoints(self.arm))
+        }
+        self.flange_index = self.find_link(config.arm.flange.link)
+        self.tool_index = self.find_link(TOOL_LINK)
+        self.joints = range(self.flange_index + 1)
         self.bin_bodies = {name: add_bin(self.client, bin) for name, bin in config.bins.items()}
         self.set_joint_positions(np.radians(config.arm.poses_deg["home"]))
+
+    def find_link(self, name: str) -> int:
+        """Return the index of a link of the arm, by its name in the URDF."""
+        return self._link_indices[name]
 
     def name_link(self, link: int) -> str:
         """Return the name of a link of the arm for messages, by its index."""
@@ -144,7 +106,7 @@ class CellWorld:
     def get_flange_pose(self) -> Pose:
         """Return `X_WF`, the pose of the flange."""
         state = self.client.getLinkState(self.arm, self.flange_index, computeForwardKinematics=True)
-        return Pose.of(*state[4:6]) @ Pose.of([0, 0, self.robot.flange_offset])
+        return Pose.of(*state[4:6]) @ Pose.of([0, 0, self.config.arm.flange.offset])
 
     def get_tool_pose(self) -> Pose:
         """Return `X_WT`, the pose of the tool centre point: the centre of the lip of the cup."""
@@ -172,7 +134,7 @@ class CellWorld:
             values |= {f"{part}_length": length, f"{part}_radius": radius, f"{part}_centre": centre}
             values[f"{part}_collision_length"] = length - 2 * CYLINDER_MARGIN
             values[f"{part}_collision_radius"] = radius - CYLINDER_MARGIN
-        values |= {"flange_link": self.robot.flange_link, "flange_offset": self.robot.flange_offset}
+        values |= {"flange_link": self.config.arm.flange.link, "flange_offset": self.config.arm.flange.offset}
         template = Template(Path(__file__).with_name("tool.urdf").read_text())
         text = text.replace("</robot>", template.substitute(values))
         with tempfile.TemporaryDirectory() as folder:

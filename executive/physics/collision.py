@@ -150,12 +150,14 @@ class ClearanceChecker:
     def _list_pairs(self, load: ObjectClass | None, obstacles: Sequence[tuple[str, int]]) -> list[BodyPair]:
         """Return all pairs; `obstacles` contains name and body of each obstacle."""
         world = self.world
-        robot = world.robot
+        simulation = world.config.arm.simulation
+        first_link = world.find_link(simulation.first_collision_link)
         joints = world.joints
         bodies = [("the table", world.table), *world.bin_bodies.items(), *obstacles]
-        links = range(robot.first_collision_link, world.tool_index + 1)
+        links = range(first_link, world.tool_index + 1)
         pairs = [BodyPair((world.arm, body), links, joints, body_name=name) for name, body in bodies]
-        for link_a, link_b in robot.self_collision_pairs:
+        for names in simulation.self_collision_pairs:
+            link_a, link_b = map(world.find_link, names)
             moving_joints = joints[min(link_a, link_b) + 1 : max(link_a, link_b) + 1]
             first_links = range(link_a, link_a + 1)
             pair = BodyPair((world.arm, world.arm), first_links, moving_joints, world.name_link(link_b))
@@ -170,7 +172,7 @@ class ClearanceChecker:
                 bin = world.config.bins.get(body_name)
                 support_height = (bin.position[2] if bin else 0.0) + BIN_THICKNESS + SUPPORT_TOLERANCE
             pairs.append(BodyPair((load_body, body), range(-1, 0), joints, body_name, name, support_height))
-        lower_links = range(robot.first_collision_link, robot.wrist_link)
+        lower_links = range(first_link, world.find_link(simulation.wrist_link))
         lower_joints = joints[lower_links.start + 1 :]
         return [*pairs, BodyPair((world.arm, load_body), lower_links, lower_joints, load_name=name)]
 
@@ -201,7 +203,7 @@ class ClearanceChecker:
         client.resetJointStatesMultiDof(world.arm, range(len(q)), [[angle] for angle in q])
         if load is not None:
             flange = client.getLinkState(world.arm, world.flange_index, computeForwardKinematics=True)[4:6]
-            offset = world.robot.flange_offset + world.config.tool.length + load.height / 2
+            offset = world.config.arm.flange.offset + world.config.tool.length + load.height / 2
             load_pose = client.multiplyTransforms(*flange, [0, 0, offset], [0, 0, 0, 1])
             client.resetBasePositionAndOrientation(self._get_load_body(load), *load_pose)
 
@@ -221,7 +223,12 @@ class ClearanceChecker:
         lengths = np.linalg.norm(links, axis=1)
         # The link of a joint counts only with its component perpendicular to the axis of the joint.
         perpendicular_lengths = np.linalg.norm(np.cross(axes, links), axis=1)
-        return perpendicular_lengths + lengths[::-1].cumsum()[::-1] - lengths + world.robot.link_radius
+        return (
+            perpendicular_lengths
+            + lengths[::-1].cumsum()[::-1]
+            - lengths
+            + world.config.arm.simulation.link_radius
+        )
 
     def _place_obstacles(self, obstacles: Sequence[Obstacle]) -> list[tuple[str, int]]:
         """Represent the obstacles by cylinders on the table; return name and body of each obstacle."""

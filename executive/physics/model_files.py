@@ -53,11 +53,11 @@ def find_model(name: str) -> Path:
     raise InputError(f"there is no model {name}, neither beside the cell file nor in pybullet_data")
 
 
-def read_urdf(path: Path) -> Element:
-    """Return the root element of the URDF of an object; links joined by fixed joints become one link.
+def read_robot(path: Path) -> Element:
+    """Return the root element of a URDF.
 
     Raises:
-        InputError: The file is no URDF, refers to a file outside of its folder, or has an invalid mesh.
+        InputError: The file is no URDF.
     """
     try:
         root = ElementTree.parse(path).getroot()
@@ -65,6 +65,16 @@ def read_urdf(path: Path) -> Element:
         raise InputError(f"the model {path.name} is no URDF: {error}") from None
     if root.tag != "robot":
         raise InputError(f"the model {path.name} is no URDF: its root is <{root.tag}>, not <robot>")
+    return root
+
+
+def read_urdf(path: Path) -> Element:
+    """Return the root element of the URDF of an object; links joined by fixed joints become one link.
+
+    Raises:
+        InputError: The file is no URDF, refers to a file outside of its folder, or has an invalid mesh.
+    """
+    root = read_robot(path)
     for element in root.iter():
         if element.tag.startswith("{"):
             raise InputError(f"the model {path.name} has an XML namespace, {element.tag}; remove it")

@@ -11,6 +11,7 @@ from pathlib import Path
 import yaml
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+from executive.cell.arm_config import DEFAULT_ARM_FILE
 from executive.cell.config import CellConfig
 from executive.errors import InputError, explain_os_errors
 from executive.events import RunStarted
@@ -19,6 +20,7 @@ from executive.mission.load import LoadedMission, load_mission
 from executive.mission.outline import OutlineNode
 from executive.skill import Skill
 from executive.text.findings import Source
+from executive.text.yaml_files import get_shipped_folder
 
 FOLDER_ADVICE = "name another folder with --runs DIR"
 """Advice if a run directory cannot be made or written."""
@@ -192,8 +194,11 @@ def read_cell(path: Path) -> CellConfig:
         InputError: The cell file cannot be read.
     """
     try:
-        return CellConfig(**yaml.safe_load((path / "cell.yaml").read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError, yaml.YAMLError) as error:
+        content = yaml.safe_load((path / "cell.yaml").read_text(encoding="utf-8"))
+        # Earlier records contain only model, limits and poses of their arm, which was always the default arm.
+        default_arm = yaml.safe_load((get_shipped_folder() / DEFAULT_ARM_FILE).read_text(encoding="utf-8"))
+        return CellConfig(**{**content, "arm": {**default_arm, **content["arm"]}})
+    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError) as error:
         raise InputError(f'cannot read the cell file in the run directory "{path}": {error}') from error
 
 

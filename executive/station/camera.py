@@ -86,7 +86,7 @@ class CellCamera:
         # T is the frame of the tool, F the frame of the flange.
         self._X_TF = Pose.of((0.0, 0.0, -config.tool.length))
         self._size = (self.config.width, self.config.height)
-        self._link_radius = config.arm.link_radius
+        self._link_radius = config.arm.simulation.link_radius
         self._load_radius = max(section.radius for section in config.objects.values()) + MAX_LOAD_OFFSET
         self._load_height = config.max_object_height
         heights = (0.0, config.max_pile_height)

@@ -28,6 +28,10 @@ POINTS_PER_SIDE = 9
 """Number of positions of the flattest object along each side of the workspace for the check of occlusion."""
 
 
+MAX_KINEMATICS_ERROR = 1e-4
+"""Maximum difference between the kinematics of the solver and of the model, in position [m] and rotation."""
+
+
 @dataclass(frozen=True)
 class CellChecker:
     """Checks cell files of one kind; implements `executive.mission.load.CellChecker`.
@@ -92,12 +96,30 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     partial views must see it from all its scan poses together.
     """
     with contextlib.closing(ClearanceChecker(config)) as checker:
+        if error := _describe_wrong_solver(config, checker.world):
+            yield ("arm", "solver"), error
+            return
         for name, pose in config.arm.poses_deg.items():
             if violation := checker.find_violation(np.radians(pose)):
                 margin = f"the minimum clearance is {config.motion.margin:.3f} m"
                 message = f'the pose "{name}" brings {violation}; {margin}'
                 yield ("arm", "poses_deg", name), message
         yield from _find_occluding_poses_and_bins(config, checker.world)
+
+
+def _describe_wrong_solver(config: CellConfig, world: CellWorld) -> str:
+    """Return a message if the kinematics of the solver differ from the model of the arm, or ""."""
+    lower, upper = np.radians(config.arm.limits.position_ranges_deg).T
+    q = lower + 0.7 * (upper - lower)  # No joint is at 0, so that the axis of each joint matters.
+    world.set_joint_positions(q)
+    difference = world.get_tool_pose().inverse() @ build_kinematics(config).compute_tool_pose(q)
+    distance = float(np.linalg.norm(difference.position))
+    if max(distance, np.abs(difference.rotation - np.eye(3)).max()) < MAX_KINEMATICS_ERROR:
+        return ""
+    return (
+        f'the solver "{config.arm.solver}" does not describe the model {config.arm.urdf}: its tool is '
+        f"{distance:.3f} m away from the tool of the model, or turned; correct urdf, flange or solver"
+    )
 
 
 class _StillRobot:

@@ -9,7 +9,12 @@ from click.testing import CliRunner
 
 from executive.behaviours import load_skills
 from executive.cli.main import main
-from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
+from executive.mission.schema import (
+    make_arm_schema,
+    make_cell_schema,
+    make_library_schema,
+    make_mission_schema,
+)
 from executive.tree.node import load_control_nodes
 
 
@@ -19,6 +24,7 @@ from executive.tree.node import load_control_nodes
         ([], make_mission_schema(load_skills(), load_control_nodes())),
         (["--library"], make_library_schema(load_skills(), load_control_nodes())),
         (["--cell"], make_cell_schema()),
+        (["--arm"], make_arm_schema()),
     ],
 )
 def test_the_schema_asked_for_is_printed(options: list[str], expected: object) -> None:

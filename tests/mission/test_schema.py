@@ -12,7 +12,12 @@ from jsonschema import Draft7Validator
 from referencing import Registry
 
 from executive.behaviours import load_skills
-from executive.mission.schema import make_cell_schema, make_library_schema, make_mission_schema
+from executive.mission.schema import (
+    make_arm_schema,
+    make_cell_schema,
+    make_library_schema,
+    make_mission_schema,
+)
 from executive.skill import Skill
 from executive.text.findings import Source
 from executive.text.yaml_files import get_shipped_folder, parse_yaml
@@ -22,12 +27,14 @@ MISSIONS = get_shipped_folder()
 SCHEMAS: dict[str, tuple[Callable[[], dict[str, Any]], str]] = {
     "mission.schema.json": (lambda: make_mission_schema(load_skills(), load_control_nodes()), ""),
     "cells/cell.schema.json": (make_cell_schema, " --cell"),
+    "arms/arm.schema.json": (make_arm_schema, " --arm"),
 }
 """The generated files: how each is made, and the option that prints it."""
 FILES = {
     "mission.schema.json": "*.yaml",
     "library/library.schema.json": "library/*.yaml",
     "cells/cell.schema.json": "cells/*.yaml",
+    "arms/arm.schema.json": "arms/*.yaml",
 }
 """The shipped schemas, and the files each is for."""
 
@@ -61,6 +68,7 @@ def test_the_shipped_schema_is_the_generated_one(name: str) -> None:
         make_mission_schema(load_skills(), load_control_nodes()),
         make_library_schema(load_skills(), load_control_nodes()),
         make_cell_schema(),
+        make_arm_schema(),
     ],
     ids=FILES,
 )

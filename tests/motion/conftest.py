@@ -1,24 +1,21 @@
-"""The iiwa of the shipped overhead cell, without a simulator."""
+"""The arm of the shipped overhead cell, without a simulator."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-import yaml
+from joint_states import ARM, CONFIG
 
 from executive.cell.config import CellConfig
 from executive.geometry import Array
-from executive.motion.arms import build_kinematics
 from executive.motion.joints import JointLimits, Kinematics
 from executive.motion.planner import Planner
 from executive.motion.trajectory import Connector
 
 
 @pytest.fixture(scope="session")
-def config(missions: Path) -> CellConfig:
-    return CellConfig(**yaml.safe_load((missions / "cells" / "overhead.yaml").read_text(encoding="utf-8")))
+def config() -> CellConfig:
+    return CONFIG
 
 
 @pytest.fixture(scope="session")
@@ -27,8 +24,8 @@ def limits(config: CellConfig) -> JointLimits:
 
 
 @pytest.fixture(scope="session")
-def kinematics(config: CellConfig, limits: JointLimits) -> Kinematics:
-    return build_kinematics(config)
+def kinematics() -> Kinematics:
+    return ARM
 
 
 @pytest.fixture(scope="session")

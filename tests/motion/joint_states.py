@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from executive.cell.arm import Goal, JointState
 from executive.geometry import Array
+from executive.mission.cell_file import load_cell
+from executive.motion.arms import build_kinematics
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.joints import JointLimits, JointRange, Kinematics
+from executive.motion.joints import JointLimits, Kinematics
 from executive.motion.trajectory import MotionPiece
+from executive.text.yaml_files import get_shipped_folder
 
-POSITION_LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])
-"""Of an iiwa 14 [rad]."""
-LIMITS = JointLimits(
-    position=JointRange(-POSITION_LIMIT, POSITION_LIMIT),
-    velocity=np.radians([85, 85, 100, 75, 130, 135, 135]),
-    acceleration=np.array([8.57, 8.57, 8.74, 11.36, 12.23, 15.72, 15.72]),
-    jerk=np.array([85.7, 85.7, 87.4, 113.6, 122.3, 157.2, 157.2]),
+CONFIG = load_cell(get_shipped_folder() / "cells" / "overhead.yaml")
+ARM = build_kinematics(CONFIG)
+LIMITS = replace(
+    JointLimits.from_config(CONFIG.arm.limits),
     stop_acceleration=np.full(7, 20.0),
     stop_jerk=np.full(7, 300.0),
 )
-"""Of an iiwa 14, for tests whose examples hypothesis finds."""
+"""Limits of `ARM` for tests whose examples hypothesis finds."""
 
 SOONER = 1e-3
 """Time between sampled states [s]."""

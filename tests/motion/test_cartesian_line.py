@@ -7,14 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from joint_states import LIMITS, SOONER, passed, peaks, tool_velocities
+from joint_states import ARM, LIMITS, SOONER, passed, peaks, tool_velocities
 
 from executive.cell.arm import Goal
 from executive.geometry import Array
 from executive.motion.configurations import CartesianLine, find_configuration_pairs, solve_vertical_waypoints
-from executive.motion.iiwa14_kinematics import Iiwa14
-
-ARM = Iiwa14(0.12, LIMITS.position)
 
 
 class Descent(NamedTuple):

@@ -7,23 +7,24 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from joint_states import LIMITS
+from joint_states import ARM, CONFIG, LIMITS
 
 from executive.cell.arm import Goal
 from executive.errors import Unreachable
 from executive.geometry import Array
+from executive.motion.arms import build_kinematics
 from executive.motion.configurations import find_configuration_pairs, find_vertical_waypoints
-from executive.motion.iiwa14_kinematics import Iiwa14
-from executive.motion.joints import JointRange
+from executive.motion.joints import Kinematics
 
-ARM = Iiwa14(0.12, LIMITS.position)
 START = np.radians([38, 33, 0, -88, 0, 59, 20])
 places = st.tuples(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.02, 0.1))
 yaws = st.none() | st.floats(-math.pi, math.pi)
 
 
-def arm_within(limit: Array) -> Iiwa14:
-    return Iiwa14(0.12, JointRange(-limit, limit))
+def arm_within(limit: Array) -> Kinematics:
+    limits = CONFIG.arm.limits.model_copy(update={"position_deg": tuple(np.degrees(limit).tolist())})
+    arm = CONFIG.arm.model_copy(update={"limits": limits})
+    return build_kinematics(CONFIG.model_copy(update={"arm": arm}))
 
 
 @given(places, yaws, st.floats(0.0, 0.15))

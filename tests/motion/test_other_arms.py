@@ -8,8 +8,8 @@ from joint_states import passed, peaks
 from six_joint_arm import SixJointArm
 
 from executive.cell.arm import Goal, Task
+from executive.cell.arm_config import LimitsConfig
 from executive.cell.config import CellConfig
-from executive.cell.device_config import ArmConfig, LimitsConfig
 from executive.cell.objects import ObjectClass, Obstacle
 from executive.motion.joints import JointLimits, Kinematics
 from executive.motion.planner import Planner
@@ -31,8 +31,8 @@ HOME = np.radians([20.0, -10.0, 110.0, 0.0, 80.0, 0.0])
 
 @pytest.fixture(scope="module")
 def six(config: CellConfig) -> CellConfig:
-    arm = ArmConfig(urdf="six", limits=LIMITS, poses_deg={"home": tuple(np.degrees(HOME).tolist())})
-    return config.model_copy(update={"arm": arm})
+    changes = {"limits": LIMITS, "poses_deg": {"home": tuple(np.degrees(HOME).tolist())}}
+    return config.model_copy(update={"arm": config.arm.model_copy(update=changes)})
 
 
 @pytest.fixture(scope="module")

@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import passed, peaks, tool_velocities
 
+from executive.arms.iiwa14 import interpolate_max_joint_6_angle
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass, Obstacle
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.iiwa14_kinematics import interpolate_max_joint_6_angle
 from executive.motion.planner import MAX_CHECK_SPACING, Planner
 from executive.motion.trajectory import Trajectory
 

@@ -193,7 +193,7 @@ def move_arm_randomly(world: World, camera: CameraConfig, rng: Generator) -> boo
     # The inverse kinematics starts from a pose that is closer to all targets than the scan poses.
     position = rng.uniform((0.25, -0.50, 0.05), (0.72, 0.50, 0.40))
     azimuth = math.atan2(position[1], position[0])
-    world.set_joint_positions([azimuth, *map(math.radians, world.robot.ik_seed_deg)])
+    world.set_joint_positions([azimuth, *map(math.radians, world.config.arm.simulation.sampling_pose_deg)])
     _move_tool(world, make_tool_down_pose(position, azimuth + rng.uniform(-1.2, 1.2)))
     return bool(rng.random() < 0.3)
 
@@ -301,7 +301,8 @@ def simulate_fall(config: CellConfig, objects: Sequence[TrueObject]) -> list[Tru
 
 def _move_tool(world: World, X_WT: Pose) -> None:
     """Move the tool near `X_WT`; the accuracy is unimportant, because labels use the actual camera pose."""
-    X_WL = X_WT @ Pose.of([0, 0, -(world.robot.flange_offset + world.config.tool.length)])
+    tool_offset = world.config.arm.flange.offset + world.config.tool.length
+    X_WL = X_WT @ Pose.of([0, 0, -tool_offset])
     for _ in range(3):  # X_WL is the pose of the flange link
         q = world.client.calculateInverseKinematics(
             world.arm, world.flange_index, X_WL.position, X_WL.quaternion,

@@ -1,4 +1,4 @@
-"""Models of objects: mesh, silhouette, PyBullet body, pose and mass, and check of the declared size."""
+"""Models of objects: mesh, silhouette, PyBullet body, pose and mass; check of all models of a cell file."""
 
 from __future__ import annotations
 
@@ -19,14 +19,17 @@ import pybullet_data
 from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
+from executive.cell.arm_config import TOOL_LINK, ArmFile
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import STEP
 from executive.cell.frame import Box
+from executive.physics.model_files import read_robot
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.physics import model_files
 from executive.physics.model_files import find_model, make_rotation
 from executive.processes import build_command
+from executive.text.findings import suggest_choice
 from executive.text.validate import KeyPath
 from executive.text.yaml_files import get_shipped_folder
 
@@ -160,6 +163,8 @@ def compute_mass(config: ObjectConfig) -> float:
 def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message for each model of a cell file that is missing, invalid, or of a wrong size.
 
+    The model of the arm must contain the links that the arm file names.
+
     A child process tries each model that is not shipped with the executive or PyBullet; this process reads
     the model afterwards, because reading may take very long.
     """
@@ -173,6 +178,30 @@ def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
             yield from _find_wrong_sizes(label, object_config)
         except InputError as error:
             yield ("objects", label, "mesh" if object_config.mesh else "urdf"), str(error)
+    yield from _find_missing_links(config.arm)
+
+
+def _find_missing_links(arm: ArmFile) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for each link that the arm file names and the model of the arm lacks."""
+    try:
+        links = [link.get("name", "") for link in read_robot(find_model(arm.urdf)).findall("link")]
+    except InputError as error:
+        yield ("arm", "urdf"), str(error)
+        return
+    simulation = arm.simulation
+    named_links: list[tuple[KeyPath, str]] = [
+        (("flange", "link"), arm.flange.link),
+        (("simulation", "first_collision_link"), simulation.first_collision_link),
+        (("simulation", "wrist_link"), simulation.wrist_link),
+    ]
+    for index, pair in enumerate(simulation.self_collision_pairs):
+        named_links += [
+            (("simulation", "self_collision_pairs", index), link) for link in pair if link != TOOL_LINK
+        ]
+    for keys, link in named_links:
+        if link not in links:
+            hint = suggest_choice(link, links, "Links of the model")
+            yield ("arm", *keys), f'the model {arm.urdf} of the arm {arm.arm} has no link "{link}". {hint}'
 
 
 def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPath, str]]:

@@ -138,7 +138,7 @@ class World(CellWorld):
         self.log.append(world_log.JOINT_TARGETS, time, *q)
         self.client.setJointMotorControlArray(
             self.arm, self.joints, pybullet.POSITION_CONTROL, targetPositions=q.tolist(),
-            forces=self.robot.max_torques, positionGains=[1.0] * len(q),
+            forces=self.config.arm.effort, positionGains=[1.0] * len(q),
         )  # fmt: skip
 
     def cast_ray(self, origin: Array, direction: Array) -> Array | None:

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from executive.arms.iiwa14 import Iiwa14, interpolate_max_joint_6_angle
 from executive.cell.arm import Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.motion.arms import build_kinematics
-from executive.motion.iiwa14_kinematics import Iiwa14, interpolate_max_joint_6_angle
 from executive.physics.collision import ClearanceChecker
 from tests.motion.joint_states import reach
 

@@ -79,8 +79,10 @@ def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wri
 
 
 @pytest.mark.parametrize("kind", [SIM_CELL_KIND, FakeCell])
-def test_an_arm_without_kinematics_is_a_finding_with_the_supported_arms(overhead: CellConfig, kind) -> None:
-    config = overhead.model_copy(update={"arm": overhead.arm.model_copy(update={"urdf": "r2d2.urdf"})})
+def test_an_unknown_solver_is_a_finding_with_the_installed_solvers(
+    overhead: CellConfig, kind
+) -> None:
+    config = overhead.model_copy(update={"arm": overhead.arm.model_copy(update={"solver": "r2d2"})})
     ((keys, message),) = kind.check(config, Path())
-    assert keys == ("arm", "urdf")
-    assert message.endswith("supported: kuka_iiwa/model.urdf")
+    assert keys == ("arm", "solver")
+    assert message.endswith("Installed solvers: iiwa14.")

@@ -20,20 +20,19 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 
-from executive.errors import Unreachable
+from executive.cell.arm_config import ArmFile
+from executive.errors import InputError, Unreachable
 from executive.geometry import Array, Pose, format_point
-from executive.motion.joints import BranchKey, JointRange, wrap_angles
+from executive.motion.joints import BranchKey, JointLimits, JointRange, wrap_angles
 
-IIWA14_JOINT_COUNT = 7
+JOINT_COUNT = 7
 """Number of joints of the arm."""
-FLANGE_OFFSET = 0.045
-"""Distance from the origin of link 7 to the outer face of the flange, along the z axis of the link [m]."""
 
-# Lengths between base, shoulder, elbow, wrist and flange [m], from pybullet_data kuka_iiwa/model.urdf.
+# Lengths between base, shoulder, elbow, wrist and link 7 [m], from pybullet_data kuka_iiwa/model.urdf.
 SHOULDER_HEIGHT = 0.36
 UPPER_ARM = 0.42
 FOREARM = 0.40
-WRIST_TO_FLANGE = 0.081 + FLANGE_OFFSET
+WRIST_TO_LINK_7 = 0.081
 
 FLIPS = np.array([[s, e, w] for s in (1, -1) for e in (1, -1) for w in (1, -1)])
 """Signs of joints 2, 4 and 6 in the eight solutions of one redundancy angle `(8, 3)`."""
@@ -65,15 +64,14 @@ def interpolate_max_joint_6_angle(min_link_distance: float) -> float:
 class Iiwa14:
     """Kinematics of an iiwa 14; implements `executive.motion.joints.Kinematics`.
 
-    Args:
-        tool_length: Distance from the flange to the tool centre point [m].
-        joint_range: Range according to the data sheet, `n` = 7; `min_link_distance` makes it narrower.
-        min_link_distance: Minimum distance between links 5 and 7 [m], which limits joint 6, or None.
+    The constructor implements `executive.motion.arms.KinematicsFactory`: `min_link_distance` is the distance
+    between links 5 and 7, which limits joint 6.
     """
 
-    def __init__(
-        self, tool_length: float, joint_range: JointRange, min_link_distance: float | None = None
-    ) -> None:
+    def __init__(self, arm: ArmFile, tool_length: float, min_link_distance: float | None = None) -> None:
+        if arm.joint_count != JOINT_COUNT:
+            raise InputError(f"it solves arms with {JOINT_COUNT} joints, not {arm.joint_count}")
+        joint_range = JointLimits.from_config(arm.limits).position
         lower = joint_range.lower.copy()
         upper = joint_range.upper.copy()
         if min_link_distance is not None:
@@ -81,7 +79,7 @@ class Iiwa14:
             lower[5] = max(lower[5], -max_angle)
             upper[5] = min(upper[5], max_angle)
         self.joint_range = JointRange(lower, upper)
-        self._wrist_to_tool = WRIST_TO_FLANGE + tool_length
+        self._wrist_to_tool = WRIST_TO_LINK_7 + arm.flange.offset + tool_length
         cos4 = math.cos(max(-lower[3], upper[3]))
         # Law of cosines in the triangle of shoulder, elbow and wrist.
         self._min_wrist_distance = math.sqrt(UPPER_ARM**2 + FOREARM**2 + 2 * UPPER_ARM * FOREARM * cos4)
@@ -139,7 +137,7 @@ class Iiwa14:
         """Return the solutions for all flips and evenly spaced redundancy angles, that of `q_seed` first."""
         offsets = np.radians(np.arange(0.0, 360.0, math.degrees(angle_step)))
         angles = self.find_branch(q_seed)[1] + offsets
-        solutions = self._solve_angles([X_WT], angles).reshape(-1, IIWA14_JOINT_COUNT)
+        solutions = self._solve_angles([X_WT], angles).reshape(-1, JOINT_COUNT)
         return solutions, list(product(range(len(FLIPS)), angles.tolist()))
 
     def _solve_angles(self, poses: Sequence[Pose], angles: Array) -> Array:
@@ -165,7 +163,7 @@ class Iiwa14:
         z4 = -np.sin(q4) * x3 + np.cos(q4) * z3
         R_47 = np.stack([x4, y3, z4], axis=-2) @ np.array([pose.rotation for pose in poses])[:, None]
 
-        unflipped_qs = np.empty((len(poses), 1, len(angles), IIWA14_JOINT_COUNT))
+        unflipped_qs = np.empty((len(poses), 1, len(angles), JOINT_COUNT))
         unflipped_qs[:, 0, :, :3] = _find_zyz_angles(x3, y3, z3)
         unflipped_qs[..., 3] = q4
         unflipped_qs[:, 0, :, 4:] = _find_zyz_angles(*np.moveaxis(R_47, -1, 0))

@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pybullet_utils.bullet_client import BulletClient
 
+from executive.arms.iiwa14 import Iiwa14
 from executive.geometry import Pose
-from executive.motion.iiwa14_kinematics import Iiwa14
-from executive.motion.joints import JointRange
+from executive.mission.cell_file import load_cell
+from executive.text.yaml_files import get_shipped_folder
 
 LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])
-ARM = Iiwa14(0.12, JointRange(-LIMIT, LIMIT))
+ARM = Iiwa14(load_cell(get_shipped_folder() / "cells" / "overhead.yaml").arm, 0.12)
 postures = st.tuples(*(st.floats(-limit, limit) for limit in LIMIT)).map(np.array)
 
 

@@ -1,0 +1,157 @@
+"""Data of an arm: content of an arm file, and the section `arm` of a cell file, which an arm file completes.
+
+Each field is a key of `missions/arms/*.yaml`, in SI units. Values of keys that end in `_deg` are in degrees.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from executive.cell.device_config import Angle, Distance, Length, Name, Section
+
+DEFAULT_ARM_FILE = "arms/iiwa14.yaml"
+"""Shipped arm file of cells that name none: the cell files of earlier versions are for this arm."""
+TOOL_LINK = "tool"
+"""Name of the link of the tool in an arm file and in the simulated arm."""
+MIN_JOINT_RANGE = 2.0
+"""Minimum range of a joint's positions [degree]; a joint with a smaller range is regarded as fixed."""
+Speed = Annotated[float, Field(ge=1, le=1000)]
+"""Joint velocity [degree/s]; the fastest arms reach 1000 degree/s."""
+Acceleration = Annotated[float, Field(ge=0.1, le=1000)]
+"""Joint acceleration [rad/s²]; at 0.1 rad/s², a motion takes minutes; the fastest arms reach 100 rad/s²."""
+Jerk = Annotated[float, Field(ge=1, le=1e5)]
+"""Joint jerk [rad/s³]; the minimum reaches 0.1 rad/s² in 0.1 s, the maximum 1000 rad/s² in 0.01 s."""
+Torque = Annotated[float, Field(ge=0.1, le=1e5)]
+"""Joint torque [Nm], from the torque of a servo for models to that of the arms that lift cars."""
+LinkName = Annotated[str, Field(min_length=1, max_length=200)]
+"""Name of a link in the URDF."""
+
+
+class LimitsConfig(Section):
+    """Joint limits of the arm, one value for each joint, and their source."""
+
+    source: str
+    """Source of the limits, for instance a data sheet."""
+    min_position_deg: tuple[Angle, ...] = ()
+    """Minimum joint positions [degree]; if empty, the negatives of `position_deg`."""
+    position_deg: tuple[Angle, ...] = Field(min_length=1)
+    """Maximum joint positions [degree]."""
+    velocity_deg: tuple[Speed, ...]
+    """Maximum joint velocities [degree/s]."""
+    acceleration: tuple[Acceleration, ...]
+    """Maximum joint accelerations [rad/s²]."""
+    jerk: tuple[Jerk, ...]
+    """Maximum joint jerks [rad/s³]."""
+    stop_acceleration: tuple[Acceleration, ...]
+    """Maximum joint accelerations while the arm brakes [rad/s²]."""
+    stop_jerk: tuple[Jerk, ...]
+    """Maximum joint jerks while the arm brakes [rad/s³]."""
+
+    @property
+    def position_ranges_deg(self) -> tuple[tuple[float, float], ...]:
+        """Minimum and maximum position of each joint [degree]."""
+        lower = self.min_position_deg or tuple(-upper for upper in self.position_deg)
+        return tuple(zip(lower, self.position_deg, strict=True))
+
+    @model_validator(mode="after")
+    def _check_joints(self) -> LimitsConfig:
+        count = len(self.position_deg)
+        for name, values in self:
+            is_default = name == "min_position_deg" and not values
+            if isinstance(values, tuple) and len(values) != count and not is_default:
+                problem = f"has {len(values)} values in {name} and {count} in position_deg"
+                raise ValueError(f"{problem}; both need one value for each joint")
+        for joint, (lower, upper) in enumerate(self.position_ranges_deg, start=1):
+            if upper - lower < MIN_JOINT_RANGE:
+                problem = f"allows joint {joint} the positions {lower:g} to {upper:g} degrees"
+                limit = f"the range of a joint must be at least {MIN_JOINT_RANGE:g} degrees"
+                raise ValueError(f"{problem}; {limit}")
+        return self
+
+
+class FlangeConfig(Section):
+    """The flange, on which the tool is mounted; its z axis points out of the arm."""
+
+    link: LinkName
+    """Link of the URDF whose z axis is the z axis of the flange."""
+    offset: Distance = 0.0
+    """Distance from the origin of the link to the flange along the z axis [m]."""
+
+
+class ArmSimulationConfig(Section):
+    """Properties of the simulated arm that its URDF does not contain."""
+
+    source: str
+    """Source of the values."""
+    first_collision_link: LinkName
+    """First link that can collide with other bodies; the links before it stay in their place."""
+    wrist_link: LinkName
+    """First link of the wrist, whose links a held object is permitted to touch."""
+    self_collision_pairs: tuple[tuple[LinkName, LinkName], ...] = ()
+    """Pairs of links that can collide with each other; `tool` is the tool."""
+    link_radius: Length
+    """Radius of a cylinder around the housing of each link [m]."""
+    sampling_pose_deg: tuple[Angle, ...]
+    """Joint positions, without joint 1, from which the numerical inverse kinematics of data sets starts
+    [degree]."""
+
+
+class ArmFile(Section):
+    """An arm: model, limits and solver. All values are of the arm alone, without its place in a cell."""
+
+    arm: Name
+    """Name of the arm."""
+    urdf: str = Field(min_length=1)
+    """Path of the URDF, relative to this file or to pybullet_data. Each link from the base to the flange has
+    its own joint."""
+    flange: FlangeConfig
+    """Flange of the arm."""
+    limits: LimitsConfig
+    """Joint limits of the arm."""
+    effort: tuple[Torque, ...]
+    """Maximum joint torques [Nm]."""
+    solver: str
+    """Inverse kinematics of the arm: the name of an entry point of the group `executive.ik_solvers`."""
+    simulation: ArmSimulationConfig
+    """Properties of the simulated arm that its URDF does not contain."""
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints."""
+        return len(self.limits.position_deg)
+
+    @model_validator(mode="after")
+    def _check_counts(self) -> ArmFile:
+        sampling_pose = self.simulation.sampling_pose_deg
+        for name, values, count in (
+            ("effort", self.effort, self.joint_count),
+            ("simulation.sampling_pose_deg", sampling_pose, self.joint_count - 1),
+        ):
+            if len(values) != count:
+                problem = f"has {len(values)} values in {name} and limits of {self.joint_count} joints"
+                raise ValueError(f"{problem}; {name} needs {count} values")
+        return self
+
+
+class ArmConfig(ArmFile):
+    """The arm of a cell: the content of an arm file, and the named poses of the arm in this cell."""
+
+    file: str = Field("", exclude=True)  # The loader inserts the content of the file.
+    """Path of an arm file, relative to the cell file or to the shipped missions. The other keys except
+    `poses_deg` are those of the arm file, unless they are given here. Without a file, the arm is that of
+    `arms/iiwa14.yaml`, and `limits` must be given."""
+    poses_deg: dict[Name, tuple[Angle, ...]] = Field(min_length=1)
+    """Named joint configurations, one position for each joint [degree]; a run starts in `home`."""
+
+    @model_validator(mode="after")
+    def _check_poses(self) -> ArmConfig:
+        if "home" not in self.poses_deg:
+            raise ValueError(f'needs a pose named "home"; there are: {", ".join(self.poses_deg)}')
+        for name, pose in self.poses_deg.items():
+            if len(pose) != self.joint_count:
+                angles = f'{len(pose)} angles in the pose "{name}"'
+                limits = f"limits of {self.joint_count} joints"
+                raise ValueError(f"has {angles} and {limits}; each needs one value for each joint")
+        return self
