@@ -36,7 +36,6 @@ from executive.perception.detectors.cell_detector import build_cell_detectors
 from executive.perception.detectors.detector_registry import KindMaker, make_installed_kind
 from executive.perception.detectors.simulated import TruthDetector
 from executive.perception.localization import CellLocalizer
-from executive.physics.collision import ClearanceChecker
 from executive.station.audit import count_outcomes
 from executive.station.border import Border
 from executive.station.camera import CellCamera, Robot
@@ -255,6 +254,9 @@ def _build_planner(
     if is_without_physics:
         plan_straight = partial(plan_straight_motion, config, kinematics)
         return PlannerService(plan_straight, clock, planning_time, emit)
+    # The import loads PyBullet, which takes 0.2 s; a cell without physics and a replay do not need it.
+    from executive.physics.collision import ClearanceChecker
+
     checker = ClearanceChecker(config)
     planner = Planner(config, checker.check, kinematics)
     return PlannerService(planner.plan, clock, planning_time, emit, checker.close)

@@ -8,32 +8,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 
-from executive.cell.config import CellConfig, DetectorConfig
-from executive.cell.device_config import CameraConfig
-from executive.cell.devices import TrueObject
-from executive.cell.frame import Detection, Frame
+from executive.cell.devices import TrueObject, TrueWorld, CameraImage, DriverOptions
+from executive.cell.frame import Detection
 from executive.cell.objects import UNKNOWN_LABEL
-from executive.cell.protocols import Clock
 from executive.drivers.sim.camera import Image, SimCamera
-from executive.drivers.sim.cell import SimCell
+from executive.cell.config import CellConfig
+from executive.drivers.sim.driver import SimDriver
+from executive.station.station import Station
 from executive.drivers.sim.models import compute_bounding_box, load_mesh
 from executive.drivers.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.perception.camera_model import NEAR_PLANE, project
-from executive.perception.detectors.requests import PendingSearch
-
-ORACLE_CONFIDENCE = 0.9
-"""Confidence of all detections of an oracle."""
+from executive.perception.detectors.simulated import TruthDetector
 
 
 class WorldAccess:
@@ -107,17 +101,6 @@ class WorldAccess:
 
 
 @dataclass(frozen=True, eq=False)
-class TrueFrame(Frame):
-    """A frame with ground truth: the true detections of its objects.
-
-    Attributes:
-        true_detections: Detections of all objects with a class whose box centre no other object occludes.
-    """
-
-    true_detections: tuple[Detection, ...]
-
-
-@dataclass(frozen=True, eq=False)
 class _Outline:
     """Outline of an object in an image.
 
@@ -140,7 +123,7 @@ class _Outline:
 
 
 class TruthCamera(SimCamera):
-    """A simulated camera whose frames contain ground truth: the true detections.
+    """A simulated camera whose frames contain the true detections: no other object occludes their centres.
 
     Images are black unless `renders_images` is True or the camera measures depth.
     """
@@ -149,9 +132,9 @@ class TruthCamera(SimCamera):
         super().__init__(world, *args, **options)
         self._renders_images = renders_images
 
-    def capture(self) -> TrueFrame:
-        """Capture an image and return the frame with its true detections."""
-        return TrueFrame(**vars(super().capture()), true_detections=self._find_true_detections())
+    def capture(self) -> CameraImage:
+        """Capture and return an image with its true detections."""
+        return super().capture()._replace(true_detections=self._find_true_detections())
 
     def _capture_images(self) -> tuple[Image, Array | None]:
         if self._renders_images or self.config.depth:
@@ -168,70 +151,33 @@ class TruthCamera(SimCamera):
                 pixels = project(camera_matrix, X_WC, vertices)
                 outlines.append(_Outline(label, pixels, float(distances.mean())))
         return tuple(
-            Detection(outline.label, ORACLE_CONFIDENCE, compute_bounding_box(outline.pixels))
+            Detection(outline.label, 1.0, compute_bounding_box(outline.pixels))
             for outline in outlines
             if outline.label != UNKNOWN_LABEL and not any(other.is_occluding(outline) for other in outlines)
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Oracle:
-    """A detector that returns the true detections of a `TrueFrame`; implements `cell.protocols.Detector`.
-
-    The detector omits boxes whose centre is outside the requested view or occluded by the arm.
+@dataclass(frozen=True)
+class OracleKind:
+    """Kind of simulated drivers whose images contain true detections; implements `DriverKind`.
 
     Attributes:
-        name: Name of the detector in the cell file.
-        config: Section of the detector in the cell file; only threshold, error rates and latency are used.
-        camera: Camera of the frames.
-        clock: Clock of the run.
-        box_std: Standard deviation of the noise of each box coordinate [pixel].
-        seed: Random seed of the noise; each frame has its own noise.
+        renders_images: True to render images; otherwise images are black unless the camera measures depth.
     """
 
-    name: str
-    config: DetectorConfig
-    camera: CameraConfig
-    clock: Clock
-    box_std: float
-    seed: int
+    renders_images: bool = False
+    check = staticmethod(SimDriver.check)
+    compute_mass = staticmethod(SimDriver.compute_mass)
 
-    def request(self, frame: Frame, view: str) -> PendingSearch:
-        """Request the true detections of `frame`, which are available after the latency of the detector."""
-        assert isinstance(frame, TrueFrame), "an oracle requires frames of a TruthCamera"
-        random_generator = np.random.default_rng([self.seed, frame.id])
-        detections = []
-        for true_detection in frame.true_detections:
-            box = np.array(true_detection.box) + random_generator.normal(0.0, self.box_std, 4)
-            detection = replace(true_detection, box=(box[0], box[1], box[2], box[3]))
-            column, row = detection.centre
-            left, top, right, bottom = self.camera.get_view_box(view)
-            if left <= column < right and top <= row < bottom and frame.visible[int(row), int(column)]:
-                detections.append(detection)
-        answer: Future[list[Detection]] = Future()
-        answer.set_result(detections)
-        answer_time = self.clock.now + self.config.latency
-        return PendingSearch(answer, answer_time, self.clock, self.name, self.config.error_rates)
-
-    def close(self) -> None:
-        """Do nothing: an oracle holds no resources."""
+    def __call__(self, config: CellConfig, options: DriverOptions) -> SimDriver:
+        """Return the driver of a cell."""
+        return SimDriver(config, options, partial(TruthCamera, renders_images=self.renders_images))
 
 
-def make_oracle_kind(*, box_std: float = 0.7, renders_images: bool = False) -> Callable[..., SimCell]:
-    """Return a factory of simulated cells with oracles as detectors, for `RunOptions.make_cell`.
+def make_oracle_kind(*, box_std: float = 0.7, renders_images: bool = False) -> Callable[..., Station]:
+    """Return a factory of simulated stations with true detections, for `RunOptions.make_cell`.
 
     `box_std`: standard deviation of box coordinates [pixel]; if `renders_images` is False, images are black.
     """
-    camera = partial(TruthCamera, renders_images=renders_images)
-    return partial(SimCell, build_camera=camera, build_detectors=partial(_build_oracles, box_std=box_std))
-
-
-def _build_oracles(
-    config: CellConfig, *, clock: Clock, base: Path, seed: int, folders: Sequence[Path], box_std: float
-) -> dict[str, Oracle]:
-    del base, folders  # An oracle loads no files from the folder of the cell file.
-    camera = next(iter(config.cameras.values()))
-    return {
-        name: Oracle(name, detector_config, camera, clock, box_std, seed)
-        for name, detector_config in config.detectors.items()
-    }
+    make_detector = partial(TruthDetector.from_config, box_std=box_std)
+    return partial(Station, kind=OracleKind(renders_images), make_detector=make_detector)
