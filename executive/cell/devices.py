@@ -251,7 +251,7 @@ def load_driver_kind(name: str) -> DriverKind:
         return kind
     if name in list_entries(FORMER_DRIVER_GROUP, "kind of cell"):
         raise InputError(
-            f'a package registers "{name}" in the group {FORMER_DRIVER_GROUP}, which no longer exists; write a '
+            f'a package registers "{name}" in the group {FORMER_DRIVER_GROUP}, which is not used; write a '
             f"driver (executive.cell.devices.Driver), and register it in {DRIVER_GROUP}"
         )
     installed = ", ".join(sorted(entries)) or "none"

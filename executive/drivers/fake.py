@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from executive.cell.arm import Goal, Guard, Motion
-from executive.cell.device_config import STEP
 from executive.cell.config import CellConfig
+from executive.cell.device_config import STEP
 from executive.cell.devices import DEFAULT_ROLE, CameraImage, DriverOptions, StepClock, TrueObject, WallClock
 from executive.cell.frame import Box, Detection
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass

@@ -12,7 +12,6 @@ from pydantic import JsonValue
 
 from executive.behaviours import Skills
 from executive.cell.config import CellConfig, ObjectConfig
-from executive.text.validate import KeyPath
 from executive.cell.objects import Quotas
 from executive.errors import InputError
 from executive.mission import check_flow, check_nodes, check_skills, check_variables
@@ -25,6 +24,7 @@ from executive.perception.camera_model import find_calibration_doubts
 from executive.perception.detectors.envelope import find_unmeasured_detectors
 from executive.skill import Skill
 from executive.text.findings import Finding, MissionError, Source, make_warning, sort_findings
+from executive.text.validate import KeyPath
 from executive.text.yaml_files import (
     find_file_below,
     find_mission,

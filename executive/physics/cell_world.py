@@ -6,8 +6,7 @@ The origin of the world frame W is at the base of the arm, on the table top.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -22,7 +21,6 @@ from executive.cell.device_config import STEP
 from executive.cell.objects import BIN_THICKNESS
 from executive.geometry import Array, Pose
 from executive.physics.model_files import find_model
-
 
 TABLE_HEIGHT = 0.625
 """Height of the table in pybullet_data [m]."""

@@ -197,7 +197,7 @@ class Border:
         return self.read(entry.name.format(*access.arguments, name=access.name), proceed, entry.codec)
 
     def read(self, name: str, query: Callable[[], T], codec: Codec = IDENTITY) -> T:
-        """Return the value of an input: from `query`, which is recorded if it has changed, or from the record.
+        """Return the value of an input: from `query`, recorded if it has changed, or from the record.
 
         Raises:
             Exception: `query` raised an exception, which is recorded and raised again; or the recorded read

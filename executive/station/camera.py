@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig
 from executive.cell.devices import ArmDevice, CameraDevice
-from executive.cell.frame import Box, Frame
+from executive.cell.frame import Box, Frame, TrueFrame
 from executive.cell.objects import Bin
 from executive.cell.protocols import Tool
 from executive.geometry import Array, Pose
 from executive.motion.joints import Kinematics
 from executive.perception.camera_check import describe_displacement
 from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, compute_hull_mask
-from executive.testing.oracle import TrueFrame
 
 MAX_LOAD_OFFSET = 0.015
 """Maximum distance of the centre of a held object from the axis of the tool [m]."""
@@ -43,8 +42,8 @@ class CellCamera:
         config: The cell file.
         name: Name of the camera in the cell file.
         device: The camera of the driver.
-        robot: The arm, whose flange is the mount of a wrist camera, and the tool. An object that the tool holds
-            is assumed to be of the largest class.
+        robot: The arm, whose flange is the mount of a wrist camera, and the tool. An object that the tool
+            holds is assumed to be of the largest class.
         unrecorded_robot: The same arm and tool, whose reads are not recorded, for `sees_table`: the answer
             itself is recorded.
         kinematics: Kinematics of the arm.

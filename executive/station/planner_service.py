@@ -26,7 +26,7 @@ DIFFERENTIATION_STEP = 1e-4
 """Time step of the numerical derivative of the tool position [s]."""
 
 PlanMotion = Callable[[Array, Goal | Array, Task], Motion]
-"""Function that plans a motion from rest at joint positions to a goal or to other joint positions, `(n,)` each
+"""Function that plans a motion from rest at joint positions to a goal or to other joint positions, each `(n,)`
 [rad]; it raises Unreachable or Blocked if there is none."""
 
 

@@ -16,7 +16,7 @@ from executive.motion.arms import build_kinematics
 from executive.physics.cell_world import CellWorld
 from executive.physics.collision import ClearanceChecker
 from executive.station.camera import CellCamera, Robot
-from executive.station.check import find_view_errors
+from executive.station.view_check import find_view_errors
 from executive.text.validate import KeyPath
 
 POINTS_PER_SIDE = 9

@@ -32,7 +32,7 @@ from executive.motion.arms import build_planning_kinematics
 from executive.motion.joints import Kinematics
 from executive.motion.planner import Planner
 from executive.motion.straight_paths import plan_straight_motion
-from executive.perception.detectors.cell_detector import build_cell_detectors
+from executive.perception.detectors.cell_detector import CellDetector, build_cell_detectors
 from executive.perception.detectors.detector_registry import KindMaker, make_installed_kind
 from executive.perception.detectors.simulated import TruthDetector
 from executive.perception.localization import CellLocalizer
@@ -41,7 +41,6 @@ from executive.station.border import Border
 from executive.station.camera import CellCamera, Robot
 from executive.station.planner_service import PlannedArm, PlannerService
 from executive.text.yaml_files import get_shipped_folder
-from executive.training.evaluate import CellDetector
 
 
 class SilentOperator:
@@ -157,7 +156,7 @@ class Station:
         poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
         if options.has_devices:
             self._planner = _build_planner(config, kinematics, clock, emit, is_without_physics)
-            # Detectors are built last, because their processes would outlive an exception in a later statement.
+            # Detectors are built last: their processes would outlive an exception in a later statement.
             truth = TruthDetector.from_config if is_without_physics else make_installed_kind
             self._detectors = build_cell_detectors(
                 config,

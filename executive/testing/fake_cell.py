@@ -10,7 +10,7 @@ from executive.cell.protocols import Routes
 from executive.drivers.fake import FakeDriver
 from executive.events import Emit, discard_event
 from executive.mission.cell_file import load_cell
-from executive.perception.detectors.requests import DetectorContext
+from executive.perception.detectors.detector_registry import DetectorContext
 from executive.perception.detectors.simulated import TruthDetector
 from executive.station.station import CellOptions, SilentOperator, Station
 from executive.text.yaml_files import get_shipped_folder

@@ -15,19 +15,19 @@ from typing import Any
 import cv2
 import numpy as np
 
-from executive.cell.devices import TrueObject, TrueWorld, CameraImage, DriverOptions
+from executive.cell.config import CellConfig
+from executive.cell.devices import CameraImage, DriverOptions, TrueObject, TrueWorld
 from executive.cell.frame import Detection
 from executive.cell.objects import UNKNOWN_LABEL
 from executive.drivers.sim.camera import Image, SimCamera
-from executive.cell.config import CellConfig
 from executive.drivers.sim.driver import SimDriver
-from executive.station.station import Station
 from executive.drivers.sim.models import compute_bounding_box, load_mesh
 from executive.drivers.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.perception.camera_model import NEAR_PLANE, project
 from executive.perception.detectors.simulated import TruthDetector
+from executive.station.station import Station
 
 
 class WorldAccess:

@@ -7,15 +7,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from executive.drivers.sim.tool import SuctionTool
-from executive.motion.joints import JointLimits
 from executive.cell.arm import Guard, Motion
 from executive.cell.device_config import STEP
 from executive.drivers import world_log
-from executive.drivers.sim.tool import LIP_LENGTH
+from executive.drivers.sim.tool import LIP_LENGTH, SuctionTool
 from executive.drivers.sim.world import World
 from executive.errors import Fault
 from executive.geometry import Array, format_point
+from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory, plan_braking, plan_retreat
 from executive.physics.cell_world import BODY_B, LINK_A, NORMAL_FORCE, POSITION_A, name_load
 

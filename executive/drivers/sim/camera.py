@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from executive.cell.config import CellConfig
-from executive.cell.devices import CameraImage
-from executive.drivers import world_log
 from executive.cell.device_config import CameraConfig, Colour, DepthConfig, NoiseConfig, Section
+from executive.cell.devices import CameraImage
 from executive.cell.protocols import Clock
+from executive.drivers import world_log
 from executive.drivers.sim.world import World
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import (

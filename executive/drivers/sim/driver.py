@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from executive.cell.config import CellConfig
 from executive.cell.device_config import STEP
 from executive.cell.devices import DEFAULT_ROLE, DriverOptions, StepClock, TrueObject, derive_seeds

@@ -23,11 +23,10 @@ from executive.cell.arm_config import TOOL_LINK, ArmFile
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import STEP
 from executive.cell.frame import Box
-from executive.physics.model_files import read_robot
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.physics import model_files
-from executive.physics.model_files import find_model, make_rotation
+from executive.physics.model_files import find_model, make_rotation, read_robot
 from executive.processes import build_command
 from executive.text.findings import suggest_choice
 from executive.text.validate import KeyPath

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field
 
-from executive.cell.devices import derive_seeds
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import (
     POSE_AND_FOV_KEYS,
@@ -26,6 +25,7 @@ from executive.cell.device_config import (
     TransformConfig,
     check_ascending,
 )
+from executive.cell.devices import derive_seeds
 from executive.cell.objects import UNKNOWN_LABEL
 from executive.drivers.sim.camera import Light
 from executive.drivers.sim.models import (

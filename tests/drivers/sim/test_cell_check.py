@@ -12,7 +12,7 @@ from executive.drivers.sim.kind import SIM_CELL_KIND
 
 from executive.cell.config import CellConfig
 from executive.motion.arms import build_kinematics
-from executive.station.check import find_pose_errors
+from executive.station.pose_check import find_pose_errors
 from executive.testing.fake_cell import FakeCell
 from tests.motion.joint_states import reach
 
@@ -79,9 +79,7 @@ def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wri
 
 
 @pytest.mark.parametrize("kind", [SIM_CELL_KIND, FakeCell])
-def test_an_unknown_solver_is_a_finding_with_the_installed_solvers(
-    overhead: CellConfig, kind
-) -> None:
+def test_an_unknown_solver_is_a_finding_with_the_installed_solvers(overhead: CellConfig, kind) -> None:
     config = overhead.model_copy(update={"arm": overhead.arm.model_copy(update={"solver": "r2d2"})})
     ((keys, message),) = kind.check(config, Path())
     assert keys == ("arm", "solver")

@@ -15,7 +15,7 @@ import yaml
 from executive.drivers.sim.cell import SimCell
 
 from executive.cell.config import CellConfig
-from executive.cell.frame import Frame
+from executive.cell.frame import Frame, TrueFrame
 from executive.cell.objects import UNKNOWN_LABEL
 from executive.drivers.sim.camera import CELL_LIGHT
 from executive.drivers.sim.models import load_mesh
@@ -33,7 +33,7 @@ from executive.geometry import Pose
 from executive.perception.camera_model import compute_calibration
 from executive.station.station import CellOptions, SilentOperator
 from executive.testing.fake_cell import SHIPPED_ROUTES
-from executive.testing.oracle import TrueFrame, make_oracle_kind
+from executive.testing.oracle import make_oracle_kind
 from executive.text.findings import MissionError
 
 Build = Callable[..., World]

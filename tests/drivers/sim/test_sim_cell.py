@@ -11,12 +11,13 @@ import pytest
 from executive.drivers.sim.cell import SimCell
 
 from executive.cell.arm import Goal
+from executive.cell.frame import TrueFrame
 from executive.events import discard_event
 from executive.geometry import Pose
 from executive.mission.cell_file import load_cell
 from executive.station.station import CellOptions, SilentOperator
 from executive.testing.fake_cell import SHIPPED_ROUTES
-from executive.testing.oracle import TrueFrame, make_oracle_kind
+from executive.testing.oracle import make_oracle_kind
 
 Build = Callable[..., SimCell]
 
