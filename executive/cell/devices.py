@@ -181,19 +181,23 @@ class CameraDevice(Protocol):
 
 
 class Driver(Protocol):
-    """The devices of one cell; arms and tools by role, cameras by their names in the cell file.
+    """The devices of one cell."""
 
-    Attributes:
-        clock: Clock of the devices; its time is 0 at the start of the run.
-        arms: Arms by role.
-        tools: Tools by role.
-        cameras: Cameras by name.
-    """
+    @property
+    def clock(self) -> Clock:
+        """Clock of the devices; its time is 0 at the start of the run."""
 
-    clock: Clock
-    arms: Mapping[str, ArmDevice]
-    tools: Mapping[str, Tool]
-    cameras: Mapping[str, CameraDevice]
+    @property
+    def arms(self) -> Mapping[str, ArmDevice]:
+        """Arms by role."""
+
+    @property
+    def tools(self) -> Mapping[str, Tool]:
+        """Tools by role."""
+
+    @property
+    def cameras(self) -> Mapping[str, CameraDevice]:
+        """Cameras by their names in the cell file."""
 
     def close(self) -> None:
         """Release all devices; the driver is unusable afterwards."""
