@@ -172,18 +172,16 @@ class CellOptions:
     Attributes:
         operator: The person or script that requests classes of objects.
         cell_folder: Folder of the cell file, to which paths in the file are relative.
-        gui: True to show the simulated world in a window.
         resume: State of the cell at the interruption of a resumed run; None for a new run.
-        scene: Scene file with differences of the simulated world from the cell file; None: no differences.
         quotas: Maximum numbers of objects in the bins, from the mission.
+        driver_options: Options of the driver by name; only the driver knows them.
     """
 
     operator: Operator
     cell_folder: Path
-    gui: bool = False
     resume: ResumePoint | None = None
-    scene: Path | None = None
     quotas: Quotas = field(default_factory=dict)
+    driver_options: Mapping[str, str] = field(default_factory=dict)
 
 
 class CellKind(Protocol):
@@ -191,6 +189,8 @@ class CellKind(Protocol):
 
     A kind may have a method `compute_mass(section)`, which returns the mass [kg] of the objects of a class,
     declared or not, or raises an `InputError`; `section` is an `executive.cell.config.ObjectConfig`.
+    A kind may have an attribute `driver_options`, which contains `file` or `flag` by the name of each option
+    of a run that it knows; the run directory gets a copy of a file.
     """
 
     def __call__(
@@ -268,3 +268,25 @@ def load_cell_kind(name: str) -> CellKind:
         raise InputError(f'no installed package offers cells of kind "{name}"; installed: {installed}')
     cell_kind: CellKind = entries[name].load()
     return cell_kind
+
+
+def find_driver_options(kind: str) -> Mapping[str, str]:
+    """Return `file` or `flag` by the name of each option that the driver of a kind of cell knows.
+
+    Raises:
+        InputError: No package registers this kind, or its class cannot be loaded.
+    """
+    known_options: Mapping[str, str] = getattr(load_cell_kind(kind), "driver_options", {})
+    return known_options
+
+
+def check_driver_options(kind: str, options: Iterable[str]) -> None:
+    """Raise an InputError if the driver of a kind of cell does not know an option."""
+    for name in options:
+        known_options = find_driver_options(kind)
+        if name not in known_options:
+            choices = ", ".join(known_options) or "none"
+            advice = f"omit --{name}, or use a cell with another driver"
+            raise InputError(
+                f'the driver "{kind}" does not know the option "{name}"; it knows: {choices}; {advice}'
+            )

@@ -359,7 +359,7 @@ class FakeCell(CellWithoutHardware):
         ledger: The ledger of the run, the same object as `accounts`.
 
     Raises:
-        InputError: `options` request a window, or the state of a resumed run cannot be read.
+        InputError: The state of a resumed run cannot be read.
     """
 
     def __init__(
@@ -373,8 +373,6 @@ class FakeCell(CellWithoutHardware):
     ) -> None:
         config = config or load_empty_cell()
         options = options or CellOptions(SilentOperator(), cell_folder=Path())
-        if options.gui:
-            raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
         super().__init__(config, seed=seed, routes=routes, emit=emit, options=options)
         clock = self.cell.clock
         self.ledger = self.accounts

@@ -11,7 +11,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.cell.protocols import Cell, Operator
-from executive.cell.workcell import CellOptions, ResumePoint, Workcell, load_cell_kind
+from executive.cell.workcell import CellOptions, ResumePoint, Workcell, check_driver_options, load_cell_kind
 from executive.errors import Fault, InputError
 from executive.events import Observer, RequestGiven, RunEnded, RunResumed, RunStarted
 from executive.mission.build import build_tree
@@ -34,21 +34,19 @@ class RunOptions:
         seed: Seed of all random numbers.
         requests: Requests of the operator, or None if a person gives requests at the terminal or in a view.
         has_keyboard: True if requests of the operator come from standard input.
-        gui: True to show the simulated world in a window.
         is_realtime: True to execute the run at the speed of the wall clock.
         make_cell: Factory of the work cell, or None for the kind of cell that the cell file names.
         substitutes: Skill that replaces the skills of nodes, by a pattern for the node paths (`*/Grasp`).
-        scene: Scene file, which changes the world of a simulated cell, or None.
+        driver_options: Options of the driver by name; only the driver knows them.
     """
 
     seed: int
     requests: Sequence[str] | None = None
     has_keyboard: bool = True
-    gui: bool = False
     is_realtime: bool = False
     make_cell: Callable[..., Workcell] | None = None
     substitutes: Mapping[str, type[Skill]] = field(default_factory=dict)
-    scene: Path | None = None
+    driver_options: Mapping[str, str] = field(default_factory=dict)
 
 
 def assemble(loaded: LoadedMission, options: RunOptions, observers: Sequence[Observer] = ()) -> Run:
@@ -75,6 +73,7 @@ def assemble(loaded: LoadedMission, options: RunOptions, observers: Sequence[Obs
         base=str(loaded.cell_path.parent.resolve()),
         step=workcell.cell.clock.step,
         versions=dict(list_versions()),
+        cell=loaded.replacing_cell,
     )
     return run
 
@@ -147,10 +146,9 @@ def _build_workcell(
     if options.requests is not None:
         operator = ScriptedOperator(options.requests, tuple(loaded.routes), run.emit, request_count)
     base = loaded.cell_path.parent
-    cell_options = CellOptions(
-        operator, base, options.gui, resume=resume_point, scene=options.scene, quotas=loaded.quotas
-    )
     config = loaded.cell_config
+    check_driver_options(config.kind, options.driver_options)
+    cell_options = CellOptions(operator, base, resume_point, loaded.quotas, options.driver_options)
     make_cell = options.make_cell or load_cell_kind(config.kind)
     return make_cell(config, seed=options.seed, routes=loaded.routes, emit=run.emit, options=cell_options)
 

@@ -65,6 +65,21 @@ def find_mission(name: str | Path) -> Path:
     raise InputError(f'there is no mission file and no shipped mission "{name}". {hint}')
 
 
+def find_cell(name: str) -> Path:
+    """Return the cell file with the path `name`, or the shipped cell with this name.
+
+    Raises:
+        InputError: There is no such file and no such shipped cell.
+    """
+    if os.path.isfile(name):
+        return Path(name)
+    shipped_files = {file.stem: file for file in sorted((get_shipped_folder() / "cells").glob("*.yaml"))}
+    if name in shipped_files:
+        return shipped_files[name]
+    hint = suggest_choice(name, shipped_files, "Shipped cells")
+    raise InputError(f'there is neither a cell file nor a shipped cell "{name}". {hint}')
+
+
 def find_file_below(folder: Path, reference: str, shipped_subfolders: Sequence[str] = ("",)) -> Path:
     """Return the file with the relative path `reference` in `folder`, otherwise in a shipped subfolder.
 

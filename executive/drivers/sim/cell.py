@@ -15,7 +15,7 @@ from executive.drivers.sim.camera import SimCamera, find_missing_depth_sensors
 from executive.drivers.sim.collision import ClearanceChecker
 from executive.drivers.sim.models import build_simulated_class
 from executive.drivers.sim.rebuild import WorldRebuilder
-from executive.drivers.sim.scene import build_initial_world, derive_seeds, load_scene
+from executive.drivers.sim.scene import build_world_of_run, derive_seeds
 from executive.drivers.sim.tool import SuctionTool
 from executive.drivers.sim.world import SimVisuals, World
 from executive.drivers.world_log import CommandLog, read_commands
@@ -65,8 +65,8 @@ class SimCell(CellWithoutHardware):
         clock = self.cell.clock
         bins = tuple(self.cell.bins.values())
         _, camera_seed, detector_seed, load_seed = derive_seeds(seed)
-        scene = load_scene(options.scene, config)
-        world = self._world = build_initial_world(config, seed, gui=options.gui, scene=scene)
+        world, scene = build_world_of_run(config, seed, options.driver_options)
+        self._world = world
         self._clearance_checker = ClearanceChecker(config)
         planner = Planner(config, self._clearance_checker.check)
         self._tool = SuctionTool(world, config.tool, load_seed)
