@@ -63,7 +63,7 @@ def sweep_command(
         else:
             assert mission is not None
             assert seeds is not None
-            settings = make_settings(mission, seeds, overrides, variations, cell, scene, save_images)
+            settings = make_settings(mission, seeds, overrides, variations, scene, save_images, cell)
             database = create_sweep(settings, runs_folder)
         with closing(database):
             click.echo(f"results: {database.path}", err=True)

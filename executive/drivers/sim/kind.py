@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from executive.cell.workcell import CellOptions, Workcell
 from executive.drivers.sim.camera import SimCamera, find_missing_depth_sensors, get_camera_pose
 from executive.drivers.sim.collision import ClearanceChecker
 from executive.drivers.sim.models import compute_mass, find_model_errors
-from executive.drivers.sim.scene import DRIVER_OPTIONS, find_object_count_errors
+from executive.drivers.sim.scene import find_object_count_errors
 from executive.drivers.sim.world import World
 from executive.events import Emit
 from executive.geometry import Array
@@ -95,7 +96,7 @@ class SimCellKind:
     """The kind of the simulated cells; implements `executive.cell.workcell.CellKind`."""
 
     compute_mass = staticmethod(compute_mass)
-    driver_options = DRIVER_OPTIONS
+    driver_options: ClassVar[Mapping[str, str]] = {"scene": "file", "gui": "flag"}
 
     def __call__(
         self, config: CellConfig, *, seed: int, routes: Routes, emit: Emit, options: CellOptions

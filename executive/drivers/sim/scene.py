@@ -160,8 +160,6 @@ class SceneConfig(Section):
     """Calibration errors and noise of the camera."""
 
 
-DRIVER_OPTIONS = {"scene": "file", "gui": "flag"}
-"""Options of runs of simulated cells: the scene file, and whether a window shows the world."""
 DECLARED_SCENE = SceneConfig(scene="as declared")
 """The scene without changes to the world of the cell file."""
 
@@ -301,7 +299,9 @@ def build_initial_world(
 def build_world_of_run(
     config: CellConfig, seed: int, driver_options: Mapping[str, str]
 ) -> tuple[World, SceneConfig]:
-    """Return the initial world of a run with `DRIVER_OPTIONS`, and its scene.
+    """Return the initial world of a run, and its scene.
+
+    The options are `scene`, the path of a scene file, and `gui`, which shows the world in a window.
 
     Raises:
         MissionError: The scene file is invalid; the error lists all findings.
