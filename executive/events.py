@@ -230,6 +230,7 @@ class RunStarted(Event):
         step: Duration of a control step [s].
         versions: Versions of this project, Python, the machine and the required packages.
         format: Version of the journal format.
+        cell: Cell from the command line, which replaced the cell of the mission; "" if there was none.
     """
 
     mission: str
@@ -242,6 +243,7 @@ class RunStarted(Event):
     step: float
     versions: Mapping[str, str]
     format: Literal[3] = JOURNAL_FORMAT
+    cell: str = ""
 
 
 @dataclass(frozen=True)

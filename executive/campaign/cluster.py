@@ -185,8 +185,9 @@ def _execute_job(job: SweepJob, root: Path, working_directory: Path) -> cluster_
         search_path = filter(None, (packages, os.environ.get("PYTHONPATH")))
         os.environ["PYTHONPATH"] = os.pathsep.join(search_path)
     mission = str(_make_worker_path(root, Path(job.settings.mission)))
+    cell = job.settings.replacing_cell and str(_make_worker_path(root, Path(job.settings.replacing_cell)))
     scene = job.settings.scene and _make_worker_path(root, job.settings.scene)
-    settings = replace(job.settings, mission=mission, scene=scene)
+    settings = replace(job.settings, mission=mission, replacing_cell=cell, scene=scene)
     job = replace(job, settings=settings, runs_folder=_make_worker_path(root, job.runs_folder))
     try:
         return cluster_bundle.pack_run(run_job(job), root)

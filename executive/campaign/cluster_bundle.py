@@ -33,7 +33,7 @@ from executive.motion.arms import IK_SOLVER_GROUP
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.detectors.envelope import MEASUREMENT_SUFFIX
 from executive.record.run_directory import FOLDER_ADVICE, make_unique_folder
-from executive.text.yaml_files import find_mission, get_shipped_folder
+from executive.text.yaml_files import find_cell, find_mission, get_shipped_folder
 from executive.tree.node import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
 
 if TYPE_CHECKING:
@@ -64,17 +64,18 @@ RUN_TEXT_SUFFIXES = (".html", ".json", ".jsonl", ".yaml")
 
 
 def make_bundle(jobs: Sequence[SweepJob]) -> bytes:
-    """Return a zip file with the files of the missions and scenes of jobs, and of the packages with plugins.
+    """Return a zip file with the files that jobs read, and of the packages with plugins.
 
-    Each file of a mission or scene has its absolute path, so that all relative paths stay valid. A shipped
-    file that is named in another folder is not included, because each worker has the same version of this
-    project. Equal files have an equal zip file.
+    Each file of a mission, cell or scene has its absolute path, so that all relative paths stay valid. A
+    shipped file that is named in another folder is not included, because each worker has the same version
+    of this project. Equal files have an equal zip file.
 
     Raises:
         InputError: A file names another file by its absolute path, or the module of a plugin does not exist.
     """
     settings = [job.settings for job in jobs]
     paths = {find_mission(each.mission) for each in settings}
+    paths |= {find_cell(each.replacing_cell) for each in settings if each.replacing_cell}
     paths |= {each.scene for each in settings if each.scene}
     values = {text for job in jobs for text in (*job.settings.overrides.values(), *job.variant.values())}
     files = {f"{PACKAGES_FOLDER}/{name}": content for name, content in _list_plugin_files()}

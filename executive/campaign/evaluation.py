@@ -18,7 +18,7 @@ from executive.perception.detectors.detector_registry import find_detectable_lab
 from executive.perception.localization import CellLocalizer
 from executive.record.run_directory import write_atomically
 from executive.text.findings import suggest_choice
-from executive.text.yaml_files import get_shipped_folder
+from executive.text.yaml_files import find_cell
 from executive.training import evaluate
 from executive.training.dataset import LabelledImage
 from executive.training.evaluate import EvaluatedDetector, Mistake
@@ -56,22 +56,6 @@ def load_cells(
             raise InputError(f'two cells are called "{config.cell}"; give one of them another name')
         cells[path] = config
     return cells
-
-
-def find_cell(path_or_name: str) -> Path:
-    """Return the path of a cell file, or the path of the shipped cell file with this name.
-
-    Raises:
-        InputError: There is neither a cell file with this path nor a shipped cell with this name.
-    """
-    path = Path(path_or_name)
-    if path.is_file():
-        return path
-    shipped_files = {file.stem: file for file in sorted((get_shipped_folder() / "cells").glob("*.yaml"))}
-    if path_or_name in shipped_files:
-        return shipped_files[path_or_name]
-    choices = suggest_choice(path_or_name, shipped_files, "Shipped cells")
-    raise InputError(f'there is neither a cell file nor a shipped cell "{path_or_name}". {choices}')
 
 
 @dataclass(frozen=True)

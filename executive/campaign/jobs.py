@@ -66,14 +66,16 @@ class MissionUnderTest:
 
 
 def load_mission_under_test(
-    mission: str, overrides: Mapping[str, str], has_oracle: bool, seed: int
+    mission: str, overrides: Mapping[str, str], has_oracle: bool, seed: int, cell: str = ""
 ) -> MissionUnderTest:
     """Load a mission; if `has_oracle` is True, the detectors of its simulated cell return true detections.
+
+    `cell` replaces the mission's cell, as in `load_mission`.
 
     Raises:
         InputError: The mission does not exist or has errors, or `has_oracle` requires a simulated cell.
     """
-    loaded = load_mission(mission, load_skills(), overrides, load_checker)
+    loaded = load_mission(mission, load_skills(), overrides, load_checker, cell)
     kind = loaded.cell_config.kind
     if not has_oracle:
         return MissionUnderTest(loaded, Station, kind, seed)
@@ -220,8 +222,9 @@ def run_job(job: SweepJob) -> RunRecord:
     """Execute and record one run, and return its rows; write a report if the run has a problem."""
     settings = job.settings
     timeline = Timeline()
-    loaded = _load_mission(settings.mission, tuple({**settings.overrides, **job.variant}.items()))
-    options = RunOptions(job.seed, scene=settings.scene)
+    overrides = {**settings.overrides, **job.variant}
+    loaded = _load_mission(settings.mission, tuple(overrides.items()), settings.replacing_cell)
+    options = RunOptions(job.seed, driver_options=settings.driver_options)
     record_options = RecordOptions(saves_pictures=settings.saves_images, timeline=timeline)
     result = record_run(loaded, options, job.runs_folder, record_options)
     record = make_record(job.index, job.variant, result, timeline)
@@ -240,6 +243,6 @@ def make_fault_record(job: SweepJob, error: BaseException) -> RunRecord:
 
 
 @functools.lru_cache(maxsize=4)
-def _load_mission(mission: str, overrides: tuple[tuple[str, str], ...]) -> LoadedMission:
+def _load_mission(mission: str, overrides: tuple[tuple[str, str], ...], cell: str) -> LoadedMission:
     """Return the mission; cached, because a worker runs the same mission many times."""
-    return load_mission(mission, load_skills(), dict(overrides))
+    return load_mission(mission, load_skills(), dict(overrides), replacing_cell=cell)

@@ -45,6 +45,7 @@ class SweepSettings:
     mission: str
     mission_name: str
     cell: str
+    replacing_cell: str = ""
     overrides: Mapping[str, str]
     variations: Mapping[str, tuple[str, ...]]
     first_seed: int
@@ -60,10 +61,16 @@ class SweepSettings:
         names = self.variations
         return [dict(zip(names, values, strict=True)) for values in product(*names.values())]
 
+    @property
+    def driver_options(self) -> dict[str, str]:
+        """Options of the driver by name."""
+        return {} if self.scene is None else {"scene": str(self.scene)}
+
     def make_repeat_command(self, run: RunRow) -> str:
         """Return the command line that repeats a run of the sweep."""
         overrides = {**self.overrides, **run.variant}
-        return format_repeat_command(self.mission, run.seed, overrides, scene=self.scene)
+        options = {"cell": self.replacing_cell, **self.driver_options}
+        return format_repeat_command(self.mission, run.seed, overrides, (), options)
 
 
 @dataclass(frozen=True, kw_only=True)

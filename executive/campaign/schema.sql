@@ -1,10 +1,11 @@
--- Tables of a sweep, one file per sweep. A program that changes them also changes the version.
+-- Tables of a sweep, one file per sweep. A program that changes or removes columns also changes the version.
 PRAGMA user_version = 1;
 
 CREATE TABLE settings ( -- Settings of a sweep, from which its jobs are computed; the table has one row.
   mission TEXT, -- Mission file, or name of a shipped mission.
   mission_name TEXT, -- Name of the mission.
   cell TEXT, -- Path of the cell file.
+  replacing_cell TEXT, -- Value of `--cell`, which replaces the cell of the mission, or "".
   overrides TEXT, -- Values of `--set` by param or by `cell.<key>.<key>`; equal in all runs.
   variations TEXT, -- Values of `--vary` by param or by `cell.<key>.<key>`; each combination is a variant.
   first_seed INTEGER, -- First seed of each variant.

@@ -17,6 +17,7 @@ from executive.behaviours import load_skills
 from executive.campaign.jobs import JobOptions, list_jobs, make_fault_record, run_job, run_jobs
 from executive.campaign.results import FILE_NAME, ResultsDatabase, RunRecord, SweepSettings
 from executive.campaign.sweep_summary import SweepResults, summarize_runs
+from executive.cell.devices import check_driver_options
 from executive.drivers.sim.scene import load_scene
 from executive.errors import InputError
 from executive.mission.load import load_mission
@@ -32,7 +33,7 @@ SIDES = ("a", "b")
 
 def make_settings(
     mission: str, seeds: range, overrides: Mapping[str, str], variations: Mapping[str, tuple[str, ...]],
-    scene: Path | None, saves_images: bool,
+    scene: Path | None, saves_images: bool, cell: str = "",
 ) -> SweepSettings:  # fmt: skip
     """Check the inputs of a sweep, and return its settings.
 
@@ -43,14 +44,15 @@ def make_settings(
         variations: Values of `--vary`, by param of the mission or key of the cell.
         scene: Scene file; None: no change of the simulated world.
         saves_images: True to save the images on which decisions are based.
+        cell: Cell file or name of a shipped cell that replaces the mission's cell, or "".
 
     Raises:
         MissionError: A variant has errors.
         InputError: An input does not exist.
     """
     return _complete_settings(SweepSettings(
-        mission=mission, mission_name="", cell="", overrides=overrides, variations=variations,
-        first_seed=seeds[0], last_seed=seeds[-1], scene=scene,
+        mission=mission, mission_name="", cell="", replacing_cell=cell, overrides=overrides,
+        variations=variations, first_seed=seeds[0], last_seed=seeds[-1], scene=scene,
         saves_images=saves_images, inputs_hash="", versions=dict(list_versions()),
     ))  # fmt: skip
 
@@ -62,12 +64,13 @@ def _complete_settings(settings: SweepSettings) -> SweepSettings:
     weights.
     """
     skills = load_skills()
-    missions = [
-        load_mission(settings.mission, skills, {**settings.overrides, **variant}, load_checker)
-        for variant in settings.variants
-    ]
-    for loaded in missions:
+    missions = []
+    for variant in settings.variants:
+        overrides = {**settings.overrides, **variant}
+        loaded = load_mission(settings.mission, skills, overrides, load_checker, settings.replacing_cell)
+        check_driver_options(loaded.cell_config.kind, settings.driver_options)
         load_scene(settings.scene, loaded.cell_config)
+        missions.append(loaded)
     inputs: list[object] = [] if settings.scene is None else [read_source(settings.scene).text]
     for loaded in missions:
         cell = loaded.cell_config

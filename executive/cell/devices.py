@@ -224,7 +224,9 @@ class DriverKind(Protocol):
     A kind may have a method `compute_mass(section)`, which returns the mass [kg] of the objects of a class,
     declared or not, or raises an `InputError`; `section` is an `executive.cell.config.ObjectConfig`. A kind
     with the attribute `is_rehearsal`, which is True, has no physics: its frames contain true detections, its
-    arms hide nothing and move on straight joint paths, and nothing is measured.
+    arms hide nothing and move on straight joint paths, and nothing is measured. A kind may have an attribute
+    `driver_options`, which contains `file` or `flag` by the name of each option that it knows; the run
+    directory gets a copy of a file.
     """
 
     def __call__(self, config: Any, options: DriverOptions) -> Driver:
@@ -260,6 +262,28 @@ def load_driver_kind(name: str) -> DriverKind:
         )
     installed = ", ".join(sorted(entries)) or "none"
     raise InputError(f'no installed package offers cells of kind "{name}"; installed: {installed}')
+
+
+def find_driver_options(kind: str) -> Mapping[str, str]:
+    """Return `file` or `flag` by the name of each option that a kind of driver knows.
+
+    Raises:
+        InputError: No package registers this kind, or its class cannot be loaded.
+    """
+    known_options: Mapping[str, str] = getattr(load_driver_kind(kind), "driver_options", {})
+    return known_options
+
+
+def check_driver_options(kind: str, options: Iterable[str]) -> None:
+    """Raise an InputError if a kind of driver does not know an option."""
+    for name in options:
+        known_options = find_driver_options(kind)
+        if name not in known_options:
+            choices = ", ".join(known_options) or "none"
+            advice = f"omit --{name}, or use a cell with another driver"
+            raise InputError(
+                f'the driver "{kind}" does not know the option "{name}"; it knows: {choices}; {advice}'
+            )
 
 
 def is_rehearsal(kind: DriverKind) -> bool:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from executive.cli.options import check_usage, json_option, mission_argument, overrides_option
+from executive.cli.options import cell_option, check_usage, json_option, mission_argument, overrides_option
 from executive.cli.streams import keep_stdout_clean, print_json, print_result
 from executive.errors import ExitCode, InputError
 
@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 @click.command(name="check")
 @click.argument("missions", metavar="MISSION...", nargs=-1, required=True)
 @overrides_option
+@cell_option
 @json_option
-def check_command(missions: tuple[str, ...], overrides: dict[str, str], as_json: bool) -> ExitCode:
+def check_command(missions: tuple[str, ...], overrides: dict[str, str], cell: str, as_json: bool) -> ExitCode:
     """Check missions without running them.
 
     Prints the errors and warnings of each MISSION (a file or the name of a shipped mission), and the failures
@@ -37,10 +38,13 @@ def check_command(missions: tuple[str, ...], overrides: dict[str, str], as_json:
         from executive.mission.load import load_mission
         from executive.station.check import load_checker
         from executive.text.findings import MAX_LISTED_FINDINGS, Finding, MissionError, describe_findings
+        from executive.text.yaml_files import find_cell
 
         # The last garbage collection of the process would take 0.1 s. Commands that plan motions need this
         # collection, because ruckig would otherwise report its objects as leaks.
         atexit.register(gc.freeze)
+        if cell:
+            find_cell(cell)  # A missing cell is no mistake of a mission.
         skills = load_skills()
         reports: list[dict[str, Any]] = []
         texts = []
@@ -48,7 +52,7 @@ def check_command(missions: tuple[str, ...], overrides: dict[str, str], as_json:
             failures: Sequence[UnhandledFailure] = ()
             is_valid = False
             try:
-                loaded = load_mission(mission, skills, overrides, load_checker)
+                loaded = load_mission(mission, skills, overrides, load_checker, cell)
                 findings = loaded.warnings
                 failures = loaded.unhandled_failures
                 is_valid = True
@@ -84,6 +88,7 @@ def _list_failure_lines(failures: Sequence[UnhandledFailure]) -> Iterator[str]:
 @click.command(name="tree")
 @mission_argument
 @overrides_option
+@cell_option
 @click.option("--ports", is_flag=True, help="Print the inputs (?: possibly unset) and outputs of each skill.")
 @click.option(
     "--reasons", is_flag=True,
@@ -97,7 +102,7 @@ def _list_failure_lines(failures: Sequence[UnhandledFailure]) -> Iterator[str]:
 )  # fmt: skip
 @json_option
 def tree_command(
-    mission: str, overrides: dict[str, str], ports: bool, reasons: bool, fold: bool, as_svg: bool,
+    mission: str, overrides: dict[str, str], cell: str, ports: bool, reasons: bool, fold: bool, as_svg: bool,
     format_name: str | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Print the behaviour tree of a mission.
@@ -124,7 +129,7 @@ def tree_command(
         from executive.view.svg import make_svg
         from executive.view.text import draw_text, fold_subtrees
 
-        loaded = load_mission(mission, load_skills(), overrides)
+        loaded = load_mission(mission, load_skills(), overrides, replacing_cell=cell)
         # No node of the tree is executed, so that none needs a clock or a ledger.
         placeholder_cell: Any = SimpleNamespace(clock=None, ledger=None)
         nodes = make_outline(build_tree(loaded, loaded.skills, placeholder_cell, Blackboard(), discard_event))

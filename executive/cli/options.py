@@ -117,6 +117,9 @@ variations_option = click.option(
 runs_option = click.option("--runs", "runs_folder", type=FOLDER, default="runs", help="Folder of the runs.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
 seed_option = click.option("--seed", type=click.IntRange(0, MAX_SEED), default=0, help="Random seed.")
+cell_option = click.option(
+    "--cell", metavar="CELL", default="", help="Cell file or shipped cell instead of the cell of the mission."
+)
 scene_option = click.option(
     "--scene", type=FILE,
     help="Scene file: differences of the simulated world from the cell file (light, table, objects, camera).",
@@ -144,7 +147,7 @@ _SWEEP_OPTIONS = (
         "--frames", "save_images", is_flag=True,
         help="Save the camera images on which decisions are based.",
     ),
-    overrides_option, scene_option, runs_option, json_option,
+    overrides_option, cell_option, scene_option, runs_option, json_option,
 )  # fmt: skip
 """Options that the commands `sweep` and `compare` share."""
 

@@ -19,6 +19,7 @@ from executive.errors import ExitCode
 @click.option("--resume", metavar="RUN", help="Resume an interrupted run: a run directory or `latest`.")
 @options.seed_option
 @options.overrides_option
+@options.cell_option
 @options.scene_option
 @options.video_option
 @options.force_option
@@ -36,16 +37,18 @@ from executive.errors import ExitCode
 @click.pass_context
 def run_command(
     ctx: click.Context, mission: str | None, resume: str | None, seed: int, overrides: dict[str, str],
-    scene: Path | None, video: Path | None, force: bool, runs_folder: Path, as_json: bool, quiet: bool,
-    has_page: bool, paused: bool, gui: bool, realtime: bool, requests: tuple[str, ...],
+    cell: str, scene: Path | None, video: Path | None, force: bool, runs_folder: Path, as_json: bool,
+    quiet: bool, has_page: bool, paused: bool, gui: bool, realtime: bool, requests: tuple[str, ...],
 ) -> ExitCode:  # fmt: skip
     """Run a mission and record the run.
 
     MISSION is a file or the name of a shipped mission.
     """
-    has_mission_options = options.is_any_given(ctx, "mission", "seed", "overrides", "requests", "scene")
+    has_mission_options = options.is_any_given(
+        ctx, "mission", "seed", "overrides", "requests", "cell", "scene"
+    )
     has_keyboard = sys.stdin is not None and sys.stdin.isatty()
-    settings_text = "mission, seed, params, requests and scene from the run"
+    settings_text = "mission, seed, params, requests, cell and scene from the run"
     pauses_forever = paused and not has_page and (quiet or not has_keyboard)
     options.check_usage(
         (mission is None and resume is None, "give a MISSION, or a run with --resume RUN"),
@@ -65,7 +68,7 @@ def run_command(
         from executive.record.journal import find_run_start, read_journal
         from executive.record.recorded_run import GuardedView, RecordOptions, record_run
         from executive.record.result import find_exit_code
-        from executive.record.run_directory import RunDirectory, find_run, read_cell
+        from executive.record.run_directory import find_recorded_options, find_run, read_cell
         from executive.run.assembly import RunOptions
         from executive.station.check import load_checker
         from executive.view import terminal
@@ -86,9 +89,11 @@ def run_command(
                 click.echo(f"watch the run at {page.address}", err=True)
             views = [GuardedView(view) for view in (terminal_view, page) if view is not None]
             record = RecordOptions(views, starts_paused=paused)
+            driver_options = {"scene": str(scene)} if scene else {}
+            driver_options |= {"gui": "true"} if gui else {}
             run_options = RunOptions(
-                seed, requests or None, has_keyboard=page is None or has_keyboard, gui=gui,
-                is_realtime=realtime, scene=scene,
+                seed, requests or None, has_keyboard=page is None or has_keyboard,
+                is_realtime=realtime, driver_options=driver_options,
             )  # fmt: skip
             if mission is None:
                 # Only a resumption needs the replay.
@@ -102,23 +107,19 @@ def run_command(
                 events = read_journal(path / "journal.jsonl")
                 start_event = find_run_start(events, path, "run the mission again")
                 repeat_arguments = (start_event.file, start_event.seed, start_event.overrides)
+                cell = start_event.cell
             else:
-                loaded_mission = load_mission(mission, load_skills(), overrides, load_checker)
+                loaded_mission = load_mission(mission, load_skills(), overrides, load_checker, cell)
                 for warning in loaded_mission.warnings if views else ():
                     click.echo(str(warning), err=True)
-                if scene is not None:
-                    # The import loads the simulator. Only simulated cells read the scene file, but its errors
-                    # are reported for every cell.
-                    from executive.drivers.sim.scene import load_scene
-
-                    load_scene(scene, loaded_mission.cell_config)
                 if video is not None:
                     options.check_video(video, loaded_mission.cell_config.kind, force=force)
                 result = record_run(loaded_mission, run_options, runs_folder, record)
                 repeat_arguments = (mission, seed, overrides)
             # The command that repeats the run also contains requests that the operator made during the run.
+            repeat_options = {"cell": cell, **find_recorded_options(Path(result.run))}
             repeat_command = terminal.format_repeat_command(
-                *repeat_arguments, requests or result.requests, RunDirectory(Path(result.run)).scene
+                *repeat_arguments, requests or result.requests, repeat_options
             )
             report, report_problem = try_write_report(result.run)
             if page is not None:

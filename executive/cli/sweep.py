@@ -31,7 +31,7 @@ from executive.errors import ExitCode
 def sweep_command(
     ctx: click.Context, mission: str | None, seeds: range | None, variations: dict[str, tuple[str, ...]],
     resume: Path | None, workers: int, cluster: str | None, save_images: bool, overrides: dict[str, str],
-    scene: Path | None, runs_folder: Path, require: str | None, junit: Path | None, as_json: bool,
+    cell: str, scene: Path | None, runs_folder: Path, require: str | None, junit: Path | None, as_json: bool,
 ) -> int:  # fmt: skip
     """Run a mission once for every seed and variant, and summarize the runs.
 
@@ -41,7 +41,7 @@ def sweep_command(
     not met. Ctrl-C ends the current runs; then the results of the complete runs are printed. A second Ctrl-C
     quits immediately.
     """
-    names = ("mission", "seeds", "variations", "overrides", "save_images", "scene")
+    names = ("mission", "seeds", "variations", "overrides", "save_images", "cell", "scene")
     has_settings = resume is not None and options.is_any_given(ctx, *names)
     lacks_input = resume is None and (mission is None or seeds is None)
     options.check_usage(
@@ -63,7 +63,7 @@ def sweep_command(
         else:
             assert mission is not None
             assert seeds is not None
-            settings = make_settings(mission, seeds, overrides, variations, scene, save_images)
+            settings = make_settings(mission, seeds, overrides, variations, scene, save_images, cell)
             database = create_sweep(settings, runs_folder)
         with closing(database):
             click.echo(f"results: {database.path}", err=True)
@@ -91,6 +91,8 @@ def sweep_command(
 @click.argument("missions", metavar="A [B]", nargs=-1)
 @options.make_overrides_option("--set-a", "overrides_a", help="Like --set, but only for A; repeatable.")
 @options.make_overrides_option("--set-b", "overrides_b", help="Like --set, but only for B; repeatable.")
+@click.option("--cell-a", default="", metavar="CELL", help="Like --cell, but only for A.")
+@click.option("--cell-b", default="", metavar="CELL", help="Like --cell, but only for B.")
 @click.option(
     "--resume", type=options.FOLDER, metavar="FOLDER",
     help="Execute the missing runs of the interrupted comparison in this folder.",
@@ -99,22 +101,27 @@ def sweep_command(
 @click.pass_context
 def compare_command(
     ctx: click.Context, missions: tuple[str, ...], seeds: range | None, overrides_a: dict[str, str],
-    overrides_b: dict[str, str], resume: Path | None, workers: int, cluster: str | None, save_images: bool,
-    overrides: dict[str, str], scene: Path | None, runs_folder: Path, as_json: bool,
+    overrides_b: dict[str, str], cell_a: str, cell_b: str, resume: Path | None, workers: int,
+    cluster: str | None, save_images: bool, overrides: dict[str, str], cell: str, scene: Path | None,
+    runs_folder: Path, as_json: bool,
 ) -> int:  # fmt: skip
     """Run the missions A and B once for every seed, and estimate the differences.
 
-    A and B are files or names of shipped missions. A single mission is used as A and as
-    B, and --set-a and --set-b state the difference. The results of both are stored in a/results.sqlite and
-    b/results.sqlite in a folder below --runs. Each difference has a 95 % confidence interval.
+    A and B are files or names of shipped missions. A single mission is used as A and as B, and --set-a,
+    --set-b, --cell-a and --cell-b state the difference. The results of both are stored in a/results.sqlite
+    and b/results.sqlite in a folder below --runs. Each difference has a 95 % confidence interval.
     Ctrl-C ends the current runs; then the results of the complete pairs are printed.
     """
-    names = ("missions", "seeds", "overrides", "overrides_a", "overrides_b", "save_images", "scene")
+    names = (
+        "missions", "seeds", "overrides", "overrides_a", "overrides_b", "cell", "cell_a", "cell_b",
+        "save_images", "scene",
+    )  # fmt: skip
     has_settings = resume is not None and options.is_any_given(ctx, *names)
     lacks_input = resume is None and (len(missions) not in (1, 2) or seeds is None)
     options.check_usage(
         (lacks_input, "give one or two missions and --seeds, or --resume FOLDER"),
         (has_settings, "--resume takes missions, seeds and settings from the comparison; omit them"),
+        (cell and (cell_a or cell_b), "--cell is for A and B; omit it, or omit --cell-a and --cell-b"),
     )
     options.check_disjoint(overrides, "--set-a or --set-b", {**overrides_a, **overrides_b})
     with keep_stdout_clean():
@@ -129,11 +136,13 @@ def compare_command(
             databases = sweep.open_comparison(resume)
         else:
             assert seeds is not None
-            settings = [
-                sweep.make_settings(mission, seeds, {**overrides, **own_overrides}, {}, scene, save_images)
-                for mission, own_overrides in ((missions[0], overrides_a), (missions[-1], overrides_b))
-            ]
-            databases = sweep.create_comparison(settings, runs_folder)
+            settings_a = sweep.make_settings(
+                missions[0], seeds, {**overrides, **overrides_a}, {}, scene, save_images, cell_a or cell
+            )
+            settings_b = sweep.make_settings(
+                missions[-1], seeds, {**overrides, **overrides_b}, {}, scene, save_images, cell_b or cell
+            )
+            databases = sweep.create_comparison([settings_a, settings_b], runs_folder)
         results: list[SweepResults] = []
         for side, database in zip("AB", databases, strict=True):
             with closing(database):
@@ -177,11 +186,13 @@ def parse_fault_numbers(text: str) -> tuple[int, ...]:
 @options.workers_option
 @options.seed_option
 @options.overrides_option
+@options.cell_option
 @options.runs_option
 @options.json_option
 def faults_command(
     mission: str, oracle: bool, pairs: int | None, fault_numbers: tuple[int, ...] | None,
-    list_only: bool, workers: int, seed: int, overrides: dict[str, str], runs_folder: Path, as_json: bool,
+    list_only: bool, workers: int, seed: int, overrides: dict[str, str], cell: str, runs_folder: Path,
+    as_json: bool,
 ) -> int:  # fmt: skip
     """Inject each possible fault into a run of a mission.
 
@@ -199,7 +210,7 @@ def faults_command(
         from executive.campaign.jobs import JobOptions, load_mission_under_test
         from executive.cli.progress import print_halt, show_progress
 
-        mission_under_test = load_mission_under_test(mission, overrides, oracle, seed)
+        mission_under_test = load_mission_under_test(mission, overrides, oracle, seed, cell)
         with show_progress("faults", quiet=as_json or list_only or fault_numbers is not None) as progress:
             campaign = fault_campaign.Campaign(mission_under_test, JobOptions(workers, progress, print_halt))
             output: Any

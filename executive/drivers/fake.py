@@ -324,16 +324,13 @@ class FakeDriver:
 
     Args:
         config: The cell file.
-        options: Seed of the objects; the fake cell has no options.
+        options: Seed of the objects.
         clock: Clock of the devices; None: simulated time.
 
     Attributes:
         world: Objects and bins.
         arm, tool, camera: The devices.
         last_command_tick: Tick of the last start of a motion or command to the tool.
-
-    Raises:
-        InputError: The options contain an option.
     """
 
     is_rehearsal = True
@@ -344,9 +341,6 @@ class FakeDriver:
         options: DriverOptions = DriverOptions(),
         clock: StepClock | WallClock | None = None,
     ) -> None:
-        if options.values:
-            names = ", ".join(options.values)
-            raise InputError(f'cell {config.cell} is of kind "fake" and has no option {names}; leave it out')
         classes = {label: section.build_class(label) for label, section in config.objects.items()}
         self.world = FakeWorld(classes, config.build_bins().values())
         put_random_objects(self.world, config, options.seed)

@@ -26,6 +26,7 @@ from executive.skill import Skill
 from executive.text.findings import Finding, MissionError, Source, make_warning, sort_findings
 from executive.text.validate import KeyPath
 from executive.text.yaml_files import (
+    find_cell,
     find_file_below,
     find_mission,
     get_shipped_folder,
@@ -99,13 +100,13 @@ def read_mission(
     overrides: Mapping[str, str],
     skills: Skills,
     node_classes: ControlNodes,
-    recorded_cell: CellFile | None = None,
+    replacing_cell: str | CellFile = "",
 ) -> MissionFiles:
-    """Return the content of a mission file, its libraries, and its cell file or the recorded cell.
+    """Return the content of a mission file, its libraries, and its cell file or the cell that replaces it.
 
     Raises:
         MissionError: The mission file is not valid YAML.
-        InputError: The mission file does not exist.
+        InputError: The mission file or the replacing cell does not exist.
     """
     source = read_source(path)
     root, findings = parse_yaml(source)
@@ -117,13 +118,17 @@ def read_mission(
     texts = {str(file): _add_library(file, path.parent, parser, subtrees) for file in mission.libraries}
     libraries = {name: text for name, text in texts.items() if text is not None}
     mission = replace(mission, subtrees=subtrees, is_complete=len(libraries) == len(texts))
-    cell = recorded_cell
-    if cell is None and mission.cell:
+    cell: CellFile | None = None
+    if isinstance(replacing_cell, CellFile):
+        cell = replacing_cell
+    elif replacing_cell:
+        cell = read_cell(find_cell(replacing_cell), overrides)
+    elif mission.cell:
         try:
             cell = read_cell(find_file_below(path.parent, mission.cell), overrides)
-            findings += cell.findings
         except InputError as error:
             parser.add_error(mission.cell.span, "no-cell", str(error))
+    findings += cell.findings if cell else ()
     return MissionFiles(source, mission, libraries, parser.behaviours, cell, tuple(findings))
 
 
@@ -191,6 +196,7 @@ class LoadedMission:
         warnings: Findings that do not prevent a run.
         overrides: Values of `--set` as text, by name of a param or by `cell.<key>.<key>`.
         skills: Installed skills by name, and skills for the py_trees behaviours in the mission by class name.
+        replacing_cell: Cell file or name of the shipped cell that replaces the mission's cell, or "".
     """
 
     mission: Mission
@@ -204,6 +210,7 @@ class LoadedMission:
     warnings: tuple[Finding, ...]
     overrides: Mapping[str, str]
     skills: Mapping[str, type[Skill]]
+    replacing_cell: str
 
     @property
     def params(self) -> dict[str, JsonValue]:
@@ -229,7 +236,7 @@ def load_mission(
     skills: Mapping[str, type[Skill]],
     overrides: Mapping[str, str] | None = None,
     find_checker: CheckerFinder | None = None,
-    recorded_cell: CellFile | None = None,
+    replacing_cell: str | CellFile = "",
 ) -> LoadedMission:
     """Return a mission that has passed all checks.
 
@@ -238,15 +245,16 @@ def load_mission(
         skills: Installed skills by name.
         overrides: Values as text, by name of a param or by `cell.<key>.<key>` for a key of the cell.
         find_checker: Function that returns the checker of a kind of cell; None to skip its checks.
-        recorded_cell: Cell of a recorded run, which replaces the cell file, or None.
+        replacing_cell: Cell instead of the mission's cell: a cell file, the name of a shipped cell, or the
+            cell of a recorded run; "" for the mission's cell.
 
     Raises:
         MissionError: The mission or the cell has errors; the exception contains every finding.
-        InputError: The mission does not exist.
+        InputError: The mission or the cell does not exist.
     """
     mission_path = find_mission(path)
     node_classes = load_control_nodes()
-    files = read_mission(mission_path, overrides or {}, skills, node_classes, recorded_cell)
+    files = read_mission(mission_path, overrides or {}, skills, node_classes, replacing_cell)
     mission = files.mission
     cell = files.cell
     findings = list(files.findings)
@@ -286,7 +294,7 @@ def load_mission(
     return LoadedMission(
         mission, tree, config, files.source.text, mission_path, cell.path, files.libraries,
         find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
-        dict(overrides or {}), skills,
+        dict(overrides or {}), skills, replacing_cell if isinstance(replacing_cell, str) else "",
     )  # fmt: skip
 
 

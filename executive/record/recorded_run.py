@@ -13,6 +13,7 @@ from typing import Protocol
 
 import yaml
 
+from executive.cell.workcell import find_driver_options
 from executive.errors import ExecutiveError
 from executive.events import Observer, TimedEvent
 from executive.mission.load import LoadedMission
@@ -20,7 +21,7 @@ from executive.mission.outline import make_outline
 from executive.record.diagnose import diagnose
 from executive.record.journal import Recorder
 from executive.record.result import Audit, ItemCounts, Result, is_resumable, list_requests, write_result
-from executive.record.run_directory import SCENE_FILE, RunDirectory, format_tree, make_dated_folder
+from executive.record.run_directory import RunDirectory, format_tree, make_dated_folder
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
@@ -108,7 +109,7 @@ def record_run(
 
     Args:
         loaded: The mission and its cell.
-        options: Options of the run; the run directory gets a copy of the scene file.
+        options: Options of the run; the run directory gets copies of the files of its driver.
         runs_folder: Folder of the run directories.
         record: Options of the record.
 
@@ -129,7 +130,7 @@ def record_run(
 
 
 def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, folder: Path) -> RunDirectory:
-    """Make and return the directory of a run below `folder`, with the mission, the cell and the scene.
+    """Make and return the directory of a run below `folder`, with its inputs.
 
     Raises:
         InputError: The directory cannot be made, or a file cannot be written.
@@ -141,8 +142,9 @@ def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, fol
         "cell.yaml": yaml.safe_dump(cell, sort_keys=False, allow_unicode=True),
         "tree.json": format_tree(make_outline(run.root)),
     }
-    if options.scene is not None:
-        texts[SCENE_FILE] = read_source(options.scene).text
+    for option, value in options.driver_options.items():
+        if find_driver_options(loaded.cell_config.kind)[option] == "file":
+            texts[f"{option}.yaml"] = read_source(Path(value)).text
     name = f"{loaded.mission.name}_s{options.seed}"
     directory = RunDirectory(make_dated_folder(folder, name, datetime.now()))
     directory.save_inputs(texts, loaded.libraries)

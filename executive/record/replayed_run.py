@@ -17,7 +17,7 @@ from executive.mission.load import LoadedMission
 from executive.record.journal import Recorder, find_run_end, find_run_start, read_journal
 from executive.record.recorded_run import RecordOptions, execute_recorded
 from executive.record.result import Result, is_resumable, read_result
-from executive.record.run_directory import RunDirectory, read_mission_of_run
+from executive.record.run_directory import RunDirectory, find_recorded_options, read_mission_of_run
 from executive.record.timeline import get_skill_name
 from executive.run.assembly import ResumedRun, RunOptions, assemble_replay, assemble_resumed
 from executive.run.replay import InputLog
@@ -217,7 +217,7 @@ def resume_run(
     Args:
         path: The run directory.
         skills: Installed skills by name.
-        options: Options of the resumed run; the interrupted run determines seed, requests and scene.
+        options: Options of the resumed run; the interrupted run determines seed, requests and files.
         record: Options of the record.
 
     Raises:
@@ -244,7 +244,8 @@ def resume_run(
         if problem:
             advice = "run the mission again, or install the version that recorded the run"
             raise InputError(f'the run in "{path}" cannot be resumed: {problem}; {advice}')
-        options = replace(options, seed=start.seed, requests=start.requests, scene=directory.scene)
+        driver_options = {**options.driver_options, **find_recorded_options(path)}
+        options = replace(options, seed=start.seed, requests=start.requests, driver_options=driver_options)
         run = assemble_resumed(
             loaded, options, log, directory.world_log,
             is_complete=replay.is_complete, has_ended=lacks_only_result,

@@ -13,6 +13,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from executive.cell.arm_config import DEFAULT_ARM_FILE
 from executive.cell.config import CellConfig
+from executive.cell.workcell import find_driver_options
 from executive.errors import InputError, explain_os_errors
 from executive.events import RunStarted
 from executive.mission.cell_file import CellFile
@@ -26,8 +27,6 @@ FOLDER_ADVICE = "name another folder with --runs DIR"
 """Advice if a run directory cannot be made or written."""
 LATEST_LINK = "latest"
 """Name of the link to the last run directory."""
-SCENE_FILE = "scene.yaml"
-"""Name of the copy of the scene file."""
 _NODES_ADAPTER = TypeAdapter(list[OutlineNode], config=ConfigDict(ser_json_inf_nan="strings"))
 """Encoder and decoder of `tree.json`."""
 
@@ -53,12 +52,6 @@ class RunDirectory:
         self.report = path / "report.html"
         self.result = path / "result.json"
         self.pictures = path / "frames"
-
-    @property
-    def scene(self) -> Path | None:
-        """Copy of the scene file, or None if the run had no scene file."""
-        path = self.path / SCENE_FILE
-        return path if path.is_file() else None
 
     def save_inputs(self, texts: Mapping[str, str], libraries: Mapping[str, str]) -> None:
         """Write and sync the inputs of the run, and let the link `runs/latest` point to this directory.
@@ -184,7 +177,7 @@ def read_mission_of_run(
     overrides = {key: text for key, text in start.overrides.items() if not key.startswith("cell.")}
     cell_path = Path(start.base) / "cell.yaml"
     recorded_cell = CellFile(cell_path, read_cell(path), Source(str(cell_path), ""))
-    return load_mission(mission or path / "mission.yaml", skills, overrides, recorded_cell=recorded_cell)
+    return load_mission(mission or path / "mission.yaml", skills, overrides, replacing_cell=recorded_cell)
 
 
 def read_cell(path: Path) -> CellConfig:
@@ -200,6 +193,19 @@ def read_cell(path: Path) -> CellConfig:
         return CellConfig(**{**content, "arm": {**default_arm, **content["arm"]}})
     except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError) as error:
         raise InputError(f'cannot read the cell file in the run directory "{path}": {error}') from error
+
+
+def find_recorded_options(path: Path) -> dict[str, str]:
+    """Return the options of the driver whose files are in the run directory `path`, by name.
+
+    There are none if the cell file cannot be read, or its driver is not installed.
+    """
+    options: dict[str, str] = {}
+    with contextlib.suppress(InputError):
+        for name, kind in find_driver_options(read_cell(path).kind).items():
+            if kind == "file" and (file := path / f"{name}.yaml").is_file():
+                options[name] = str(file)
+    return options
 
 
 def format_tree(nodes: Sequence[OutlineNode]) -> str:

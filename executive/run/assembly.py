@@ -12,6 +12,7 @@ from py_trees.common import Status
 
 from executive.cell.devices import Rebuildable
 from executive.cell.protocols import Cell, Operator
+from executive.cell.devices import check_driver_options
 from executive.errors import Fault, InputError
 from executive.events import Observer, RequestGiven, RunEnded, RunResumed, RunStarted
 from executive.mission.build import build_tree
@@ -37,7 +38,7 @@ class RunOptions:
         is_realtime: True to execute the run at the speed of the wall clock.
         make_cell: Factory of the station; by default `Station`.
         substitutes: Skill that replaces the skills of nodes, by a pattern for the node paths (`*/Grasp`).
-        driver_options: Options of the driver by name; only the driver knows their meaning.
+        driver_options: Options of the driver by name; only the driver knows them.
     """
 
     seed: int
@@ -73,6 +74,7 @@ def assemble(loaded: LoadedMission, options: RunOptions, observers: Sequence[Obs
         base=str(loaded.cell_path.parent.resolve()),
         step=station.driver.clock.step,
         versions=dict(list_versions()),
+        cell=loaded.replacing_cell,
     )
     return run
 
@@ -146,6 +148,7 @@ def _build_station(
     operator: Operator = TerminalOperator(run.emit, run.control, has_keyboard=options.has_keyboard)
     if options.requests is not None:
         operator = ScriptedOperator(options.requests, tuple(loaded.routes), run.emit, request_count)
+    check_driver_options(loaded.cell_config.kind, options.driver_options)
     cell_options = CellOptions(
         operator, loaded.cell_path.parent, options.driver_options, world_log, has_devices, loaded.quotas
     )

@@ -52,17 +52,32 @@ def find_mission(name: str | Path) -> Path:
     Raises:
         InputError: There is no such file and no such shipped mission.
     """
+    return _find_file_or_shipped(str(name), "mission", Path("missions"))
+
+
+def find_cell(name: str) -> Path:
+    """Return the cell file with the path `name`, or the shipped cell with this name.
+
+    Raises:
+        InputError: There is no such file and no such shipped cell.
+    """
+    return _find_file_or_shipped(name, "cell", Path("missions/cells"))
+
+
+def _find_file_or_shipped(name: str, noun: str, folder: Path) -> Path:
     path = Path(name)
     # Unlike the methods of Path, these functions return False for invalid file names.
     if os.path.isfile(path):
         return path
     if os.path.lexists(path):
         raise InputError(f'"{name}" is {_describe_kind(path)}, not a file')
-    stem = PurePosixPath(str(name).removeprefix("missions/").removesuffix(".yaml"))
-    if len(stem.parts) == 1 and os.path.isfile(shipped_path := get_shipped_folder() / f"{stem}.yaml"):
-        return shipped_path
-    hint = suggest_choice(str(stem), list_shipped_missions(), "Shipped missions")
-    raise InputError(f'there is no mission file and no shipped mission "{name}". {hint}')
+    shipped_folder = get_shipped_folder() / folder.relative_to("missions")
+    shipped_files = {file.stem: file for file in sorted(shipped_folder.glob("*.yaml"))}
+    stem = name.removeprefix(f"{folder}/").removesuffix(".yaml")
+    if stem in shipped_files:
+        return shipped_files[stem]
+    hint = suggest_choice(stem, shipped_files, f"Shipped {noun}s")
+    raise InputError(f'there is no {noun} file and no shipped {noun} "{name}". {hint}')
 
 
 def find_file_below(folder: Path, reference: str, shipped_subfolders: Sequence[str] = ("",)) -> Path:

@@ -27,7 +27,7 @@ from executive.record.diagnosis import list_labelled_sentences, make_resume_comm
 from executive.record.journal import find_run_end, find_run_start, read_journal
 from executive.record.picture_recorder import PALETTE, split_picture_name
 from executive.record.result import is_resumable, list_requests, read_result
-from executive.record.run_directory import RunDirectory, read_tree, write_atomically
+from executive.record.run_directory import RunDirectory, find_recorded_options, read_tree, write_atomically
 from executive.record.timeline import Activation, Timeline, find_last_failure, format_counts, group_by_node
 from executive.text.yaml_files import get_shipped_folder
 from executive.view.svg import NodeResult, make_svg
@@ -112,8 +112,9 @@ class ReportData:
         self.requests = list_requests(self.timeline)
         file = Path(self.start.file)
         mission = file.stem if file.parent == get_shipped_folder() else str(file)
+        options = {"cell": self.start.cell, **find_recorded_options(path)}
         self.repeat_command = format_repeat_command(
-            mission, self.start.seed, self.start.overrides, self.requests, directory.scene
+            mission, self.start.seed, self.start.overrides, self.requests, options
         )
         self.resume_command = make_resume_command(str(path)) if is_resumable(self.status) else ""
         self.replay_command = shlex.join(["executive", "replay", str(path)])

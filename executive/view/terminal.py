@@ -11,7 +11,6 @@ import threading
 import tty
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import TextIO
 
 from rich.console import Console, Group, RenderableType
@@ -255,18 +254,20 @@ class KeyReader:
 
 def format_repeat_command(
     mission: str, seed: int, overrides: Mapping[str, object], requests: Iterable[str] = (),
-    scene: Path | None = None,
+    options: Mapping[str, str] = {},
 ) -> str:  # fmt: skip
     """Return the command line that repeats a run exactly.
 
-    `overrides` contains the params from the command line by name; `requests` are made by the operator.
+    `overrides` contains the params from the command line by name; `requests` are made by the operator;
+    `options` contains further options by name; an empty value is omitted.
     """
     arguments = ["executive", "run", mission, "--seed", str(seed)]
     for key, value in overrides.items():
         arguments += ["--set", f"{key}={value}"]
     for request in requests:
         arguments += ["--request", request]
-    arguments += [] if scene is None else ["--scene", str(scene)]
+    for name, value in options.items():
+        arguments += [f"--{name}", value] if value else []
     return shlex.join(arguments)
 
 

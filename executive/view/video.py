@@ -15,7 +15,7 @@ import PIL.Image
 from executive.cell.config import CellConfig
 from executive.drivers.sim.camera import Image, Light, render
 from executive.drivers.sim.rebuild import WorldRebuilder
-from executive.drivers.sim.scene import build_initial_world, load_scene
+from executive.drivers.sim.scene import build_world_of_run
 from executive.drivers.sim.tool import SuctionTool
 from executive.drivers.world_log import RUN_STEP, read_commands
 from executive.errors import InputError, explain_os_errors
@@ -23,7 +23,7 @@ from executive.geometry import Array, Pose
 from executive.perception.camera_model import compute_camera_matrix, compute_look_at_pose
 from executive.record.journal import find_run_start, read_journal
 from executive.record.picture_recorder import split_picture_name
-from executive.record.run_directory import RunDirectory, read_cell, replace_atomically
+from executive.record.run_directory import RunDirectory, find_recorded_options, read_cell, replace_atomically
 from executive.record.timeline import Timeline, get_skill_name
 from executive.run.replay import InputLog
 
@@ -109,7 +109,7 @@ def _render_pictures(
     """
     config = read_cell(directory.path)
     viewpoint = _compute_viewpoint(config)
-    world = build_initial_world(config, seed, scene=load_scene(directory.scene, config))
+    world, _ = build_world_of_run(config, seed, find_recorded_options(directory.path))
     try:
         rebuilder = WorldRebuilder(world, SuctionTool(world, config.tool))
         for command in read_commands(directory.world_log):

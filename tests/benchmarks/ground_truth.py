@@ -201,7 +201,8 @@ def _run_in_this_process(
         return cells[0]
 
     loaded = load_mission(mission, load_skills(), {}, load_cell_kind)
-    options = RunOptions(seed, make_cell=make_cell, scene=scene)
+    driver_options = {"scene": str(scene)} if scene else {}
+    options = RunOptions(seed, make_cell=make_cell, driver_options=driver_options)
     result = record_run(loaded, options, runs, RecordOptions(saves_pictures=False))
     reports = {
         timed.event.item: Report(timed.event.label, timed.event.state, timed.event.reason)

@@ -74,8 +74,9 @@ def project(tmp_path: Path, missions: Path, monkeypatch: pytest.MonkeyPatch) -> 
     return folder
 
 
-def list_sweep_jobs(folder: Path) -> list[SweepJob]:
-    with closing(create_sweep(make_settings("wave.yaml", range(2), {}, {}, None, False), folder)) as database:
+def list_sweep_jobs(folder: Path, cell: str = "") -> list[SweepJob]:
+    settings = make_settings("wave.yaml", range(2), {}, {}, None, False, cell)
+    with closing(create_sweep(settings, folder)) as database:
         return list_jobs(database.settings, database.path.parent)
 
 
@@ -98,11 +99,13 @@ def test_an_absolute_path_to_a_file_is_refused(project: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_worker_runs_a_skill_of_another_package(project: Path, tmp_path: Path) -> None:
+def test_a_worker_runs_a_skill_of_another_package_on_another_cell(project: Path, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     from executive.campaign.cluster import BundlePlugin
 
-    jobs = list_sweep_jobs(tmp_path / "runs")
+    stand = tmp_path / "stand.yaml"
+    stand.write_text("base: overhead.yaml\ncell: stand\nkind: fake\n")
+    jobs = list_sweep_jobs(tmp_path / "runs", str(stand))
     local = run_job(jobs[0])
     plugin = BundlePlugin(make_bundle(jobs), describe_environment())
     worker = SimpleNamespace(local_directory=str(tmp_path))
@@ -114,6 +117,7 @@ def test_a_worker_runs_a_skill_of_another_package(project: Path, tmp_path: Path)
         plugin.teardown(worker)  # type: ignore[arg-type]
     remote = unpack_run(first)
     assert local.run.status == "SUCCESS"
+    assert "cell: stand\n" in (Path(remote.run.run_directory) / "cell.yaml").read_text()
     assert (remote.run.status, remote.run.decision_hash) == (local.run.status, local.run.decision_hash)
     journals = {(Path(one.run.run_directory) / "journal.jsonl").read_bytes() for one in (local, remote)}
     assert len(journals) == 1

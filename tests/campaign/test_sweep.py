@@ -122,15 +122,16 @@ def store_runs(
 
 def test_every_seed_is_run_with_every_combination() -> None:
     settings = replace(
-        SETTINGS, variations={"b": ("1", "2"), "c": ("x", "y")}, last_seed=1, scene=Path("s.yaml")
-    )
+        SETTINGS, variations={"b": ("1", "2"), "c": ("x", "y")}, last_seed=1, scene=Path("s.yaml"),
+        replacing_cell="depth",
+    )  # fmt: skip
     jobs = list_jobs(settings, Path("folder"))
     assert [(job.index, job.seed, "".join(job.variant.values())) for job in jobs] == [
         (0, 0, "1x"), (1, 1, "1x"), (2, 0, "1y"), (3, 1, "1y"),
         (4, 0, "2x"), (5, 1, "2x"), (6, 0, "2y"), (7, 1, "2y"),
     ]  # fmt: skip
     assert settings.make_repeat_command(make_sweep_record(jobs[3]).run) == (
-        "executive run sort --seed 1 --set a=1 --set b=1 --set c=y --scene s.yaml"
+        "executive run sort --seed 1 --set a=1 --set b=1 --set c=y --cell depth --scene s.yaml"
     )
 
 

@@ -38,7 +38,7 @@ def project(monkeypatch):
         load=[], run=[], load_error=None, warnings=(), endings=(), run_error=None, result=RESULT
     )
 
-    def load_mission(mission, skills, overrides=None, robot_check=None):
+    def load_mission(mission, skills, overrides=None, robot_check=None, cell=""):
         asked.load.append((mission, overrides))
         if asked.load_error is not None:
             raise asked.load_error
@@ -54,7 +54,7 @@ def project(monkeypatch):
 
     monkeypatch.setattr("executive.mission.load.load_mission", load_mission)
     monkeypatch.setattr("executive.record.recorded_run.record_run", record_run)
-    monkeypatch.setattr("executive.plugins.load_skills", dict)
+    monkeypatch.setattr("executive.behaviours.load_skills", dict)
     monkeypatch.setattr("executive.view.report.try_write_report", lambda run: ("runs/x/report.html", ""))
     return asked
 
@@ -66,7 +66,7 @@ def invoke(*words: str):
 def test_sigterm_ends_a_command_with_a_word_as_ctrl_c_does(project, monkeypatch):
     before = signal.getsignal(signal.SIGTERM)
     # While it still loads what it needs, long before a run listens.
-    monkeypatch.setattr("executive.plugins.load_skills", lambda: os.kill(os.getpid(), signal.SIGTERM))
+    monkeypatch.setattr("executive.behaviours.load_skills", lambda: os.kill(os.getpid(), signal.SIGTERM))
     shown = invoke("run", "sort")
     assert (shown.exit_code, shown.stdout, shown.stderr) == (130, "", "\nhalted\n")
     assert signal.getsignal(signal.SIGTERM) is before

@@ -37,6 +37,13 @@ def compare(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., Re
     return invoke
 
 
+def test_each_side_may_have_a_cell_of_its_own(compare) -> None:
+    shown = compare("sort_fruit", "--seeds", "0:2", "--cell-b", "fruit", "--json")
+    assert [each["replacing_cell"] for each in json.loads(shown.stdout)["settings"]] == ["", "fruit"]
+    refused = compare("sort_fruit", "--seeds", "0:2", "--cell-b", "fruit", "--cell", "fruit")
+    assert "omit it, or omit --cell-a and --cell-b" in refused.output
+
+
 LOSS = ("sort_fruit", "--seeds", "0:10", "--set", "cell.kind=fake", "--set-b", "cell.table.objects=[1, 1]")
 
 

@@ -53,7 +53,10 @@ def test_a_replay_says_what_is_decided_otherwise(runs: Path, tmp_path: Path) -> 
     ("words", "sentence"),
     [
         ((), "give a MISSION, or a run with --resume RUN"),
-        (("sort_fruit", "--resume", "latest"), "--resume takes mission, seed, params, requests and scene"),
+        (
+            ("sort_fruit", "--resume", "latest"),
+            "--resume takes mission, seed, params, requests, cell and scene",
+        ),
         (("--resume", "latest", "--scene", "dim.yaml"), "--resume takes mission, seed, params"),
         (("--resume", "nowhere"), '"nowhere" is no run directory'),
     ],

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
-from executive.record.run_directory import RunDirectory
+from executive.record.run_directory import RunDirectory, find_recorded_options
 
 
 def invoke(*words: str) -> Result:
@@ -47,8 +47,7 @@ def test_the_run_directory_has_a_copy_from_which_the_run_is_repeated_and_replaye
     runs = tmp_path / "runs"
     result = run_json(sort, "--scene", str(scene), runs=runs)
     directory = RunDirectory(Path(result["run"]))
-    copy = directory.scene
-    assert copy is not None
+    copy = directory.path / "scene.yaml"
     assert copy.read_text() == scene.read_text()
     assert result["audit"]["left"] == 1
     repeat = f"executive run {sort} --seed 0 --scene {copy}"
@@ -60,7 +59,7 @@ def test_the_run_directory_has_a_copy_from_which_the_run_is_repeated_and_replaye
     again = run_json(sort, "--scene", str(copy), runs=runs)
     assert (again["trace"], again["audit"]) == (result["trace"], result["audit"])
     plain = run_json(sort, runs=runs)
-    assert (RunDirectory(Path(plain["run"])).scene, "--scene" in plain["said"]) == (None, False)
+    assert (find_recorded_options(Path(plain["run"])), "--scene" in plain["said"]) == ({}, False)
     assert plain["audit"]["left"] > 1
 
 
@@ -76,7 +75,7 @@ def test_a_cell_that_is_not_simulated_takes_no_scene(command: str, scene: Path, 
     refused = invoke(*command.split(), "--scene", str(scene), "--runs", str(tmp_path / "runs"))
     assert (refused.exit_code, refused.stdout) == (2, "")
     assert refused.stderr == (
-        f"the scene {scene} changes the simulated world of a cell of kind sim, and the cell fruit is of kind "
-        "fake; leave --scene out, or name a mission on a cell of kind sim\n"
+        'the driver "fake" does not know the option "scene"; it knows: none; '
+        "omit --scene, or use a cell with another driver\n"
     )
     assert not (tmp_path / "runs").exists()

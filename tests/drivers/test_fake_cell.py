@@ -10,11 +10,10 @@ import pytest
 
 from executive.cell.config import CellConfig
 from executive.cell.frame import Detections
+from executive.cell.workcell import AUDIT_KEYS, check_driver_options
+from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.mission.cell_file import load_cell
-from executive.station.audit import AUDIT_KEYS
-from executive.station.station import CellOptions, SilentOperator
-from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
 from skills.localize import Localize
@@ -53,10 +52,16 @@ def test_as_many_objects_as_the_file_says_lie_apart_on_its_table(load: Load) -> 
     assert counts == {5, 6, 7}
 
 
-def test_a_window_is_refused(load: Load) -> None:
-    options = CellOptions(SilentOperator(), cell_folder=Path(), gui=True)
-    with pytest.raises(InputError, match="has no window"):
-        FakeCell(load(), options=options)
+def test_an_option_that_the_driver_does_not_know_is_refused() -> None:
+    with pytest.raises(
+        InputError, match='driver "fake" does not know the option "gui"; it knows: none; omit'
+    ):
+        check_driver_options("fake", ["gui"])
+    check_driver_options("sim", ["gui"])
+    with pytest.raises(
+        InputError, match='driver "sim" does not know the option "gain"; it knows: scene, gui;'
+    ):
+        check_driver_options("sim", ["gui", "gain"])
 
 
 def test_every_detector_of_the_file_sees_everything_with_its_own_latency(load: Load) -> None:

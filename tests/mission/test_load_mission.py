@@ -87,6 +87,12 @@ def test_a_link_out_of_the_folder_is_refused(load: Load, tmp_path: Path, small_c
         load("mission: m\ncell: link.yaml\ntree: Look\n")
 
 
+def test_another_cell_replaces_the_cell_of_the_mission(load: Load) -> None:
+    Path("other.yaml").write_text(Path("cells/small.yaml").read_text())
+    loaded = load("mission: m\ncell: missing.yaml\ntree: Look\n", replacing_cell="other.yaml")
+    assert (loaded.cell_path, loaded.replacing_cell) == (Path("other.yaml"), "other.yaml")
+
+
 @pytest.mark.parametrize("name", ["sort_overhead", "sort_overhead.yaml", "missions/sort_overhead.yaml"])
 def test_shipped_missions_go_by_name(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -130,7 +130,13 @@ def test_the_world_of_a_scene_is_rebuilt(missions: Path, tmp_path: Path) -> None
     loaded, scene = load(missions, "sort_overhead"), tmp_path / "scene.yaml"
     scene.write_text("scene: two objects\ntable: {objects: [2, 2]}\nunknown: {count: [1, 1], scale: 0.4}\n")
     with pytest.raises(Cut):
-        run_of(loaded, tmp_path, make_cell=make_oracle_kind(), scene=scene, views=[Cutter(600)])
+        run_of(
+            loaded,
+            tmp_path,
+            make_cell=make_oracle_kind(),
+            driver_options={"scene": str(scene)},
+            views=[Cutter(600)],
+        )
     # What happens to the file afterwards is nothing to the run.
     scene.unlink()
     result = resumed(find_run("latest", tmp_path), make_cell=make_oracle_kind())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from executive.drivers.sim.arm import SimArm
 from executive.drivers.sim.camera import SimCamera, find_missing_depth_sensors
 from executive.drivers.sim.models import compute_mass, find_model_errors
 from executive.drivers.sim.rebuild import WorldRebuilder
-from executive.drivers.sim.scene import build_initial_world, find_object_count_errors, load_scene
+from executive.drivers.sim.scene import build_world_of_run, find_object_count_errors
 from executive.drivers.sim.tool import SuctionTool
 from executive.drivers.sim.world import SimVisuals
 from executive.drivers.world_log import CommandLog, read_commands
@@ -36,7 +37,7 @@ class SimDriver:
 
     Args:
         config: The cell file.
-        options: Seed and options; `scene`: path of a scene file; `gui`: a window shows the world.
+        options: Seed and options of the driver.
         make_camera: Makes the camera from the arguments of `SimCamera`.
 
     Attributes:
@@ -50,6 +51,7 @@ class SimDriver:
     """
 
     compute_mass = staticmethod(compute_mass)
+    driver_options: ClassVar[Mapping[str, str]] = {"scene": "file", "gui": "flag"}
 
     def __init__(
         self, config: CellConfig, options: DriverOptions, make_camera: Callable[..., SimCamera] = SimCamera
@@ -57,9 +59,7 @@ class SimDriver:
         for _, message in find_missing_depth_sensors(config):
             raise InputError(f"cell {config.cell}: {message}")
         _, camera_seed, _, load_seed = derive_seeds(options.seed)
-        scene_path = options.values.get("scene")
-        scene = load_scene(Path(scene_path) if scene_path else None, config)
-        self.world = build_initial_world(config, options.seed, gui="gui" in options.values, scene=scene)
+        self.world, scene = build_world_of_run(config, options.seed, options.values)
         self._steps_per_tick = round(config.clock.step / STEP)
         self.clock = StepClock(self._steps_per_tick * STEP)
         self.clock.on_tick = self._advance

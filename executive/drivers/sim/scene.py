@@ -165,7 +165,7 @@ DECLARED_SCENE = SceneConfig(scene="as declared")
 """The scene without changes to the world of the cell file."""
 
 
-def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
+def load_scene(path: str | Path | None, config: CellConfig) -> SceneConfig:
     """Return the content of a scene file, checked against the cell whose world it changes.
 
     Args:
@@ -174,16 +174,11 @@ def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
 
     Raises:
         MissionError: The file is invalid; the error lists all findings.
-        InputError: There is no such file, or the cell is not simulated.
+        InputError: There is no such file.
     """
     if path is None:
         return DECLARED_SCENE
-    if config.kind != "sim":
-        raise InputError(
-            f"the scene {path} changes the simulated world of a cell of kind sim, and the cell {config.cell} "
-            f"is of kind {config.kind}; leave --scene out, or name a mission on a cell of kind sim"
-        )
-    source = read_source(path)
+    source = read_source(Path(path))
     root, findings = parse_yaml(source)
     scene, errors = (None, ()) if root is None else validate(root, SceneConfig)
     if root is not None and scene is not None:
@@ -295,6 +290,21 @@ def build_initial_world(
     spawn_objects(world, object_seed, scene.unknown)
     world.rest_positions = {body: [world.get_object_pose(body).position] for body in world.labels}
     return world
+
+
+def build_world_of_run(
+    config: CellConfig, seed: int, driver_options: Mapping[str, str]
+) -> tuple[World, SceneConfig]:
+    """Return the initial world of a run, and its scene.
+
+    The options are `scene`, the path of a scene file, and `gui`, which shows the world in a window.
+
+    Raises:
+        MissionError: The scene file is invalid; the error lists all findings.
+        InputError: The workspace has no room for the objects, or there is no scene file.
+    """
+    scene = load_scene(driver_options.get("scene"), config)
+    return build_initial_world(config, seed, gui="gui" in driver_options, scene=scene), scene
 
 
 def spawn_objects(world: World, seed: int, unknown: UnknownConfig | None = None) -> tuple[int, ...]:
