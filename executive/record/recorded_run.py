@@ -13,7 +13,7 @@ from typing import Protocol
 
 import yaml
 
-from executive.cell.workcell import find_driver_options
+from executive.cell.devices import find_driver_options
 from executive.errors import ExecutiveError
 from executive.events import Observer, TimedEvent
 from executive.mission.load import LoadedMission

@@ -13,7 +13,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from executive.cell.arm_config import DEFAULT_ARM_FILE
 from executive.cell.config import CellConfig
-from executive.cell.workcell import find_driver_options
+from executive.cell.devices import find_driver_options
 from executive.errors import InputError, explain_os_errors
 from executive.events import RunStarted
 from executive.mission.cell_file import CellFile

@@ -10,9 +10,8 @@ from pathlib import Path
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.cell.devices import Rebuildable
+from executive.cell.devices import Rebuildable, check_driver_options
 from executive.cell.protocols import Cell, Operator
-from executive.cell.devices import check_driver_options
 from executive.errors import Fault, InputError
 from executive.events import Observer, RequestGiven, RunEnded, RunResumed, RunStarted
 from executive.mission.build import build_tree

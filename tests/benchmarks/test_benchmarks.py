@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 from events import at, item_changed
 
-from executive.campaign.evaluation import find_cell
 from executive.campaign.jobs import MissionUnderTest, load_mission_under_test
 from executive.mission.cell_file import load_cell
 from executive.record.result import Audit, ItemCounts, Result
+from executive.text.yaml_files import find_cell
 from tests.benchmarks import (
     damaged_records,
     halts,

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
+from executive.cell.devices import check_driver_options
 from executive.cell.frame import Detections
-from executive.cell.workcell import AUDIT_KEYS, check_driver_options
-from executive.drivers.fake import FakeCell
 from executive.errors import InputError
 from executive.mission.cell_file import load_cell
+from executive.station.audit import AUDIT_KEYS
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
 from skills.localize import Localize
