@@ -6,8 +6,7 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
-from executive.cell.workcell import ResumePoint, Workcell
-
+from executive.cell.devices import ResumePoint, Workcell
 from executive.events import discard_event
 from executive.mission.load import LoadedMission
 from executive.station.station import CellOptions, SilentOperator

@@ -12,7 +12,6 @@ from types import ModuleType
 import jsonschema
 import pytest
 from click.testing import CliRunner
-from executive.cell.workcell import load_cell_kind
 from guide_blocks import GUIDES, ROOT, TUTORIAL, blocks, files, read, shown, transcripts
 
 from executive.behaviours import load_skills
@@ -25,6 +24,7 @@ from executive.mission.cell_file import load_cell
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.schema import make_mission_schema
 from executive.run.assembly import RunOptions, assemble
+from executive.station.check import load_checker
 from executive.testing.fake_cell import FakeCell
 from executive.text.findings import Source
 from executive.text.yaml_files import list_shipped_missions, parse_yaml
@@ -64,7 +64,7 @@ def assert_does_its_work(loaded: LoadedMission) -> None:
     try:
         outcome = run.execute()
         assert (outcome.status, outcome.message) == ("SUCCESS", "")
-        items = run.workcell.accounts.count_states()
+        items = run.station.ledger.count_states()
         assert items["lost"] == 0
         # Whoever says where things go brings at least one of them there.
         assert items["placed"] >= bool(loaded.routes)
@@ -75,14 +75,14 @@ def assert_does_its_work(loaded: LoadedMission) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MISSIONS)
 def test_every_mission_of_the_mission_guides_does_its_work(name: str, folder: Path) -> None:
-    assert_does_its_work(load_mission(name, load_skills(), find_cell_kind=load_cell_kind))
+    assert_does_its_work(load_mission(name, load_skills(), find_checker=load_checker))
 
 
 def test_the_mission_on_the_front_page_does_its_work(tmp_path: Path) -> None:
     (block,) = (block for block in blocks("README.md") if block.language == "yaml")
     path = tmp_path / "shown.yaml"
     path.write_text(block.text, encoding="utf-8")
-    assert_does_its_work(load_mission(path, load_skills(), find_cell_kind=load_cell_kind))
+    assert_does_its_work(load_mission(path, load_skills(), find_checker=load_checker))
 
 
 @pytest.mark.parametrize("name", MISSIONS)

@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from executive.cell.workcell import load_cell_kind
 
 from executive.behaviours import load_behaviour, load_skills
 from executive.errors import InputError
 from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.plugins import list_entries
+from executive.station.check import load_checker
 
 Write = Callable[..., Path]
 Install = Callable[[str, str], None]
@@ -70,7 +70,7 @@ def test_kinds_of_cells_and_detectors_are_found_likewise(project: Write) -> None
         "hall_four", "class Bench:\n    pass\n\n\nclass Eye:\n    pass\n",
         cells='bench = "hall_four.part:Bench"', detectors='eye = "hall_four.part:Eye"',
     )  # fmt: skip
-    assert load_cell_kind("bench").__name__ == "Bench"
+    assert load_checker("bench").__name__ == "Bench"
     assert find_detector_kinds()["eye"].load().__name__ == "Eye"
 
 
@@ -78,7 +78,7 @@ def test_kinds_of_cells_and_detectors_are_found_likewise(project: Write) -> None
     ("group", "kind", "ask"),
     [
         ("skills", "skill", load_skills),
-        ("cells", "kind of cell", lambda: load_cell_kind("wave")),
+        ("cells", "kind of cell", lambda: load_checker("wave")),
         ("detectors", "kind of detector", lambda: find_detector_kinds()["wave"].load()),
     ],
 )

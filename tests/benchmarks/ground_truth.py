@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from executive.cell.workcell import load_cell_kind
 from executive.drivers.sim.cell import SimCell, list_final_objects
 
 from executive.behaviours import load_skills
@@ -21,6 +20,7 @@ from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
 from executive.station.audit import count_outcomes
+from executive.station.check import load_checker
 from tests.benchmarks.forks import ForkRunner
 
 HUNG = "HUNG"
@@ -142,7 +142,7 @@ class AuditedCell(SimCell):
         super().advance()
         body = self._tool.held_body
         if body is not None:
-            for record in self.accounts.records:
+            for record in self.ledger.records:
                 if record.state is State.HELD:
                     self._carried[body] = record.item
 
@@ -155,7 +155,7 @@ class AuditedCell(SimCell):
     def _find(self, body: int, final_object: TrueObject) -> FoundObject:
         """Return the true end of a body."""
         gate = self.config.ledger.gate
-        records = self.accounts.records
+        records = self.ledger.records
         counts = count_outcomes([final_object], records, self.cell.bins, self.routes, gate)
         items = [
             record.item
@@ -200,7 +200,7 @@ def _run_in_this_process(
         cells.append(AuditedCell(*arguments, **options, make_detector=make_detector))
         return cells[0]
 
-    loaded = load_mission(mission, load_skills(), {}, load_cell_kind)
+    loaded = load_mission(mission, load_skills(), {}, load_checker)
     driver_options = {"scene": str(scene)} if scene else {}
     options = RunOptions(seed, make_cell=make_cell, driver_options=driver_options)
     result = record_run(loaded, options, runs, RecordOptions(saves_pictures=False))

@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from executive.cell.workcell import CellWrapper, Workcell
 from py_trees.common import Status
 
 from executive.campaign.jobs import MissionUnderTest
 from executive.cell.device_config import STEP
+from executive.cell.devices import CellWrapper, Workcell
 from executive.drivers.sim.arm import SimArm
 from executive.errors import ExecutiveError
 from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent
@@ -259,16 +259,16 @@ class _RunWithHalts:
         self._journal.close()
         halt = self._halt
         halt["holds"] = outcome.held_item
-        halt["rest_s"] = (outcome.ticks - halt["tick"]) * run.workcell.cell.clock.step
+        halt["rest_s"] = (outcome.ticks - halt["tick"]) * run.station.cell.clock.step
         if self._motion is not None:
             before_stop = halt["commands_before_stop"]
             halt.update(measure_braking([*self._commands], before_stop, self._motion, self._limits))
         problems = [
             *check_journal(read_journal(self._journal_path), outcome),
-            *check_ledger(run.workcell.accounts.count_states(), run.workcell.audit()),
-            *check_arm_at_rest(run.workcell),
+            *check_ledger(run.station.ledger.count_states(), run.station.audit()),
+            *check_arm_at_rest(run.station),
         ]
-        if run.workcell.cell.tool.holding != bool(outcome.held_item):
+        if run.station.cell.tool.holding != bool(outcome.held_item):
             problems.append(f'the held item of the run is "{outcome.held_item}", the tool says otherwise')
         if (outcome.status, outcome.reason) != ("HALTED", "halted"):
             problems.append(f"the run ended as {outcome.status} {outcome.reason}: {outcome.message}")

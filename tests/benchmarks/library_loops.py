@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from executive.cell.workcell import load_cell_kind
 
 from executive.cell.frame import Answer
 from executive.errors import Fault
+from executive.station.check import load_checker
 from executive.testing.faults import (
     after,
     during,
@@ -129,7 +129,7 @@ def run_with_faults(seed: int, kind: str) -> tuple[str, int, MissionResult, Part
         detector = "fasteners" if "fasteners" in mission else "embedded"
         rates = ASSUMED_RATES if kind == "fake" else {"threshold": UNMEASURED_THRESHOLD}
         values |= {f"cell.detectors.{detector}.{key}": str(value) for key, value in rates.items()}
-    result = run_mission(mission, load_cell_kind(kind), seed=seed, set=values, faults=faults, timeout=TIMEOUT)
+    result = run_mission(mission, load_checker(kind), seed=seed, set=values, faults=faults, timeout=TIMEOUT)
     return mission, ATTEMPTS[mission], result, parts
 
 
@@ -144,7 +144,7 @@ def explain_problem(seed: int, kind: str) -> str:
         problems.append(f"{result.reason}: {result.message}")
     if parts.pick_counts and max(parts.pick_counts.values()) > attempts + 1:
         problems.append(f"{max(parts.pick_counts.values())} picks of an object")
-    named = [row.item for row in result.accounts.list_items() if row.state in ("rejected", "lost")]
+    named = [row.item for row in result.ledger.list_items() if row.state in ("rejected", "lost")]
     if not result.agrees and (result.status == "SUCCESS" or not named):
         problems.append(f"{result.status}, items {dict(result.items)}, audit {result.audit}")
     return f"seed {seed}, {mission}: {'; '.join(problems)}" if problems else ""

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 from executive.cell.proxy import intercept
-from executive.cell.workcell import Workcell
 from py_trees.trees import BehaviourTree
 
 from executive.campaign.jobs import MissionUnderTest
+from executive.cell.devices import Workcell
 from executive.geometry import Array
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions

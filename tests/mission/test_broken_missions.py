@@ -16,13 +16,13 @@ from typing import NamedTuple
 
 import pytest
 from click.testing import CliRunner
-from executive.cell.workcell import load_cell_kind
 
 from executive.behaviours import load_skills
 from executive.cli.main import main
 from executive.cli.streams import keep_stdout_clean
-from executive.mission.load import CellKindFinder, load_mission
+from executive.mission.load import CheckerFinder, load_mission
 from executive.skill import Skill
+from executive.station.check import load_checker
 from executive.text.findings import MEANING_BY_CODE, Finding, MissionError
 
 FOLDER = Path(__file__).parent / "broken"
@@ -61,16 +61,16 @@ def rendered(path: Path, findings: Iterable[Finding]) -> str:
 @pytest.fixture(scope="module")
 def look(shared_cells: None) -> Look:
     """What is wrong with a mission; each is loaded once."""
-    skills, kind = load_skills(), functools.cache(load_cell_kind)
+    skills, kind = load_skills(), functools.cache(load_checker)
     return functools.cache(lambda path: findings_of(path, skills, kind))
 
 
 def findings_of(
-    path: Path, skills: dict[str, type[Skill]], kind: CellKindFinder = load_cell_kind
+    path: Path, skills: dict[str, type[Skill]], kind: CheckerFinder = load_checker
 ) -> tuple[Finding, ...]:
     """Return the findings of a mission."""
     try:
-        return load_mission(path, skills, find_cell_kind=kind).warnings
+        return load_mission(path, skills, find_checker=kind).warnings
     except MissionError as error:
         return error.findings
 
@@ -119,6 +119,6 @@ def test_every_kind_of_finding_has_a_broken_mission() -> None:
 if __name__ == "__main__":
     os.chdir(FOLDER)
     with keep_stdout_clean():
-        skills, kind = load_skills(), functools.cache(load_cell_kind)
+        skills, kind = load_skills(), functools.cache(load_checker)
         texts = [rendered(path, findings_of(path, skills, kind)) for path in BROKEN]
     WORDS.write_text("".join(texts), encoding="utf-8")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from executive.cell.workcell import load_cell_kind
 
 from executive.behaviours import load_skills
 from executive.errors import InputError
 from executive.mission.load import load_mission
+from executive.station.check import load_checker
 
 MISSION = "mission: m\ncell: cells/own.yaml\nroutes: {cube: red_bin}\ntree: Detect\n"
 CELL = "base: cells/overhead.yaml\ncell: own\ndetectors:\n  eye: {kind: roboflow, model_id: a/1, KEY}\n"
@@ -29,7 +29,7 @@ def test_a_key_in_a_cell_file_is_refused_and_not_shown(tmp_path: Path, key: str)
     (tmp_path / "cells" / "own.yaml").write_text(CELL.replace("KEY", key))
     (tmp_path / "m.yaml").write_text(MISSION)
     with pytest.raises(InputError) as caught:
-        load_mission(tmp_path / "m.yaml", load_skills(), find_cell_kind=load_cell_kind)
+        load_mission(tmp_path / "m.yaml", load_skills(), find_checker=load_checker)
     assert "ROBOFLOW_API_KEY" in str(caught.value) or "url" in key
     assert "***" in str(caught.value)
     assert "SECRET123" not in str(caught.value)

@@ -68,7 +68,7 @@ def test_findings_of_the_robot_stand_in_the_cell_file(load: Load) -> None:
             yield ("bins", "blue_bin", "position"), "0.3 m out of reach"
 
     with pytest.raises(MissionError) as caught:
-        load(HEAD + "tree: Look\n", find_cell_kind=lambda name: Short)
+        load(HEAD + "tree: Look\n", find_checker=lambda name: Short)
     assert str(caught.value).startswith("cells/small.yaml:16:14: error[robot]: 0.3 m out of reach\n")
 
 
@@ -76,7 +76,7 @@ def test_an_error_of_compute_mass_is_a_finding(load: Load, monkeypatch: pytest.M
     monkeypatch.setattr(FakeCell, "check", lambda config, cell_folder: ())
     monkeypatch.setattr(FakeCell, "compute_mass", Mock(side_effect=InputError("no scale")), raising=False)
     with pytest.raises(MissionError, match=r"cells/small.yaml.*robot.*cube.*no scale"):
-        load(HEAD + "routes: {cube: red_bin}\ntree: Look\n", find_cell_kind=lambda name: FakeCell)
+        load(HEAD + "routes: {cube: red_bin}\ntree: Look\n", find_checker=lambda name: FakeCell)
 
 
 def test_a_link_out_of_the_folder_is_refused(load: Load, tmp_path: Path, small_cell: str) -> None:

@@ -102,7 +102,7 @@ def test_mutants_are_refused_or_run_without_a_fault(tmp_path: Path) -> None:
         mission.write_bytes(text.encode(errors="surrogatepass"))
         try:
             loaded = load_mission(
-                mission, skills, {"cell.table.objects": "[1, 3]"}, find_cell_kind=lambda name: FakeCell
+                mission, skills, {"cell.table.objects": "[1, 3]"}, find_checker=lambda name: FakeCell
             )
         except MissionError as error:
             assert any(finding.severity == "error" for finding in error.findings), seed

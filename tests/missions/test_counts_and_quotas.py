@@ -23,7 +23,7 @@ def run_with(mission: str | Path, *labels: str, **settings: str) -> MissionResul
 def count_by_bin(result: MissionResult) -> dict[str, Counter[str]]:
     """Return the number of placed objects by bin and class."""
     counts: dict[str, Counter[str]] = {}
-    for row in result.cell.accounts.list_items():
+    for row in result.cell.ledger.list_items():
         counts.setdefault(row.bin, Counter())[row.label] += 1
     return counts
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from executive.cell.workcell import load_cell_kind
 
 from executive.cell.frame import Answer
+from executive.station.check import load_checker
 from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import (
     after,
@@ -81,7 +81,7 @@ def schedule(kind: str, seed: int) -> list[ScheduledFault]:
 
 
 def names_rejected_and_lost_items(result: MissionResult) -> bool:
-    rows = [row for row in result.accounts.list_items() if row.state in ("rejected", "lost")]
+    rows = [row for row in result.ledger.list_items() if row.state in ("rejected", "lost")]
     return result.status == "INCOMPLETE" and all(row.item in result.message for row in rows)
 
 
@@ -91,7 +91,7 @@ def names_rejected_and_lost_items(result: MissionResult) -> bool:
 @pytest.mark.parametrize("kind", ["bumped objects", "wrong classes", "exchanged objects", "emptied bin"])
 def test_ledger_and_audit_agree_or_the_run_names_the_items(kind: str, cell: str, seed: int) -> None:
     result = run_mission(
-        "sort_overhead", FakeCell if cell == "fake" else load_cell_kind("sim"),
+        "sort_overhead", FakeCell if cell == "fake" else load_checker("sim"),
         seed=seed, faults=schedule(kind, seed), set={"cell.kind": cell},
     )  # fmt: skip
     assert result.agrees or names_rejected_and_lost_items(result)

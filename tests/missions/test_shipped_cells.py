@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from executive.cell.workcell import load_cell_kind
 
 from executive.cell.config import CellConfig
 from executive.mission.cell_file import load_cell
 from executive.perception.detectors.envelope import find_unmeasured_detectors
+from executive.station.check import load_checker
 from executive.testing.fake_cell import FakeCell
 
 CELLS = sorted((Path(__file__).parents[2] / "missions" / "cells").glob("*.yaml"))
@@ -32,7 +32,7 @@ def test_it_has_the_name_of_its_file_and_says_what_it_stands_for(path: Path, con
 
 
 def test_its_kind_finds_nothing_wrong_with_it(path: Path, config: CellConfig) -> None:
-    assert list(load_cell_kind(config.kind).check(config, path.parent)) == []
+    assert list(load_checker(config.kind).check(config, path.parent)) == []
 
 
 def test_the_most_objects_that_it_asks_for_find_room(config: CellConfig) -> None:

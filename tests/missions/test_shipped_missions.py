@@ -9,13 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from executive.cell.workcell import Workcell, load_cell_kind
 
 from executive.behaviours import load_skills
+from executive.cell.devices import Workcell
 from executive.events import ItemChanged, MotionPlanned, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
+from executive.station.check import load_checker
 from executive.testing.fake_cell import FakeCell
 from executive.testing.oracle import make_oracle_kind
 
@@ -46,7 +47,7 @@ class Done:
 @functools.cache
 def loaded(name: str) -> LoadedMission:
     """Return a shipped mission."""
-    return load_mission(MISSIONS[name], load_skills(), find_cell_kind=load_cell_kind)
+    return load_mission(MISSIONS[name], load_skills(), find_checker=load_checker)
 
 
 def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = FakeCell) -> Done:
@@ -56,10 +57,10 @@ def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = F
     options = RunOptions(seed, [*mission.routes] * 6, make_cell=kind)
     with closing(assemble(mission, options, [events.append])) as run:
         outcome = run.execute()
-        rows = run.workcell.accounts.list_items()
-        audit = dict(run.workcell.audit() or {})
+        rows = run.station.ledger.list_items()
+        audit = dict(run.station.audit() or {})
     ahead = [one.event.planned_ahead for one in events if isinstance(one.event, MotionPlanned)]
-    return Done(outcome, run.workcell.accounts.count_states(), rows, audit, ahead)
+    return Done(outcome, run.station.ledger.count_states(), rows, audit, ahead)
 
 
 def assert_done(name: str, done: Done) -> None:

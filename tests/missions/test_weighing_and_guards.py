@@ -36,5 +36,5 @@ def test_after_the_working_time_the_held_object_is_put_down_and_no_other_is_pick
     result = run_mission("sort_guarded", set={"limit": "3"}, arrange=put_objects)
     assert len(result.list_activated_nodes("*/Grasp")) == result.items["placed"] + 1
     assert len(result.list_activated_nodes("*/PutDown")) == 1
-    reasons = {row.reason for row in result.accounts.list_items()}
+    reasons = {row.reason for row in result.ledger.list_items()}
     assert not any(reason.startswith("could not be picked") for reason in reasons)

@@ -37,7 +37,7 @@ def test_a_class_that_is_always_mistaken_is_in_no_wrong_bin_and_rejected_by_its_
     result = sorted_with(mission, {"cube": "sphere"})
     assert (result.status, result.items["placed"], result.items["rejected"]) == ("INCOMPLETE", 2, 2)
     assert (result.audit["wrong_bin"], result.agrees) == (0, True)
-    reasons = [row.reason for row in result.accounts.list_items() if row.state == "rejected"]
+    reasons = [row.reason for row in result.ledger.list_items() if row.state == "rejected"]
     # The fake tool feels a surface from 2 mm above it.
     height = "it was touched 52 mm above the table, and a sphere is 60 mm high"
     assert reasons == [f"could not be picked: {height}"] * 2
@@ -49,7 +49,7 @@ def test_objects_of_no_class_are_reported_as_not_sorted() -> None:
     label = "Cube"
     result = sorted_with("sort_overhead", {"cube": label})
     assert (result.status, result.items["placed"], result.items["rejected"]) == ("INCOMPLETE", 2, 2)
-    assert (result.agrees, result.accounts.unknown_labels) == (True, {label: 2})
+    assert (result.agrees, result.ledger.unknown_labels) == (True, {label: 2})
     assert f'{label}-1 (the cell has no class "{label}"' in result.message
 
 
@@ -98,7 +98,7 @@ def test_a_box_of_no_class_counts_if_looks_confirm_it_in_the_workspace(
 def test_a_label_that_the_cell_file_ignores_is_not_counted() -> None:
     # The banana is beside a sphere.
     result = sorted_beside_banana(lambda look: True, 0.5, 0.06, 0.9, **{"cell.unknown.ignore": "[banana]"})
-    assert (result.status, result.accounts.unknown_labels, result.is_table_empty) == ("SUCCESS", {}, True)
+    assert (result.status, result.ledger.unknown_labels, result.is_table_empty) == ("SUCCESS", {}, True)
     assert (result.items["placed"], result.agrees) == (4, True)
 
 

@@ -37,7 +37,7 @@ def cells(monkeypatch: pytest.MonkeyPatch) -> list[FakeCell]:
             super().__init__(*args, **options)
             made.append(self)
 
-    monkeypatch.setattr("executive.run.assembly.load_cell_kind", lambda name: Cell)
+    monkeypatch.setattr("executive.run.assembly.load_checker", lambda name: Cell)
     return made
 
 

@@ -60,8 +60,8 @@ class FailedRun:
         self.timeline = Timeline(has_history=False)
         options = RunOptions(3, requests, make_cell=FakeCell)
         self.run = assemble(self.loaded, options, [self.timeline])
-        assert isinstance(self.run.workcell, FakeCell)
-        self.fake = self.run.workcell
+        assert isinstance(self.run.station, FakeCell)
+        self.fake = self.run.station
         if objects:
             self.fake.world.objects.clear()
             for label, x, y in objects:

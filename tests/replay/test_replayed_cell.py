@@ -29,7 +29,7 @@ def test_questions_are_answered_from_the_log_and_commands_are_not_executed() -> 
     replayed.cell.arm.stop()
     assert (replayed.cell.tool.holding, fake.tool.holding) == (True, False)
     replayed.advance()
-    assert (replayed.steps, fake.steps, replayed.cell.clock.now) == (1, 0, STEP)
+    assert (replayed.steps, fake.tick_count, replayed.cell.clock.now) == (1, 0, STEP)
 
 
 def test_after_the_last_interruption_the_cell_inside_takes_over() -> None:
@@ -43,7 +43,7 @@ def test_after_the_last_interruption_the_cell_inside_takes_over() -> None:
     assert (replayed.is_live, replayed.pending_interruption) == (True, None)
     assert not replayed.cell.tool.holding
     replayed.advance()
-    assert replayed.steps == fake.steps == 2
+    assert replayed.steps == fake.tick_count == 2
 
 
 @pytest.mark.parametrize("ticked", [False, True])

@@ -37,8 +37,8 @@ def story_of(name: str, seed: int, make_cell: Callable[..., Any] = FakeCell) -> 
     run = assemble(loaded(name), RunOptions(seed, [], make_cell=make_cell), [trace])
     try:
         outcome = run.execute()
-        items = run.workcell.accounts.list_items()
-        return outcome.status, outcome.ticks, trace.hexdigest(), items, run.workcell.audit()
+        items = run.station.ledger.list_items()
+        return outcome.status, outcome.ticks, trace.hexdigest(), items, run.station.audit()
     finally:
         run.close()
 

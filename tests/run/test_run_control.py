@@ -44,7 +44,7 @@ def test_a_paused_run_can_be_stopped(missions: Path) -> None:
     threading.Timer(0.3, run.control.stop).start()
     outcome = run.execute()
     assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
-    assert run.workcell.cell.arm.at_rest
+    assert run.station.cell.arm.at_rest
     assert run.tick >= 50
 
 
@@ -55,7 +55,7 @@ def test_the_held_item_is_reported_at_the_end(missions: Path) -> None:
 
     run = make(missions, stop)
     held = run.execute().held_item
-    assert held in {row.item for row in run.workcell.accounts.list_items()}
+    assert held in {row.item for row in run.station.ledger.list_items()}
 
 
 @pytest.mark.parametrize("kind", [ItemChanged, RunEnded, FaultRaised])
@@ -73,7 +73,7 @@ def test_a_record_that_breaks_at_the_very_end_is_a_fault_with_an_outcome(
     run = make(missions, refuse)
     outcome = run.execute()
     assert (outcome.status, outcome.message) == ("FAULT", "the disk is full")
-    assert run.workcell.cell.arm.at_rest
+    assert run.station.cell.arm.at_rest
 
 
 def test_something_is_done_between_ticks_and_while_the_run_stands_still() -> None:

@@ -63,7 +63,7 @@ def test_the_cell_is_arranged_before_the_run_and_closed_after_it(look: Path) -> 
 
     seen: list[TimedEvent] = []
     result = run_mission(look, Cell, arrange=arrange, observers=[seen.append])
-    assert (list(result.events), [row.item for row in result.accounts.list_items()]) == (seen, ["duck-1"])
+    assert (list(result.events), [row.item for row in result.ledger.list_items()]) == (seen, ["duck-1"])
     with pytest.raises(ValueError, match="the test is wrong"):
         run_mission(look, Cell, arrange=break_down)
     assert closed == ["closed"] * 2
@@ -96,7 +96,7 @@ def test_a_cell_whose_time_is_over_says_so_once_so_that_the_arm_can_be_braked() 
     with pytest.raises(Fault, match=r"has not ended after 0\.01 s"):
         cell.advance()
     cell.advance()
-    assert cell.steps == 4
+    assert cell.tick_count == 4
 
 
 def test_patterns_that_fit_no_node_are_refused(look: Path) -> None:

@@ -135,7 +135,7 @@ def test_a_bug_comes_up_in_mid_work_and_the_skill_cleans_up(fake: FakeCell, targ
     broken = make_raising(Approach, ZeroDivisionError("in the model"), delay_steps=40)
     with pytest.raises(ZeroDivisionError, match="in the model"):
         run_skill(broken, fake, inputs={"target": target})
-    assert fake.steps >= 40
+    assert fake.tick_count >= 40
     assert fake.arm.commands == ["start", "stop"]
 
 

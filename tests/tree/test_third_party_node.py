@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from executive.cell.workcell import load_cell_kind
 
 from executive.behaviours import load_skills
 from executive.cli.main import main
 from executive.events import NodeEnded
 from executive.mission.load import load_mission
+from executive.station.check import load_checker
 from executive.testing.run_mission import run_mission
 from executive.text.findings import MissionError
 
@@ -126,7 +126,7 @@ def call(*words: str) -> Result:
 )
 def test_a_mission_that_uses_it_is_checked(project: Path, tree: str, code: str) -> None:
     with pytest.raises(MissionError) as caught:
-        load_mission(write(tree), load_skills(), find_cell_kind=load_cell_kind)
+        load_mission(write(tree), load_skills(), find_checker=load_checker)
     assert code in {finding.code for finding in caught.value.findings}
 
 

@@ -9,11 +9,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from executive.cell.workcell import ResumePoint
 from executive.drivers.sim.cell import SimCell
 
 from executive.behaviours import load_skills
 from executive.cell.device_config import STEP
+from executive.cell.devices import ResumePoint
 from executive.drivers.world_log import JOINT_TARGETS, CommandLog
 from executive.errors import InputError
 from executive.events import discard_event
@@ -52,7 +52,7 @@ def state_of(cell: SimCell | SimpleNamespace) -> str:
         (body, world.client.getBasePositionAndOrientation(body), world.client.getBaseVelocity(body))
         for body in world.labels
     ]
-    return repr((joints, bodies, tool.held_body, tool.pull, cell.steps))
+    return repr((joints, bodies, tool.held_body, tool.pull, cell.tick_count))
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
     """One run, and what it would have left at some of its control steps."""
     folder = tmp_path_factory.mktemp("logs")
     run = assemble(mission, RunOptions(SEED, make_cell=make_oracle_kind()))
-    cell = run.workcell
+    cell = run.station
     assert isinstance(cell, SimCell)
     cell.log_to(folder / "log")
     snapshots: list[Left] = []
@@ -73,12 +73,12 @@ def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
 
     def advanced() -> None:
         advance()
-        if cell.steps in TICKS:
-            copy = folder / str(cell.steps)
+        if cell.tick_count in TICKS:
+            copy = folder / str(cell.tick_count)
             copy.write_bytes((folder / "log").read_bytes())
             arm = cell._arm
-            snapshots.append(Left(copy, state_of(cell), cell.steps, arm._motion, arm._motion_time))
-        if cell.steps == max(TICKS):
+            snapshots.append(Left(copy, state_of(cell), cell.tick_count, arm._motion, arm._motion_time))
+        if cell.tick_count == max(TICKS):
             raise Cut
 
     cell.advance = advanced  # type: ignore[method-assign]
@@ -177,5 +177,5 @@ def test_what_happened_meanwhile_is_there_and_took_none_of_the_runs_time(
     things = {thing.body: thing.position for thing in WorldAccess(cell).objects}
     assert np.abs(things[moved[0][0]] - moved[0][1]).max() < 0.01
     assert moved[1][0] not in things
-    assert (cell.steps, cell.cell.arm.at_rest) == (left[1].tick, True)
+    assert (cell.tick_count, cell.cell.arm.at_rest) == (left[1].tick, True)
     cell.close()
