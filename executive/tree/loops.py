@@ -60,7 +60,7 @@ class GeneratorBehaviour(NodeBehaviour):
 
     def run_child(self, child: Node) -> NodeRun:
         """Tick a child once per tick until its end, and return its failure; None after success."""
-        while (status := self.tick_child(child)) is Status.RUNNING:
+        while (status := self.await_child(child)) is Status.RUNNING:
             yield
         return self.get_failure(child) if status is Status.FAILURE else None
 

@@ -238,6 +238,8 @@ class NodeBehaviour(TreeNode):
         self.clock = context.clock
         self.ledger = context.ledger
         self.children = list(self.behaviour_by_child.values())
+        self._awaited_child: Node | None = None
+        """Running child that is ticked without a call of `step`, or None."""
         self._visited_nodes: list[Behaviour] | None = None
         """Nodes that were ticked in this tick, for visitors of py_trees; None in a tick without visitors."""
         for child in self.children:
@@ -268,6 +270,19 @@ class NodeBehaviour(TreeNode):
         status = behaviour.status
         if status is Status.INVALID:
             raise Fault(f"{behaviour.name} was ticked but has no status", self.path)
+        return status
+
+    def await_child(self, child: Node) -> Status:
+        """Tick a child and return its status; while the child is running, `step` is not called.
+
+        After the end of the child, `step` must call this method again, which then only returns the status.
+        """
+        if child is self._awaited_child:
+            self._awaited_child = None
+            return self.behaviour_by_child[child].status
+        status = self.tick_child(child)
+        if status is Status.RUNNING:
+            self._awaited_child = child
         return status
 
     def halt_children(self, children: Iterable[Node]) -> None:
@@ -311,8 +326,11 @@ class NodeBehaviour(TreeNode):
         """Start the node, or continue the node by one tick."""
         if self.status is not Status.RUNNING:
             self._begin()
+            self._awaited_child = None
             self.emit(NodeStarted(self.path))
             self.start()
+        elif self._awaited_child is not None and self.tick_child(self._awaited_child) is Status.RUNNING:
+            return
         status = self.step()
         if status is not Status.RUNNING:
             self._end(status)

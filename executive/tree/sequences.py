@@ -173,7 +173,7 @@ class OrderedNode(ControlNode):
         def step(self) -> Status:
             """Tick the children in order until one of them decides the status of the tick."""
             index = previous_index = self._child_index
-            tick = self.tick_child
+            tick = self.await_child
             if not self.node.memory:
                 index = 0
                 tick = self.tick_again
