@@ -38,6 +38,8 @@ class TreeNode(Behaviour):
         self.blackboard = context.blackboard
         self.failure: Failure | None = None
         self._emit_without_parent = context.emit
+        self._held_events: list[Event] | None = None
+        """Events of this node and of the nodes below that wait for their emission; None outside of a hold."""
 
     def _begin(self) -> None:
         """Set the status RUNNING, and remove the failure of the previous activation."""
@@ -52,9 +54,14 @@ class TreeNode(Behaviour):
         return Status.FAILURE
 
     def emit(self, event: Event) -> None:
-        """Emit an event of this node or of a node below, through all ancestors."""
-        emit = self.parent.emit if isinstance(self.parent, TreeNode) else self._emit_without_parent
-        emit(event)
+        """Emit an event of this node or of a node below, unless this node or an ancestor holds its events."""
+        node: TreeNode = self
+        while node._held_events is None and isinstance(node.parent, TreeNode):
+            node = node.parent
+        if node._held_events is None:
+            node._emit_without_parent(event)
+        else:
+            node._held_events.append(event)
 
     def update(self) -> Status:
         """Continue by one tick and return the status."""
