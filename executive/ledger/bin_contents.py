@@ -54,8 +54,8 @@ class BinContents:
 
         `label` restricts the count to one class.
         """
-        items = (record for record in self.records if label in (None, record.label))
-        return sum(bin_name in (record.bin, find_probable_bin(record)) for record in items)
+        items = [item for item in self.records if bin_name in (item.bin, find_probable_bin(item))]
+        return len(items) if label is None else sum(item.label == label for item in items)
 
     def count_placed(self, detected_label: str, bin_name: str) -> int:
         """Return the number of items placed in a bin whose class the detectors report as `detected_label`."""

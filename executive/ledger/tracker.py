@@ -284,7 +284,8 @@ class Tracker:
         return [record.item for record in workspace_items if record not in certain_items]
 
     def find_held_item(self) -> Item | None:
-        return next((record.item for record in self._records.filter_by_state(State.HELD)), None)
+        held = self._records.filter_by_state(State.HELD)
+        return held[0].item if held else None
 
     def is_current(self, frame: Frame) -> bool:
         return self._coverage.is_table_unchanged(frame.change_count)
