@@ -320,11 +320,12 @@ class Tracker:
 
     def list_possible_labels(self, item: Item) -> Sequence[str]:
         record = self._records.find(item)
+        label = record.label
         if self._certainty.is_class_certain_by_weight(record):
-            return [record.label]
+            return [label]
         detected_label = record.detected_label
         similar_classes = (other for other in self.classes.values() if other.detected_label == detected_label)
-        return [record.label, *(other.label for other in similar_classes if other.label != record.label)]
+        return [label, *(other.label for other in similar_classes if other.label != label)]
 
     def describe(self, item: Item) -> KnownItem:
         record = self._records.find(item)
