@@ -13,7 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.frame import Frame, FrameCaptured
-from executive.events import DetectedObject, FrameSearched, NodeEnded, RunEnded, TargetSelected, TimedEvent
+from executive.events import (
+    DetectedObject,
+    FrameSearched,
+    ItemChanged,
+    NodeEnded,
+    RunEnded,
+    TargetSelected,
+    TimedEvent,
+)
 from executive.record.run_directory import replace_atomically
 from executive.record.timeline import Timeline, get_skill_name
 
@@ -108,7 +116,8 @@ class PictureRecorder:
                 look = self._timeline.items.histories[name].look
                 if last.state == "rejected" and look and last.label in self._unknown_labels:
                     self._queue(timed, TargetSelected(name, last.label, look.frame, ""), None)
-        self._timeline(timed)
+        if isinstance(event, ItemChanged | FrameSearched | TargetSelected):
+            self._timeline(timed)
 
     def close(self, *, wait: bool = True) -> None:
         """Draw all queued pictures; if `wait` is False, only finish the current picture."""
