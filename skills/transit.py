@@ -33,4 +33,4 @@ class Transit(Skill):
         if doubt := explain_uncertain_bin(cell, self.bin, self.held):
             raise self.failure("blocked", doubt)
         goal = make_bin_goal(cell, self.bin, self.held, self.drop)
-        yield from transport(self, cell, self.held, goal, self.bin)
+        return transport(self, cell, self.held, goal, self.bin)

@@ -14,4 +14,4 @@ class Wait(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Wait on the clock of the run."""
-        yield from cell.clock.sleep(self.seconds)
+        return cell.clock.sleep(self.seconds)

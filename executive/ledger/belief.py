@@ -75,6 +75,8 @@ class Belief:
 
     Attributes:
         first_label: Class in the first detection.
+        label: Most probable class; among equally probable classes, the first in alphabetical order.
+        detected_label: Class that the detectors report for an object of the class `label`.
         log_odds: Posterior log odds that the item exists.
         is_confirmed: True if the item certainly exists, by the log odds or by a touch of the tool.
         miss_probability: Probability that all looks since the last detection missed the item by chance.
@@ -95,6 +97,8 @@ class Belief:
     """
 
     first_label: str
+    label: str = field(init=False)
+    detected_label: str = field(init=False)
     log_odds: float
     is_confirmed: bool = False
     miss_probability: float = 1.0
@@ -108,22 +112,14 @@ class Belief:
     label_map: Mapping[str, str] = field(default_factory=dict)
     weight_log_ratios: Mapping[str, float] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        self.label = self.first_label
+        self.detected_label = self.first_label
+
     @property
     def look_count(self) -> int:
         """Number of looks with a confident detection of the item."""
         return self.label_counts.total()
-
-    @property
-    def label(self) -> str:
-        """Most probable class; among equally probable classes, the first in alphabetical order."""
-        if not self.label_counts:
-            return self.first_label
-        return min(self.log_likelihoods, key=lambda label: (-self.log_likelihoods[label], label))
-
-    @property
-    def detected_label(self) -> str:
-        """Class that the detectors report for an object of the class `label`."""
-        return self.label_map.get(self.label, self.label)
 
     @property
     def class_error(self) -> float:
@@ -190,6 +186,7 @@ class Belief:
             false_positive_rate = min(rates.false_detections * ITEM_AREA_FRACTION, 1.0)
             self.log_odds += _compute_log_ratio(1.0 - rates.miss_rate, false_positive_rate, error_correlation)
         self.label_counts[label] += 1
+        self._update_labels()
         self.low_confidence_count = 0
         self.is_confirmed = self.is_confirmed or self.log_odds >= CONFIRMATION_LOG_ODDS
 
@@ -233,13 +230,20 @@ class Belief:
         for label in self.log_likelihoods:
             self.log_likelihoods[label] += log_ratios[label] - self.weight_log_ratios.get(label, 0.0)
         self.weight_log_ratios = {label: log_ratios[label] for label in self.log_likelihoods}
+        self._update_labels()
 
     def merge(self, duplicate: Belief) -> None:
         """Add the detections of a duplicate item, which is the same object and was never weighed."""
         for label, value in duplicate.log_likelihoods.items():
             self._add_class_evidence(label, value)
         self.label_counts += duplicate.label_counts
+        self._update_labels()
         self.miss_probability = 1.0
+
+    def _update_labels(self) -> None:
+        if self.label_counts:
+            self.label = min(self.log_likelihoods, key=lambda label: (-self.log_likelihoods[label], label))
+        self.detected_label = self.label_map.get(self.label, self.label)
 
     def _add_class_evidence(self, detected_label: str, log_ratio: float) -> None:
         """Add the log likelihood ratio of a detected class to each class that looks like it."""

@@ -54,12 +54,12 @@ class BinContents:
 
         `label` restricts the count to one class.
         """
-        items = (record for record in self.records if label in (None, record.label))
-        return sum(bin_name in (record.bin, find_probable_bin(record)) for record in items)
+        items = [item for item in self.records.all if bin_name in (item.bin, find_probable_bin(item))]
+        return len(items) if label is None else sum(item.label == label for item in items)
 
     def count_placed(self, detected_label: str, bin_name: str) -> int:
         """Return the number of items placed in a bin whose class the detectors report as `detected_label`."""
-        return sum((item.detected_label, item.bin) == (detected_label, bin_name) for item in self.records)
+        return sum((item.detected_label, item.bin) == (detected_label, bin_name) for item in self.records.all)
 
     def explain_skipped_class(self, label: str) -> str:
         """Return the reason why the mission does not sort objects of a class, or ""."""
@@ -73,7 +73,7 @@ class BinContents:
 
     def find_next_slot_index(self, bin_name: str) -> int:
         """Return the index after the last used slot of a bin, but at least the number of objects in it."""
-        slots = [record.slot for record in self.records if record.bin == bin_name]
+        slots = [record.slot for record in self.records.all if record.bin == bin_name]
         return max([self.count_objects_in(bin_name), *(slot + 1 for slot in slots if slot is not None)])
 
     def measure_slot_distance(self, record: ItemRecord, observations: Sequence[Observation]) -> float:
@@ -179,7 +179,7 @@ class BinContents:
         shown = [entry for entry in observations if self.find_bin_name(entry, bias_std) == record.bin]
         alike = [entry for entry in shown if entry.detection.label == record.detected_label]
         confident = [entry for entry in alike if entry.is_confident]
-        items = [item for item in self.records if item.bin == record.bin]
+        items = [item for item in self.records.all if item.bin == record.bin]
         distances = {
             item: self.measure_slot_distance(item, confident)
             for item in items

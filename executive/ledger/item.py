@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -264,16 +263,16 @@ class ItemRecords:
 
     Args:
         emit: Function that receives the events.
+
+    Attributes:
+        all: All records; adding or removing a record makes a new tuple.
     """
 
     def __init__(self, emit: Emit) -> None:
+        self.all: tuple[ItemRecord, ...] = ()
         self._emit = emit
         self._records: dict[Item, ItemRecord] = {}
         self._name_counts: Counter[str] = Counter()
-
-    def __iter__(self) -> Iterator[ItemRecord]:
-        """Return an iterator over all records; records may be added and removed during the iteration."""
-        return iter(list(self._records.values()))
 
     def find(self, item: Item) -> ItemRecord:
         """Return the record of an item.
@@ -288,7 +287,7 @@ class ItemRecords:
 
     def filter_by_state(self, *states: State) -> list[ItemRecord]:
         """Return the records of all items in one of the given states."""
-        return [record for record in self if record.state in states]
+        return [record for record in self.all if record.state in states]
 
     def add(
         self,
@@ -306,14 +305,17 @@ class ItemRecords:
         label = belief.first_label
         self._name_counts[label] += 1
         name = f"{label}-{self._name_counts[label]}"
-        self._records[name] = ItemRecord(
+        record = ItemRecord(
             name, belief, position, frame.change_count, frame.stamp, was_place_empty, was_place_searched
         )
-        return self._records[name]
+        self._records[name] = record
+        self.all = (*self.all, record)
+        return record
 
     def remove(self, record: ItemRecord) -> None:
         """Remove an item that no event has reported yet."""
         del self._records[record.item]
+        self.all = tuple(self._records.values())
 
     def emit(self, *records: ItemRecord) -> None:
         """Emit the current state of each given item as an event."""

@@ -299,7 +299,7 @@ class LookUpdate:
         """
         phantoms = []
         for index, new_item in enumerate(detected_items):
-            if known_item := find_moved_item(new_item, self.records, self.coverage, self.certainty):
+            if known_item := find_moved_item(new_item, self.records.all, self.coverage, self.certainty):
                 known_item.merge(new_item, self.config.max_class_error)
                 detected_items[index] = known_item
                 if new_item.first_stamp == new_item.stamp:
@@ -313,7 +313,7 @@ class LookUpdate:
         """Set the less certain of two items at one position to PHANTOM, and return the phantoms."""
         duplicates = []
         for record in detected_items:
-            if other_record := find_duplicate(record, self.records, self.config.gate):
+            if other_record := find_duplicate(record, self.records.all, self.config.gate):
                 duplicate, original = sorted((record, other_record), key=self._make_certainty_key)
                 duplicate.set_state(State.PHANTOM, f"it is {original.item}")
                 duplicates.append(duplicate)

@@ -221,10 +221,10 @@ class Tracker:
             self._add_body(np.array(point))
 
     def set_final_states(self, *, completed: bool) -> None:
-        has_touched_item = any(record.touched_label for record in self._records)
+        has_touched_item = any(record.touched_label for record in self._records.all)
         dropped = self._records.filter_by_state(State.DROPPED)
         dropped_items = [record for record in dropped if not record.was_taken_away]
-        for record in self._records:
+        for record in self._records.all:
             self._settle_undeclared(record)
             final_state = find_final_state(
                 record, self._certainty, skip_reason=self._explain_skipped_item(record),
@@ -245,17 +245,17 @@ class Tracker:
             self._records.emit(record)
 
     def count_states(self) -> dict[str, int]:
-        counts = Counter(record.state for record in self._records)
+        counts = Counter(record.state for record in self._records.all)
         totals = {state.value: counts[state] for state in (*FINAL_STATES, State.PHANTOM)}
         return {"seen": counts.total() - counts[State.PHANTOM], **totals}
 
     def list_items(self) -> Sequence[ItemChanged]:
-        return [record.event for record in self.records]
+        return [record.event for record in self._records.all]
 
     @property
     def records(self) -> Sequence[ItemRecord]:
         """All items, in the order of the first detection."""
-        return list(self._records)
+        return self._records.all
 
     @property
     def change_count(self) -> int:
@@ -277,14 +277,15 @@ class Tracker:
         return targets
 
     def find_uncertain_items(self) -> Sequence[Item]:
-        possible_items = [record for record in self.records if self._certainty.may_be_on_table(record)]
+        possible_items = [record for record in self._records.all if self._certainty.may_be_on_table(record)]
         workspace_items = [item for item in possible_items if self._coverage.is_in_workspace(item.position)]
         unmoved_items = [record for record in workspace_items if self._coverage.is_unmoved(record)]
         certain_items = [record for record in unmoved_items if self._certainty.is_certain(record)]
         return [record.item for record in workspace_items if record not in certain_items]
 
     def find_held_item(self) -> Item | None:
-        return next((record.item for record in self._records.filter_by_state(State.HELD)), None)
+        held = self._records.filter_by_state(State.HELD)
+        return held[0].item if held else None
 
     def is_current(self, frame: Frame) -> bool:
         return self._coverage.is_table_unchanged(frame.change_count)
@@ -296,7 +297,7 @@ class Tracker:
         return self._certainty.is_certain(self._records.find(item))
 
     def is_height_confirmed(self, label: str) -> bool:
-        return any(record.touched_label == label for record in self.records)
+        return any(record.touched_label == label for record in self._records.all)
 
     def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
         routed_labels = [routed_label for routed_label in self.routes if label in (None, routed_label)]
@@ -305,7 +306,7 @@ class Tracker:
             return True
         if self._coverage.max_object_probability > self.config.max_miss_probability:
             return False
-        records = (record for record in self.records if record.item not in ignored_items)
+        records = (record for record in self._records.all if record.item not in ignored_items)
         possible_items = [record for record in records if self._certainty.may_be_on_table(record)]
         visible_items = [record for record in possible_items if self._coverage.is_visible(record.position)]
         # An item without enough confident detections counts as an object of every class.
@@ -319,11 +320,12 @@ class Tracker:
 
     def list_possible_labels(self, item: Item) -> Sequence[str]:
         record = self._records.find(item)
+        label = record.label
         if self._certainty.is_class_certain_by_weight(record):
-            return [record.label]
+            return [label]
         detected_label = record.detected_label
         similar_classes = (other for other in self.classes.values() if other.detected_label == detected_label)
-        return [record.label, *(other.label for other in similar_classes if other.label != record.label)]
+        return [label, *(other.label for other in similar_classes if other.label != label)]
 
     def describe(self, item: Item) -> KnownItem:
         record = self._records.find(item)
@@ -340,14 +342,14 @@ class Tracker:
         )  # fmt: skip
 
     def list_known_items(self) -> Sequence[KnownItem]:
-        records = (record for record in self._records if record.state is not State.PHANTOM)
+        records = (record for record in self._records.all if record.state is not State.PHANTOM)
         return [self.describe(record.item) for record in records if record.belief.is_probable]
 
     def count_objects_in(self, bin: str, label: str | None = None) -> int:
         return self._bin_contents.count_objects_in(bin, label)
 
     def count_items(self, state: str, label: str | None = None, bin: str | None = None) -> int:
-        items = (self.describe(record.item) for record in self._records)
+        items = (self.describe(record.item) for record in self._records.all)
         return sum(
             item.state == state and label in (None, item.label) and bin in (None, item.bin) for item in items
         )

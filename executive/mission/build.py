@@ -13,10 +13,10 @@ from executive.mission.grammar import SEQUENCE_KEYWORD
 from executive.mission.load import LoadedMission
 from executive.mission.ports import convert_setting, find_literals, find_wires
 from executive.skill import Direction, Param, Port, Skill
-from executive.tree.blackboard import Blackboard, NodeContext
+from executive.tree.blackboard import Blackboard, NodeContext, Wiring
 from executive.tree.node import ControlNode, ControlNodes, load_control_nodes
 from executive.tree.specification import Node, SkillNode, SubtreeNode
-from executive.tree.tree_node import SkillLeaf, TreeNode, Wiring
+from executive.tree.tree_node import SkillLeaf, TreeNode
 
 
 def build_tree(

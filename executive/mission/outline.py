@@ -11,7 +11,7 @@ from typing import Annotated
 from py_trees.behaviour import Behaviour
 from pydantic import Field
 
-from executive.tree.node import ControlNode, NodeBehaviour
+from executive.tree.node import ControlNode
 from executive.tree.tree_node import SkillLeaf
 
 _INDEX_PATTERN = re.compile(r"[0-9]+:")
@@ -112,16 +112,15 @@ def _iterate_outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) 
     subtrees = tuple(getattr(node, "subtree_names", ()))
     parent_key = _find_parent_key(node, parent, relative_path, (title, *reversed(subtrees)))
     trigger = ""
-    if isinstance(parent, NodeBehaviour):
-        trigger = parent.node.describe_trigger(parent.node.children[parent.children.index(node)])
+    if parent is not None and (control_node := _get_control_node(parent)):
+        trigger = control_node.describe_trigger(control_node.children[parent.children.index(node)])
     name = _format_name(relative_path)
     outline_node = OutlineNode(path, name, depth, detail, kind, title, parent_key, trigger, subtrees)
     if isinstance(node, SkillLeaf):
         yield _describe_skill(outline_node, node)
     else:
         # A py_trees behaviour that is no node of a mission is drawn in the default style.
-        symbol = node.node.symbol if isinstance(node, NodeBehaviour) else ControlNode.symbol
-        yield replace(outline_node, symbol=symbol)
+        yield replace(outline_node, symbol=(_get_control_node(node) or ControlNode).symbol)
     for child in node.children:
         yield from _iterate_outline(child, node, depth + 1)
 
@@ -135,7 +134,13 @@ def _get_kind(node: Behaviour) -> str:
     """Return "skill", the keyword of a control node, or the class name of another py_trees behaviour."""
     if isinstance(node, SkillLeaf):
         return SKILL_KIND
-    return node.node.keyword if isinstance(node, NodeBehaviour) else type(node).__name__.lower()
+    control_node = _get_control_node(node)
+    return control_node.keyword if control_node else type(node).__name__.lower()
+
+
+def _get_control_node(behaviour: Behaviour) -> ControlNode | None:
+    node = getattr(behaviour, "node", None)
+    return node if isinstance(node, ControlNode) else None
 
 
 def _format_name(relative_path: str) -> str:
@@ -159,10 +164,10 @@ def _find_parent_key(
     for name in names:
         if parts and parts[-1] == name:
             del parts[-1]
-    if not parts and isinstance(parent, NodeBehaviour):
-        omitted_keys = [name for name, key in parent.node.keys.items() if not key.in_path]
-        child = parent.node.children[parent.children.index(node)]
-        parts = [name for name in omitted_keys if child in parent.node.list_children(name)]
+    if not parts and parent is not None and (control_node := _get_control_node(parent)):
+        omitted_keys = [name for name, key in control_node.keys.items() if not key.in_path]
+        child = control_node.children[parent.children.index(node)]
+        parts = [name for name in omitted_keys if child in control_node.list_children(name)]
     return " ".join(parts)
 
 

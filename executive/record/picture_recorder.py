@@ -12,8 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from executive import events
 from executive.cell.frame import Frame, FrameCaptured
-from executive.events import DetectedObject, FrameSearched, NodeEnded, RunEnded, TargetSelected, TimedEvent
+from executive.events import DetectedObject, FrameSearched, NodeEnded, TargetSelected, TimedEvent
 from executive.record.run_directory import replace_atomically
 from executive.record.timeline import Timeline, get_skill_name
 
@@ -103,12 +104,13 @@ class PictureRecorder:
             self._queue(timed, event, None)
         elif isinstance(event, NodeEnded) and event.skill and event.status == "FAILURE":
             self._queue(timed, self._timeline.selections.get(event.item), event)
-        elif isinstance(event, RunEnded):
+        elif isinstance(event, events.RunEnded):
             for name, last in self._timeline.items.changes.items():
                 look = self._timeline.items.histories[name].look
                 if last.state == "rejected" and look and last.label in self._unknown_labels:
                     self._queue(timed, TargetSelected(name, last.label, look.frame, ""), None)
-        self._timeline(timed)
+        if isinstance(event, events.ItemChanged | FrameSearched | TargetSelected):
+            self._timeline(timed)
 
     def close(self, *, wait: bool = True) -> None:
         """Draw all queued pictures; if `wait` is False, only finish the current picture."""

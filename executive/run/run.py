@@ -361,6 +361,7 @@ class LookaheadPlanner:
         """Last selected target and its bin."""
         self._grip_tick: int | None = None
         """Control step of the last command to close the tool; None after the plan of the transit."""
+        self._held_item: Item | None = None
         self._change_tick: int | None = None
         """Control step of the last detections or motion; None if the approach has been planned since then."""
 
@@ -374,6 +375,9 @@ class LookaheadPlanner:
             self._item_and_bin = (event.item, event.bin) if exists else None
         elif isinstance(event, events.ToolCommanded):
             self._grip_tick = timed.tick if event.action == "close" else None
+        elif isinstance(event, events.ItemChanged):
+            if event.state == "held" or event.item == self._held_item:
+                self._held_item = self._cell.ledger.find_held_item()
         elif isinstance(event, events.FrameSearched | events.MotionPlanned):
             self._change_tick = timed.tick
 
@@ -384,13 +388,12 @@ class LookaheadPlanner:
         motion or a command to grip, because such a control step already has a high computational load.
         """
         cell = self._cell
-        held_item = cell.ledger.find_held_item()
-        may_hold = self._grip_tick not in (None, tick) and held_item is None
+        may_hold = self._grip_tick not in (None, tick) and self._held_item is None
         if may_hold and self._item_and_bin and cell.tool.holding:
             self._grip_tick = None
             item, bin = self._item_and_bin
             cell.arm.plan_ahead(make_bin_goal(cell, bin, item), make_transport_task(cell, item))
-        elif self._change_tick not in (None, tick) and held_item is not None and self._is_moving_to_bin():
+        elif self._change_tick not in (None, tick) and self._held_item and self._is_moving_to_bin():
             self._change_tick = None
             pickable_targets = sort_pickable_targets(cell, cell.ledger.find_targets())
             if targets := sort_by_tour(cell, pickable_targets):

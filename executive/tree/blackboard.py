@@ -1,8 +1,9 @@
-"""The blackboard (variables) of a run, and what else the nodes of a run share: context and failures."""
+"""The blackboard (variables) of a run, the wiring of skills to it, and the context and failures of nodes."""
 
 from __future__ import annotations
 
 from collections import UserDict
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from executive.cell.protocols import Clock, Ledger
@@ -52,3 +53,24 @@ class NodeContext:
     blackboard: Blackboard
     label: str = ""
     emit: Emit = discard_event
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """Connections of the ports of a skill to the constants and variables of a mission.
+
+    Attributes:
+        constants: Values of params and inputs from the mission file, by the name of the param or input.
+        inputs: Names of the variables from which inputs are read, by the name of the input.
+        outputs: Names of the variables to which outputs are written, by the name of the output.
+        fields: Fields that inputs read instead of the whole values of variables, by the name of the input.
+    """
+
+    constants: Mapping[str, object] = field(default_factory=dict)
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    outputs: Mapping[str, str] = field(default_factory=dict)
+    fields: Mapping[str, str] = field(default_factory=dict)
+
+    def make_field_suffix(self, name: str) -> str:
+        """Return `.label` for a port that reads the field `label` of its variable; "" for the whole value."""
+        return f".{self.fields[name]}" if name in self.fields else ""

@@ -42,7 +42,7 @@ class Invert(ControlNode):
 
         def step(self) -> Status:
             """Tick the body."""
-            status = self.tick_child(self.node.do)
+            status = self.await_child(self.node.do)
             if status is Status.SUCCESS:
                 return self.fail_with_reason(
                     "inverted", f"{self.behaviour_by_child[self.node.do].name} succeeded"
@@ -96,7 +96,7 @@ class Succeed(ControlNode):
             """Tick the body, if any."""
             if self.node.do is None:
                 return Status.SUCCESS
-            status = self.tick_child(self.node.do)
+            status = self.await_child(self.node.do)
             if status is Status.FAILURE:
                 self.report_choice("succeed despite the failure", self.get_failure(self.node.do))
             return Status.RUNNING if status is Status.RUNNING else Status.SUCCESS

@@ -23,7 +23,7 @@ from executive.tree.node import (
 )
 from executive.tree.specification import Child, Node, Reason, VariableName, format_reasons
 
-NodeRun: TypeAlias = Generator[None, None, Failure | None]
+NodeRun: TypeAlias = Generator[Node | None, None, Failure | None]
 """Generator that returns a failure, or None for success. A `yield` ends the tick."""
 
 
@@ -43,7 +43,9 @@ class GeneratorBehaviour(NodeBehaviour):
     def step(self) -> Status:
         """Continue the generator."""
         try:
-            next(self._run)
+            if next(self._run) is None:
+                # `run` decides in every tick, for instance with a loop over `run_child` of a running child.
+                self._awaited.clear()
         except StopIteration as end:
             failure = cast("Failure | None", end.value)
             return Status.SUCCESS if failure is None else self.fail(failure)
@@ -60,14 +62,14 @@ class GeneratorBehaviour(NodeBehaviour):
 
     def run_child(self, child: Node) -> NodeRun:
         """Tick a child once per tick until its end, and return its failure; None after success."""
-        while (status := self.tick_child(child)) is Status.RUNNING:
-            yield
+        while (status := self.await_child(child)) is Status.RUNNING:
+            yield child
         return self.get_failure(child) if status is Status.FAILURE else None
 
     def end_iteration(self) -> NodeRun:
         """End an iteration; wait for the next tick if the iteration took only one tick."""
         if not self._has_tick_passed:
-            yield
+            yield None
         self._has_tick_passed = False
         return None
 

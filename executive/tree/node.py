@@ -8,23 +8,18 @@ class `Behaviour` runs the node: `start` and `step`.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from typing import ClassVar, Protocol, TypeAlias
 
-from py_trees.behaviour import Behaviour
-from py_trees.common import Status
-
-from executive.errors import Fault, InputError
-from executive.events import BranchChosen, NodeEnded, NodeStarted
+from executive.errors import InputError
 from executive.plugins import PluginEntry, list_entries
 from executive.skill import Skill
-from executive.tree.blackboard import Failure, NodeContext
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.keys import KeyOwner
 from executive.tree.specification import Node, Reason
-from executive.tree.tree_node import TreeNode, halt
+from executive.tree.tree_node import NodeBehaviour as NodeBehaviour
 
 
 @dataclass(frozen=True)
@@ -217,128 +212,6 @@ class ControlNode(KeyOwner, Node):
     def counterpart(self) -> Counterpart | None:
         """Node of BehaviorTree.CPP with the same semantics; None if there is none."""
         return None
-
-
-class NodeBehaviour(TreeNode):
-    """Base class of the behaviours of control nodes; a subclass implements `start` and `step`.
-
-    Attributes:
-        node: Specification of the node.
-        behaviour_by_child: Behaviour of each child of the specification.
-        clock: Clock of the run.
-        ledger: Ledger of the run.
-    """
-
-    def __init__(
-        self, context: NodeContext, node: ControlNode, build_child: Callable[[Node], Behaviour]
-    ) -> None:
-        super().__init__(context, node.keyword)
-        self.node = node
-        self.behaviour_by_child = {child: build_child(child) for child in node.children}
-        self.clock = context.clock
-        self.ledger = context.ledger
-        self.children = list(self.behaviour_by_child.values())
-        self._visited_nodes: list[Behaviour] | None = None
-        """Nodes that were ticked in this tick, for visitors of py_trees; None in a tick without visitors."""
-        for child in self.children:
-            child.parent = self
-
-    @property
-    def detail(self) -> str:
-        """The constants of the node, as a text for drawings of the tree."""
-        return self.node.detail
-
-    def start(self) -> None:
-        """Begin an activation: the ticks from the start of the node to its end."""
-
-    def step(self) -> Status:
-        """Continue by one tick; return RUNNING, SUCCESS, or FAILURE after a call of `fail`."""
-        raise NotImplementedError
-
-    def clean_up(self) -> None:
-        """End an activation; called once per activation, also after a halt or a fault."""
-
-    def tick_child(self, child: Node) -> Status:
-        """Tick a child and return its status."""
-        behaviour = self.behaviour_by_child[child]
-        if self._visited_nodes is None:
-            behaviour.tick_once()
-        else:
-            self._visited_nodes.extend(behaviour.tick())
-        status = behaviour.status
-        if status is Status.INVALID:
-            raise Fault(f"{behaviour.name} was ticked but has no status", self.path)
-        return status
-
-    def halt_children(self, children: Iterable[Node]) -> None:
-        """Halt the children and all running nodes below the children, one child after the other.
-
-        Raises:
-            Fault: The clean-up of a node failed; all other nodes were halted nevertheless.
-        """
-        problems = [problem for child in children for problem in halt(self.behaviour_by_child[child])]
-        if problems:
-            raise Fault("; ".join(problems), self.path)
-
-    def get_failure(self, child: Node) -> Failure:
-        """Return the failure of a child; the reason is `failed` for a behaviour that is no `TreeNode`."""
-        behaviour = self.behaviour_by_child[child]
-        failure = getattr(behaviour, "failure", None)
-        if isinstance(failure, Failure):
-            return failure
-        return Failure(behaviour.name, "failed", self.path, message=behaviour.feedback_message)
-
-    def fail_with_reason(self, reason: str, message: str) -> Status:
-        """End with a failure of this node, with one of the declared `reasons`, and return FAILURE."""
-        return self.fail(Failure(self.node.keyword, reason, self.path, message=message))
-
-    def report_choice(self, choice: str, cause: Failure | None = None) -> None:
-        """Emit an event with a decision of the node, and with the failure that caused the decision."""
-        reason, message = (str(cause), cause.message) if cause else ("", "")
-        self.emit(BranchChosen(self.path, choice, reason, message))
-
-    def tick(self) -> Iterator[Behaviour]:
-        """Continue by one tick, then yield the ticked nodes for visitors of py_trees, children first."""
-        visited_nodes = self._visited_nodes = []
-        try:
-            self.tick_once()
-        finally:
-            self._visited_nodes = None
-        yield from visited_nodes
-        yield self
-
-    def tick_once(self) -> None:
-        """Start the node, or continue the node by one tick."""
-        if self.status is not Status.RUNNING:
-            self._begin()
-            self.emit(NodeStarted(self.path))
-            self.start()
-        status = self.step()
-        if status is not Status.RUNNING:
-            self._end(status)
-
-    def stop(self, new_status: Status = Status.INVALID) -> None:
-        """Halt the running nodes below this node, then end with `new_status`.
-
-        Raises:
-            Fault: The clean-up of a node below failed; all other nodes were halted nevertheless.
-        """
-        was_running = self.status is Status.RUNNING
-        try:
-            self.halt_children(self.node.children)
-        finally:
-            self.status = new_status
-            if was_running:
-                self.clean_up()
-                self.emit(NodeEnded(self.path, new_status.value))
-
-    def _end(self, status: Status) -> None:
-        """Set the final status, clean up, and emit `NodeEnded`."""
-        self.status = status
-        self.clean_up()
-        failure = self.failure if status is Status.FAILURE else None
-        reason, message, origin = (str(failure), failure.message, failure.path) if failure else ("", "", "")
-        self.emit(NodeEnded(self.path, status.value, reason=reason, message=message, origin=origin))
 
 
 ENTRY_POINT_GROUP = "executive.control_nodes"

@@ -155,12 +155,12 @@ class Parallel(ControlNode):
         def _tick_lead(self) -> Status:
             """Tick the lead; if the lead is still running, tick the other running children."""
             lead, *siblings = self._running_children
-            status = self.tick_child(lead)
+            status = self.await_child(lead)
             if status is not Status.RUNNING:
                 self.halt_children(siblings)
                 return status if status is Status.SUCCESS else self.fail(self.get_failure(lead))
             for child in siblings:
-                status = self.tick_child(child)
+                status = self.await_child(child)
                 if status is not Status.RUNNING:
                     self._running_children.remove(child)
                 if status is Status.FAILURE:
@@ -169,7 +169,7 @@ class Parallel(ControlNode):
 
         def _tick_all(self) -> Status:
             """Tick all running children, count the children that end, and return the status of the node."""
-            statuses = [(child, self.tick_child(child)) for child in self._running_children]
+            statuses = [(child, self.await_child(child)) for child in self._running_children]
             running_children = [child for child, status in statuses if status is Status.RUNNING]
             failures = [self.get_failure(child) for child, status in statuses if status is Status.FAILURE]
             self._running_children = running_children

@@ -11,7 +11,6 @@ from typing import ClassVar
 from py_trees.common import Status
 
 from executive.errors import Fault
-from executive.events import Event
 from executive.skill import HOLDING
 from executive.tree.flow import UNKNOWN_STATE, Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.keys import Children, KeyOwner, key
@@ -36,19 +35,9 @@ class ReactiveBehaviour(NodeBehaviour):
     Without this rule, a condition that is checked at every tick would fill the journal with equal events.
     """
 
-    _held_events: list[Event] | None = None
-    """Events of the child that `tick_again` ticks; None outside of `tick_again`."""
-
     def start(self) -> None:
         """Forget all previous results, so that the first run of each child emits events."""
         self._last_results: dict[Node, list[tuple[object, ...]]] = {}
-
-    def emit(self, event: Event) -> None:
-        """Emit an event of this node or of a node below; hold the events of a child that runs again."""
-        if self._held_events is None:
-            super().emit(event)
-        else:
-            self._held_events.append(event)
 
     def tick_again(self, child: Node) -> Status:
         """Tick a child, and return its status; discard its events if it ends as in its previous run."""
@@ -173,7 +162,7 @@ class OrderedNode(ControlNode):
         def step(self) -> Status:
             """Tick the children in order until one of them decides the status of the tick."""
             index = previous_index = self._child_index
-            tick = self.tick_child
+            tick = self.await_child
             if not self.node.memory:
                 index = 0
                 tick = self.tick_again

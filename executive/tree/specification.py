@@ -217,6 +217,11 @@ class Node(Specification):
         """Name of the node in paths: its label, otherwise its skill, subtree or keyword."""
         return self.label or self.type_name
 
+    @property
+    def detail(self) -> str:
+        """What drawings of the tree show next to the name, or ""."""
+        return ""
+
     def walk(self) -> Sequence[Node]:
         """Return this node and every node below it, parents before children."""
         return self._nodes

@@ -1,9 +1,8 @@
-"""Base class of all nodes of a tree, the leaf that runs a skill, and halting."""
+"""Ticks and halts of the nodes of a tree: base classes of all nodes and of control nodes, and skill leaf."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -13,9 +12,10 @@ from executive.cell.json_values import to_json_or_type_name
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell
 from executive.errors import Fault
-from executive.events import Event, NodeEnded, NodeStarted
+from executive.events import BranchChosen, Event, NodeEnded, NodeStarted
 from executive.skill import Direction, Skill, SkillFailed, get_attribute_name
-from executive.tree.blackboard import Failure, NodeContext
+from executive.tree.blackboard import Failure, NodeContext, Wiring
+from executive.tree.specification import Node
 
 
 class TreeNode(Behaviour):
@@ -38,6 +38,8 @@ class TreeNode(Behaviour):
         self.blackboard = context.blackboard
         self.failure: Failure | None = None
         self._emit_without_parent = context.emit
+        self._held_events: list[Event] | None = None
+        """Events of this node and of the nodes below that wait for their emission; None outside of a hold."""
 
     def _begin(self) -> None:
         """Set the status RUNNING, and remove the failure of the previous activation."""
@@ -52,9 +54,14 @@ class TreeNode(Behaviour):
         return Status.FAILURE
 
     def emit(self, event: Event) -> None:
-        """Emit an event of this node or of a node below, through all ancestors."""
-        emit = self.parent.emit if isinstance(self.parent, TreeNode) else self._emit_without_parent
-        emit(event)
+        """Emit an event of this node or of a node below, unless this node or an ancestor holds its events."""
+        node: TreeNode = self
+        while node._held_events is None and isinstance(node.parent, TreeNode):
+            node = node.parent
+        if node._held_events is None:
+            node._emit_without_parent(event)
+        else:
+            node._held_events.append(event)
 
     def update(self) -> Status:
         """Continue by one tick and return the status."""
@@ -80,6 +87,150 @@ def halt(root: Behaviour) -> list[str]:
                 # A node whose clean-up failed counts as ended: no node is halted twice.
                 node.status = Status.INVALID
     return problems
+
+
+class NodeBehaviour(TreeNode):
+    """Base class of the behaviours of control nodes; a subclass implements `start` and `step`.
+
+    Attributes:
+        node: Specification of the node.
+        behaviour_by_child: Behaviour of each child of the specification.
+        clock: Clock of the run.
+        ledger: Ledger of the run.
+    """
+
+    def __init__(self, context: NodeContext, node: Node, build_child: Callable[[Node], Behaviour]) -> None:
+        super().__init__(context, node.type_name)
+        self.node = node
+        self.behaviour_by_child = {child: build_child(child) for child in node.children}
+        self.clock = context.clock
+        self.ledger = context.ledger
+        self.children = list(self.behaviour_by_child.values())
+        self._awaited: dict[Node, Status | None] = {}
+        """Children of `await_child`, each with its status in the current tick; None before its tick."""
+        self._visited_nodes: list[Behaviour] | None = None
+        """Nodes that were ticked in this tick, for visitors of py_trees; None in a tick without visitors."""
+        for child in self.children:
+            child.parent = self
+
+    @property
+    def detail(self) -> str:
+        """The constants of the node, as a text for drawings of the tree."""
+        return self.node.detail
+
+    def start(self) -> None:
+        """Begin an activation: the ticks from the start of the node to its end."""
+
+    def step(self) -> Status:
+        """Continue by one tick; return RUNNING, SUCCESS, or FAILURE after a call of `fail`."""
+        raise NotImplementedError
+
+    def clean_up(self) -> None:
+        """End an activation; called once per activation, also after a halt or a fault."""
+
+    def tick_child(self, child: Node) -> Status:
+        """Tick a child and return its status."""
+        behaviour = self.behaviour_by_child[child]
+        if self._visited_nodes is None:
+            behaviour.tick_once()
+        else:
+            self._visited_nodes.extend(behaviour.tick())
+        status = behaviour.status
+        if status is Status.INVALID:
+            raise Fault(f"{behaviour.name} was ticked but has no status", self.path)
+        return status
+
+    def await_child(self, child: Node) -> Status:
+        """Tick a child and return its status; `step` is not called while all awaited children are running.
+
+        When one of them has ended, `step` must call this method again for each of them, in the same order.
+        """
+        status = self._awaited.pop(child, None) or self.tick_child(child)
+        if status is Status.RUNNING:
+            self._awaited[child] = None
+        return status
+
+    def halt_children(self, children: Iterable[Node]) -> None:
+        """Halt the children and all running nodes below the children, one child after the other.
+
+        Raises:
+            Fault: The clean-up of a node failed; all other nodes were halted nevertheless.
+        """
+        problems = [problem for child in children for problem in halt(self.behaviour_by_child[child])]
+        if problems:
+            raise Fault("; ".join(problems), self.path)
+
+    def get_failure(self, child: Node) -> Failure:
+        """Return the failure of a child; the reason is `failed` for a behaviour that is no `TreeNode`."""
+        behaviour = self.behaviour_by_child[child]
+        failure = getattr(behaviour, "failure", None)
+        if isinstance(failure, Failure):
+            return failure
+        return Failure(behaviour.name, "failed", self.path, message=behaviour.feedback_message)
+
+    def fail_with_reason(self, reason: str, message: str) -> Status:
+        """End with a failure of this node, with one of the declared `reasons`, and return FAILURE."""
+        return self.fail(Failure(self.node.type_name, reason, self.path, message=message))
+
+    def report_choice(self, choice: str, cause: Failure | None = None) -> None:
+        """Emit an event with a decision of the node, and with the failure that caused the decision."""
+        reason, message = (str(cause), cause.message) if cause else ("", "")
+        self.emit(BranchChosen(self.path, choice, reason, message))
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Continue by one tick, then yield the ticked nodes for visitors of py_trees, children first."""
+        visited_nodes = self._visited_nodes = []
+        try:
+            self.tick_once()
+        finally:
+            self._visited_nodes = None
+        yield from visited_nodes
+        yield self
+
+    def tick_once(self) -> None:
+        """Start the node, or continue the node by one tick."""
+        if self.status is not Status.RUNNING:
+            self._begin()
+            self._awaited.clear()
+            self.emit(NodeStarted(self.path))
+            self.start()
+        elif self._awaited and self._tick_awaited_children():
+            return
+        status = self.step()
+        if status is not Status.RUNNING:
+            self._end(status)
+
+    def stop(self, new_status: Status = Status.INVALID) -> None:
+        """Halt the running nodes below this node, then end with `new_status`.
+
+        Raises:
+            Fault: The clean-up of a node below failed; all other nodes were halted nevertheless.
+        """
+        was_running = self.status is Status.RUNNING
+        try:
+            self.halt_children(self.node.children)
+        finally:
+            self.status = new_status
+            if was_running:
+                self.clean_up()
+                self.emit(NodeEnded(self.path, new_status.value))
+
+    def _tick_awaited_children(self) -> bool:
+        """Tick the awaited children in order until one of them ends; return True if all are running."""
+        for child in self._awaited:
+            status = self._awaited[child] = self.tick_child(child)
+            if status is not Status.RUNNING:
+                return False
+        self._awaited = dict.fromkeys(self._awaited)
+        return True
+
+    def _end(self, status: Status) -> None:
+        """Set the final status, clean up, and emit `NodeEnded`."""
+        self.status = status
+        self.clean_up()
+        failure = self.failure if status is Status.FAILURE else None
+        reason, message, origin = (str(failure), failure.message, failure.path) if failure else ("", "", "")
+        self.emit(NodeEnded(self.path, status.value, reason=reason, message=message, origin=origin))
 
 
 class SkillRun:
@@ -153,27 +304,6 @@ class SkillRun:
 def _make_fault(message: str, error: Exception) -> Fault:
     """Return a fault whose traceback ends where the error was raised."""
     return Fault(message).with_traceback(error.__traceback__)
-
-
-@dataclass(frozen=True)
-class Wiring:
-    """Connections of the ports of a skill to the constants and variables of a mission.
-
-    Attributes:
-        constants: Values of params and inputs from the mission file, by the name of the param or input.
-        inputs: Names of the variables from which inputs are read, by the name of the input.
-        outputs: Names of the variables to which outputs are written, by the name of the output.
-        fields: Fields that inputs read instead of the whole values of variables, by the name of the input.
-    """
-
-    constants: Mapping[str, object] = field(default_factory=dict)
-    inputs: Mapping[str, str] = field(default_factory=dict)
-    outputs: Mapping[str, str] = field(default_factory=dict)
-    fields: Mapping[str, str] = field(default_factory=dict)
-
-    def make_field_suffix(self, name: str) -> str:
-        """Return `.label` for a port that reads the field `label` of its variable; "" for the whole value."""
-        return f".{self.fields[name]}" if name in self.fields else ""
 
 
 class SkillLeaf(TreeNode):

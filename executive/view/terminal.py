@@ -53,12 +53,15 @@ class LineView:
     """Writes a line when a skill starts or ends, a control node decides, or the state of an item changes.
 
     Starts and ends of control nodes follow from the lines about their skills, and are not written.
+
+    Attributes:
+        changes: Last change of each item by name.
     """
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._names_by_path: dict[str, str] = {}
-        self.timeline = Timeline(has_history=False)
+        self.changes: dict[str, ItemChanged] = {}
 
     def open(self, run: Run) -> None:
         """Store the names of the nodes of a run."""
@@ -69,7 +72,8 @@ class LineView:
         if text := self._describe_event(timed.event):
             self._stream.write(f"{timed.clock:9.2f} s  {text}\n")
             self._stream.flush()
-        self.timeline(timed)
+        if isinstance(timed.event, ItemChanged):
+            self.changes[timed.event.item] = timed.event
 
     def close(self) -> None:
         """Do nothing: every line is already flushed."""
@@ -108,7 +112,7 @@ class LineView:
 
     def _describe_change(self, change: events.ItemChanged) -> str:
         """Return the text about a changed item; "" if only its position or its counts changed."""
-        last = self.timeline.items.changes.get(change.item)
+        last = self.changes.get(change.item)
         if last is not None and _get_described_fields(last) == _get_described_fields(change):
             return ""
         bin_text = f" in {change.bin}" if change.state == "placed" and change.bin else ""
@@ -132,6 +136,7 @@ class TerminalView:
         self._nodes: Sequence[OutlineNode] = ()
         self._lock = threading.Lock()
         self.timeline = Timeline(has_history=False)
+        self.changes = self.timeline.items.changes
         self._live = Live(
             console=console, get_renderable=self.render, refresh_per_second=REDRAWS_PER_SECOND, transient=True
         )

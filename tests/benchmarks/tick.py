@@ -28,11 +28,11 @@ from executive.record.journal import Recorder
 from executive.record.run_directory import RunDirectory
 from executive.skill import Skill
 from executive.testing.fake_cell import FakeCell
-from executive.tree.blackboard import Blackboard, NodeContext
+from executive.tree.blackboard import Blackboard, NodeContext, Wiring
 from executive.tree.decorators import Timeout
 from executive.tree.retry import Retry
 from executive.tree.sequences import Sequence as SequenceNode
-from executive.tree.tree_node import SkillLeaf, Wiring
+from executive.tree.tree_node import SkillLeaf
 from tests.benchmarks.report import Figures, run_command
 from tests.node_behaviours import build
 

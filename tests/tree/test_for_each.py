@@ -13,9 +13,9 @@ from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.events import BranchChosen
 from executive.skill import In, Skill, port
-from executive.tree.blackboard import Blackboard
+from executive.tree.blackboard import Blackboard, Wiring
 from executive.tree.loops import ForEach
-from executive.tree.tree_node import SkillLeaf, Wiring, halt
+from executive.tree.tree_node import SkillLeaf, halt
 
 
 class Use(Skill):

@@ -49,6 +49,24 @@ def test_the_generator_of_a_halted_node_is_closed_before_the_node_ends(
     assert events[-2:] == [BranchChosen("here", "lamp off", "", ""), NodeEnded("here", "INVALID")]
 
 
+def test_a_run_that_advances_the_run_of_its_child_continues_at_every_tick(
+    leaf: Any, site: Any, ticks: Any
+) -> None:
+    class Limit(ControlNode):
+        keyword = "limit"
+        do: Child = key(doc="Body.")
+
+        class Behaviour(GeneratorBehaviour):
+            def run(self) -> NodeRun:
+                for tick, _ in enumerate(self.run_child(self.node.do)):
+                    if tick == 2:
+                        self.halt_children([self.node.do])
+                        return None
+                    yield None
+
+    assert ticks(build(site("here"), Limit, do=leaf("A", "R R R R R S"))) == "RRS"
+
+
 def test_details_say_what_the_mission_says(leaf: Any, site: Any) -> None:
     assert retry(site(), leaf("A"), 4).detail == "up to 4 attempts, on any failure"
     assert repeat(site(), leaf("A"), until=[("A", "lost"), ("B", "x")]).detail == "until A.lost, B.x"

@@ -13,8 +13,8 @@ from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
 from executive.skill import In, Out, Skill, param, port
-from executive.tree.blackboard import Blackboard
-from executive.tree.tree_node import SkillLeaf, Wiring, halt
+from executive.tree.blackboard import Blackboard, Wiring
+from executive.tree.tree_node import SkillLeaf, halt
 
 
 class Worker(Skill):

@@ -9,11 +9,11 @@ from py_trees.behaviour import Behaviour
 
 from executive.mission.outline import list_child_indices, make_outline
 from executive.skill import In, Metres, Out, Skill, param, port
-from executive.tree.blackboard import Blackboard, NodeContext
+from executive.tree.blackboard import Blackboard, NodeContext, Wiring
 from executive.tree.retry import Catch, Retry, TryCatch
 from executive.tree.sequences import Sequence
 from executive.tree.specification import Reason
-from executive.tree.tree_node import SkillLeaf, Wiring
+from executive.tree.tree_node import SkillLeaf
 from executive.view.text import draw_text, fold_subtrees
 from tests.node_behaviours import build, specify
 
