@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from executive.cell.device_config import Angle, Distance, Length, Name, Section
 
@@ -146,12 +146,21 @@ def _check_count(values: Sequence[float], noun: str, info: ValidationInfo, omitt
 
 
 class ArmConfig(ArmFile):
-    """The arm of a cell: the content of an arm file, and the named poses of the arm in this cell."""
+    """The arm of a cell: named poses, an arm file, and keys that replace keys of the arm file."""
+
+    # The loader inserts the keys of the arm file.
+    model_config = ConfigDict(
+        json_schema_extra={
+            "required": ["poses_deg"],
+            "if": {"required": ["file"]},
+            "else": {"required": ["limits"]},
+        }
+    )
 
     file: str = Field("", exclude=True)  # The loader inserts the content of the file.
-    """Path of an arm file, relative to the cell file or to the shipped missions. The other keys except
-    `poses_deg` are those of the arm file, unless they are given here. Without a file, the arm is that of
-    `arms/iiwa14.yaml`, and `limits` must be given."""
+    """Path of an arm file, relative to the cell file or to the shipped missions, which supplies all missing
+    keys except `poses_deg`. Without a file, the arm is that of `arms/iiwa14.yaml`, and `limits` is
+    required."""
     poses_deg: dict[Name, tuple[Angle, ...]] = Field(min_length=1)
     """Named joint configurations, one position for each joint [degree]; a run starts in `home`."""
 
