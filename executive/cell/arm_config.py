@@ -157,10 +157,9 @@ class ArmConfig(ArmFile):
         }
     )
 
-    file: str = Field("", exclude=True)  # The loader inserts the content of the file.
+    file: str = Field(DEFAULT_ARM_FILE, exclude=True)
     """Path of an arm file, relative to the cell file or to the shipped missions, which supplies all missing
-    keys except `poses_deg`. Without a file, the arm is that of `arms/iiwa14.yaml`, and `limits` is
-    required."""
+    keys except `poses_deg`. If no file is given, `limits` is required."""
     poses_deg: dict[Name, tuple[Angle, ...]] = Field(min_length=1)
     """Named joint configurations, one position for each joint [degree]; a run starts in `home`."""
 

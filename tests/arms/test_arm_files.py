@@ -6,14 +6,17 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 from click.testing import CliRunner
 
 from executive.behaviours import load_skills
 from executive.cell.workcell import load_cell_kind
 from executive.cli.main import main
 from executive.drivers.fake import FakeCell
+from executive.drivers.sim.model_files import find_model
 from executive.mission.cell_file import load_cell
 from executive.mission.load import load_mission
+from executive.record.run_directory import read_cell
 from executive.testing.run_mission import run_mission
 from executive.text.findings import MissionError
 from executive.text.yaml_files import get_shipped_folder
@@ -92,7 +95,7 @@ def test_keys_of_the_cell_replace_keys_of_the_arm_file() -> None:
     [
         ("arms/cobot.yaml", "solver: iiwa14", "solver: iiwa", 'cobot.yaml:6:9: error[robot]: the solver "iiwa" of the arm cobot is not installed. Did you mean "iiwa14"? Installed solvers: iiwa14.'),
         ("arms/cobot.yaml", "{link: lbr_iiwa_link_7", "{link: flange", 'cobot.yaml:5:16: error[robot]: the model kuka_iiwa/model.urdf of the arm cobot has no link "flange". Links of the model: lbr_iiwa_link_0, lbr_iiwa_link_1, '),
-        ("arms/cobot.yaml", "{link: lbr_iiwa_link_7", "{link: lbr_iiwa_link_6", 'cobot.yaml:6:9: error[robot]: the solver "iiwa14" does not describe the model kuka_iiwa/model.urdf: its tool is 0.'),
+        ("arms/cobot.yaml", "{link: lbr_iiwa_link_7", "{link: lbr_iiwa_link_6", "cobot.yaml:8:1: error[robot]: the model kuka_iiwa/model.urdf must have 7 revolute joints up to the flange, as limits says; it has: revolute, revolute, revolute, revolute, revolute, revolute"),
         ("arms/cobot.yaml", LIMITS, "", 'cobot.yaml:3:1: error[missing-key]: the file needs the key "limits"'),
         ("arms/cobot.yaml", "effort: [320, ", "effort: [", "cobot.yaml:21:1: error[wrong-value]: effort needs 7 values, not 6, for the joints in limits"),
         ("arms/cobot.yaml", "0, 65, 0]", "65]", "cobot.yaml:23:1: error[wrong-value]: simulation needs 6 angles in sampling_pose_deg, not 4, for the joints in limits"),
@@ -102,7 +105,7 @@ def test_keys_of_the_cell_replace_keys_of_the_arm_file() -> None:
         ("arms/cobot.yaml", "urdf: kuka_iiwa/model", "urdf: cobot", "cobot.yaml:4:7: error[robot]: there is no model cobot.urdf"),
         ("bench.yaml", "file: arms", "file: ../arms", 'bench.yaml:4:9: error[no-arm]: "../arms/cobot.yaml" is outside the folder of the file that names it; '),
         ("bench.yaml", "file: arms/cobot.yaml", "urdf: cobot.urdf", 'bench.yaml:4:9: error[no-arm]: an arm other than iiwa14 needs the key "file"'),
-        ("bench.yaml", "file: arms/cobot.yaml", "file: 14", "bench.yaml:4:9: error[wrong-type]: arm.file must be a text, not 14"),
+        ("bench.yaml", "file: arms/cobot.yaml", "file: 14", 'bench.yaml:4:9: error[no-arm]: there is no file "14" in cells or /'),
     ],
 )  # fmt: skip
 def test_a_wrong_arm_has_one_finding_at_its_place(file: str, old: str, new: str, expected: str) -> None:
@@ -111,3 +114,22 @@ def test_a_wrong_arm_has_one_finding_at_its_place(file: str, old: str, new: str,
         load_mission(MISSION, load_skills(), find_cell_kind=load_cell_kind)
     (finding,) = caught.value.findings
     assert str(finding).startswith(expected, str(finding).index(Path(file).name))
+
+
+def test_a_solver_for_another_arm_is_a_finding() -> None:
+    model = find_model("kuka_iiwa/model.urdf")
+    text = model.read_text().replace('filename="meshes/', f'filename="{model.parent}/meshes/')
+    Path("cells/arms/longer.urdf").write_text(text.replace('xyz="0 0.2045 0"', 'xyz="0 0.3045 0"'))
+    change("cells/arms/cobot.yaml", "kuka_iiwa/model.urdf", "longer.urdf")
+    config = load_cell(Path("cells/bench.yaml"))
+    ((keys, message),) = load_cell_kind("sim").check(config, Path("cells"))
+    assert (keys, message.partition(" does not describe")[0]) == (("arm", "solver"), 'the solver "iiwa14"')
+    assert "its tool is 0.100 m away from the tool of the model" in message
+
+
+def test_the_arm_of_an_earlier_record_is_completed(missions: Path) -> None:
+    cell = load_cell(missions / "cells" / "overhead.yaml")
+    content = cell.model_dump(mode="json")
+    content["arm"] = {key: content["arm"][key] for key in ("urdf", "limits", "poses_deg")}
+    Path("cell.yaml").write_text(yaml.safe_dump(content))
+    assert read_cell(Path()) == cell
