@@ -95,7 +95,7 @@ def test_keys_of_the_cell_replace_keys_of_the_arm_file() -> None:
     [
         ("arms/cobot.yaml", "solver: iiwa14", "solver: iiwa", 'cobot.yaml:6:9: error[robot]: the solver "iiwa" of the arm cobot is not installed. Did you mean "iiwa14"? Installed solvers: iiwa14.'),
         ("arms/cobot.yaml", "{link: lbr_iiwa_link_7", "{link: flange", 'cobot.yaml:5:16: error[robot]: the model kuka_iiwa/model.urdf of the arm cobot has no link "flange". Links of the model: lbr_iiwa_link_0, lbr_iiwa_link_1, '),
-        ("arms/cobot.yaml", "{link: lbr_iiwa_link_7", "{link: lbr_iiwa_link_6", "cobot.yaml:8:1: error[robot]: the model kuka_iiwa/model.urdf must have 7 revolute joints up to the flange, as limits says; it has: revolute, revolute, revolute, revolute, revolute, revolute"),
+        ("arms/cobot.yaml", "{link: lbr_iiwa_link_7", "{link: lbr_iiwa_link_6", "cobot.yaml:8:1: error[robot]: the model kuka_iiwa/model.urdf must have 7 revolute joints up to the flange; it has: revolute, revolute, revolute, revolute, revolute, revolute"),
         ("arms/cobot.yaml", LIMITS, "", 'cobot.yaml:3:1: error[missing-key]: the file needs the key "limits"'),
         ("arms/cobot.yaml", "effort: [320, ", "effort: [", "cobot.yaml:21:1: error[wrong-value]: effort needs 7 values, not 6, for the joints in limits"),
         ("arms/cobot.yaml", "0, 65, 0]", "65]", "cobot.yaml:23:1: error[wrong-value]: simulation needs 6 angles in sampling_pose_deg, not 4, for the joints in limits"),

@@ -217,7 +217,7 @@ def _find_arm_errors(arm: ArmFile) -> Iterator[tuple[KeyPath, str]]:
         kinds = ", ".join(reversed(joint_kinds)) or "none"
         yield (
             ("arm", "limits"),
-            f"the model {arm.urdf} must have {arm.joint_count} revolute joints up to the flange, as limits says; "
+            f"the model {arm.urdf} must have {arm.joint_count} revolute joints up to the flange; "
             f"it has: {kinds}",
         )
 
