@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from executive.behaviours import load_skills
+from executive.cell.arm_config import ArmFile
 from executive.cell.config import CellConfig
 from executive.cell.device_config import Section
 from executive.cli.main import main as command_line
@@ -73,6 +74,7 @@ def generate() -> str:
         "Subtrees of library/sorting.yaml": _sorting_library(),
         "Shipped missions": _shipped_missions(),
         "Cell files": _model(CellConfig),
+        "Arm files": _model(ArmFile),
         "Detectors": _detectors(),
         "Scene files": _model(SceneConfig),
         "Findings of executive check": [_table("code, meaning", codes)],

@@ -70,7 +70,9 @@ class Iiwa14:
 
     def __init__(self, arm: ArmFile, tool_length: float, min_link_distance: float | None = None) -> None:
         if arm.joint_count != JOINT_COUNT:
-            raise InputError(f"it solves arms with {JOINT_COUNT} joints, not {arm.joint_count}")
+            raise InputError(
+                f"the solver of the arm {arm.arm} needs {JOINT_COUNT} joints, not {arm.joint_count}"
+            )
         joint_range = JointLimits.from_config(arm.limits).position
         lower = joint_range.lower.copy()
         upper = joint_range.upper.copy()

@@ -5,9 +5,10 @@ Each field is a key of `missions/arms/*.yaml`, in SI units. Values of keys that 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from executive.cell.device_config import Angle, Distance, Length, Name, Section
 
@@ -122,26 +123,43 @@ class ArmFile(Section):
         """Number of joints."""
         return len(self.limits.position_deg)
 
-    @model_validator(mode="after")
-    def _check_counts(self) -> ArmFile:
-        sampling_pose = self.simulation.sampling_pose_deg
-        for name, values, count in (
-            ("effort", self.effort, self.joint_count),
-            ("simulation.sampling_pose_deg", sampling_pose, self.joint_count - 1),
-        ):
-            if len(values) != count:
-                problem = f"has {len(values)} values in {name} and limits of {self.joint_count} joints"
-                raise ValueError(f"{problem}; {name} needs {count} values")
-        return self
+    @field_validator("effort")
+    @classmethod
+    def _check_effort(cls, effort: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        _check_count(effort, "values", info, 0)
+        return effort
+
+    @field_validator("simulation")
+    @classmethod
+    def _check_sampling_pose(
+        cls, simulation: ArmSimulationConfig, info: ValidationInfo
+    ) -> ArmSimulationConfig:
+        _check_count(simulation.sampling_pose_deg, "angles in sampling_pose_deg", info, 1)
+        return simulation
+
+
+def _check_count(values: Sequence[float], noun: str, info: ValidationInfo, omitted_count: int) -> None:
+    """Raise `ValueError` unless there is a value for each joint except the first `omitted_count`."""
+    limits: LimitsConfig | None = info.data.get("limits")  # None: the limits are invalid.
+    if limits and len(values) != (count := len(limits.position_deg) - omitted_count):
+        raise ValueError(f"needs {count} {noun}, not {len(values)}, for the joints in limits")
 
 
 class ArmConfig(ArmFile):
-    """The arm of a cell: the content of an arm file, and the named poses of the arm in this cell."""
+    """The arm of a cell: named poses, an arm file, and keys that replace keys of the arm file."""
 
-    file: str = Field("", exclude=True)  # The loader inserts the content of the file.
-    """Path of an arm file, relative to the cell file or to the shipped missions. The other keys except
-    `poses_deg` are those of the arm file, unless they are given here. Without a file, the arm is that of
-    `arms/iiwa14.yaml`, and `limits` must be given."""
+    # The loader inserts the keys of the arm file.
+    model_config = ConfigDict(
+        json_schema_extra={
+            "required": ["poses_deg"],
+            "if": {"required": ["file"]},
+            "else": {"required": ["limits"]},
+        }
+    )
+
+    file: str = Field(DEFAULT_ARM_FILE, exclude=True)
+    """Path of an arm file, relative to the cell file or to the shipped missions, which supplies all missing
+    keys except `poses_deg`. If no file is given, `limits` is required."""
     poses_deg: dict[Name, tuple[Angle, ...]] = Field(min_length=1)
     """Named joint configurations, one position for each joint [degree]; a run starts in `home`."""
 

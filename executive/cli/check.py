@@ -164,22 +164,17 @@ def schema_command(cell: bool, arm: bool, library: bool, journal: bool) -> None:
     with keep_stdout_clean():
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.behaviours import load_skills
-        from executive.mission.schema import (
-            make_arm_schema,
-            make_cell_schema,
-            make_library_schema,
-            make_mission_schema,
-        )
+        from executive.mission import schema
         from executive.record.journal import make_journal_schema
         from executive.tree.node import load_control_nodes
 
         if cell:
-            schema = make_cell_schema()
+            content = schema.make_cell_schema()
         elif arm:
-            schema = make_arm_schema()
+            content = schema.make_arm_schema()
         elif journal:
-            schema = make_journal_schema()
+            content = make_journal_schema()
         else:
-            make_schema = make_library_schema if library else make_mission_schema
-            schema = make_schema(load_skills(), load_control_nodes())
-    print_json(schema)
+            make_schema = schema.make_library_schema if library else schema.make_mission_schema
+            content = make_schema(load_skills(), load_control_nodes())
+    print_json(content)

@@ -24,7 +24,6 @@ from executive.text.yaml_files import (
     YamlScalar,
     YamlSequence,
     find_file_below,
-    get_shipped_folder,
     has_outside_link,
     is_outside_path,
     list_scalars,
@@ -173,19 +172,13 @@ class _CellFileReader:
         arm = root.get("arm") if isinstance(root, YamlMapping) else None
         if not isinstance(root, YamlMapping) or not isinstance(arm, YamlMapping):
             return root
-        file = arm.get("file")
-        # Validation reports a file that is not a string.
-        reference = file if isinstance(file, YamlScalar) and isinstance(file.value, str) else None
-        try:
-            path = get_shipped_folder() / DEFAULT_ARM_FILE
-            if reference is not None:
-                folder = self.folders.get(reference.span.source, next(iter(self.folders.values())))
-                path = find_file_below(folder, reference.text)
-            source = read_source(path)
-        except InputError as problem:
-            self.findings.append(make_error((file or arm).span, "no-arm", str(problem)))
+        is_default = "file" not in arm.keys
+        file = YamlScalar(arm.span, DEFAULT_ARM_FILE, DEFAULT_ARM_FILE) if is_default else arm.get("file")
+        if not isinstance(file, YamlScalar):
+            return root  # Validation reports the wrong type.
+        source = self._read_named_file(file, "", "no-arm")
+        if source is None:
             return None
-        self.folders[source] = path.parent
         arm_root, findings = parse_yaml(source)
         self.findings += findings
         arm_file, errors = validate(arm_root, ArmFile) if arm_root else (None, [])
@@ -193,11 +186,11 @@ class _CellFileReader:
         if arm_file is None or not isinstance(arm_root, YamlMapping):
             return None
         urdf = arm.get("urdf")
-        if file is None and urdf is not None and urdf.python_value != arm_file.urdf:
+        if is_default and urdf is not None and urdf.python_value != arm_file.urdf:
             message = f'an arm other than {arm_file.arm} needs the key "file" with the path of an arm file'
             self.findings.append(make_error(urdf.span, "no-arm", message))
             return None
-        complete_arm = _merge_sections(arm, arm_root, excluded=() if file else ("limits",))
+        complete_arm = _merge_sections(arm, arm_root, excluded=("limits",) if is_default else ())
         entries = (
             replace(entry, value=complete_arm) if entry.value is arm else entry for entry in root.entries
         )
@@ -219,16 +212,25 @@ class _CellFileReader:
             entries.append(replace(entry, value=self.arrange_matrices(entry.value, (*keys, entry.key.text))))
         return replace(node, entries=tuple(entries))
 
+    def _read_named_file(self, file: YamlScalar, shipped_subfolder: str, code: str) -> Source | None:
+        """Return the text of the file that a value names, or None after an error with this code."""
+        folder = self.folders.get(file.span.source, next(iter(self.folders.values())))
+        try:
+            path = find_file_below(folder, file.text, (shipped_subfolder,))
+            source = read_source(path)
+        except InputError as problem:
+            self.findings.append(make_error(file.span, code, str(problem)))
+            return None
+        self.folders[source] = path.parent
+        return source
+
     def _insert_file(self, calibration: YamlMapping) -> YamlMapping:
         """Return a calibration, completed by the entries of its file, if any."""
         file = calibration.get("file")
         if not isinstance(file, YamlScalar):
             return calibration
-        folder = self.folders.get(file.span.source, next(iter(self.folders.values())))
-        try:
-            source = read_source(find_file_below(folder, file.text, ("cells",)))
-        except InputError as problem:
-            self.findings.append(make_error(file.span, "no-calibration", str(problem)))
+        source = self._read_named_file(file, "cells", "no-calibration")
+        if source is None:
             return calibration
         # PyYAML reads neither the first line nor the tags of OpenCV; the replacements keep all columns.
         text = source.text.replace("%YAML:", "#YAML:").replace("!!opencv-matrix", " " * 15)

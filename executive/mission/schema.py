@@ -7,7 +7,7 @@ import inspect
 import json
 import re
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import TypeAlias, cast, get_origin
 
 from pydantic import BaseModel, TypeAdapter
@@ -63,14 +63,14 @@ class Draft07(GenerateJsonSchema):
 
 
 def find_attribute_docstrings(declaring_class: type[object]) -> dict[str, str]:
-    """Return the docstring of each annotated attribute in the body of a class, by name of the attribute.
+    """Return the docstring of each annotated attribute of a class and its bases in the same module, by name.
 
     The option `use_attribute_docstrings` of pydantic would parse the source code in every process.
     """
-    (class_definition,) = ast.parse(inspect.getsource(declaring_class)).body
-    assert isinstance(class_definition, ast.ClassDef)
+    owners = [owner for owner in declaring_class.__mro__ if owner.__module__ == declaring_class.__module__]
+    definitions = [ast.parse(inspect.getsource(owner)).body[0] for owner in owners]
     docstrings = {}
-    for attribute, comment in pairwise(class_definition.body):
+    for attribute, comment in chain.from_iterable(pairwise(ast.iter_child_nodes(one)) for one in definitions):
         match attribute, comment:
             case ast.AnnAssign(target=ast.Name(name)), ast.Expr(ast.Constant(str(docstring))):
                 docstrings[name] = inspect.cleandoc(docstring)
@@ -91,17 +91,14 @@ def make_arm_schema() -> Schema:
 def make_cell_schema() -> Schema:
     """Return the schema of a cell file; with `base`, other keys and all keys of detectors are optional.
 
-    The keys of an arm file are optional in `arm`, except `limits` if `arm` names no file.
+    The keys of the sections of an arm file are optional, except those of `limits` if `arm` names no file.
     """
     cell = _make_model_schema(CellConfig)
     sections = cell.pop("$defs")
-    arm = sections["ArmConfig"]
     limits = {"required": sections["LimitsConfig"].pop("required")}
+    sections["ArmConfig"]["else"]["properties"] = {"limits": limits}
     for section in ("FlangeConfig", "ArmSimulationConfig"):
         del sections[section]["required"]
-    arm["required"] = ["poses_deg"]
-    arm["if"] = {"required": ["file"]}
-    arm["else"] = {"required": ["limits"], "properties": {"limits": limits}}
     required = cell.pop("required")
     detector = sections["DetectorConfig"]
     complete_detector = {"type": detector["type"], "required": detector.pop("required")}

@@ -39,7 +39,7 @@ class KinematicsFactory(Protocol):
                 the joints narrower than the limits, or None.
 
         Raises:
-            InputError: The solver cannot solve this arm; the message begins with "it".
+            InputError: The solver cannot solve this arm.
         """
 
 
@@ -63,11 +63,7 @@ def build_kinematics(config: CellConfig, min_link_distance: float | None = None)
         hint = suggest_choice(arm.solver, solvers, "Installed solvers")
         raise InputError(f'the solver "{arm.solver}" of the arm {arm.arm} is not installed. {hint}')
     factory: KinematicsFactory = solvers[arm.solver].load()
-    try:
-        return factory(arm, config.tool.length, min_link_distance)
-    except InputError as error:
-        message = f'the solver "{arm.solver}" does not fit the arm {arm.arm}: {error}'
-        raise InputError(message) from error
+    return factory(arm, config.tool.length, min_link_distance)
 
 
 def build_planning_kinematics(config: CellConfig) -> Kinematics:

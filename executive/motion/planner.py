@@ -39,7 +39,7 @@ class Planner:
     Args:
         config: The cell file.
         check_collision: Additional collision check, or None.
-        kinematics: Kinematics of the arm; None: those of `config.arm.urdf`.
+        kinematics: Kinematics of the arm; None: those of `config.arm`.
 
     Attributes:
         kinematics: Kinematics of the arm.

@@ -59,6 +59,7 @@ def project(tmp_path: Path, missions: Path, monkeypatch: pytest.MonkeyPatch) -> 
         "wave.yaml": MISSION,
         "cells/mine.yaml": "base: bases/first.yaml\ncell: mine\nkind: fake\n# labels: 'my labels.txt'\n",
         "cells/bases/first.yaml": (missions / "cells" / "overhead.yaml").read_text(encoding="utf-8"),
+        "cells/bases/arms/iiwa14.yaml": (missions / "arms" / "iiwa14.yaml").read_text(encoding="utf-8"),
         "cells/mine.measured.json": "[]",
         "cells/my labels.txt": "cube\n",
         "cells/unused.txt": "",

@@ -177,16 +177,17 @@ def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
             yield from _find_wrong_sizes(label, object_config)
         except InputError as error:
             yield ("objects", label, "mesh" if object_config.mesh else "urdf"), str(error)
-    yield from _find_missing_links(config.arm)
+    yield from _find_arm_errors(config.arm)
 
 
-def _find_missing_links(arm: ArmFile) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each link that the arm file names and the model of the arm lacks."""
+def _find_arm_errors(arm: ArmFile) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for each link that the model of the arm lacks, and for wrong joints."""
     try:
-        links = [link.get("name", "") for link in read_robot(find_model(arm.urdf)).findall("link")]
+        robot = read_robot(find_model(arm.urdf))
     except InputError as error:
         yield ("arm", "urdf"), str(error)
         return
+    links = [link.get("name", "") for link in robot.findall("link")]
     simulation = arm.simulation
     named_links: list[tuple[KeyPath, str]] = [
         (("flange", "link"), arm.flange.link),
@@ -194,13 +195,25 @@ def _find_missing_links(arm: ArmFile) -> Iterator[tuple[KeyPath, str]]:
         (("simulation", "wrist_link"), simulation.wrist_link),
     ]
     for index, pair in enumerate(simulation.self_collision_pairs):
-        named_links += [
-            (("simulation", "self_collision_pairs", index), link) for link in pair if link != TOOL_LINK
-        ]
+        key_path = ("simulation", "self_collision_pairs", index)
+        named_links += [(key_path, link) for link in pair if link != TOOL_LINK]
     for keys, link in named_links:
         if link not in links:
             hint = suggest_choice(link, links, "Links of the model")
             yield ("arm", *keys), f'the model {arm.urdf} of the arm {arm.arm} has no link "{link}". {hint}'
+    joints = {joint.findall("child")[0].get("link"): joint for joint in robot.findall("joint[parent][child]")}
+    joint_kinds = []
+    link_name: str | None = arm.flange.link
+    while (joint := joints.pop(link_name, None)) is not None:
+        joint_kinds.append(joint.get("type", ""))
+        link_name = joint.findall("parent")[0].get("link")
+    if arm.flange.link in links and joint_kinds != ["revolute"] * arm.joint_count:
+        kinds = ", ".join(reversed(joint_kinds)) or "none"
+        yield (
+            ("arm", "limits"),
+            f"the model {arm.urdf} must have {arm.joint_count} revolute joints up to the flange; "
+            f"it has: {kinds}",
+        )
 
 
 def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPath, str]]:

@@ -1,0 +1,135 @@
+# ruff: noqa: E501 - findings are quoted as they are printed
+"""Arms of other projects: an arm file beside a cell, checked, run and replayed with an unchanged package."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from executive.behaviours import load_skills
+from executive.cell.workcell import load_cell_kind
+from executive.cli.main import main
+from executive.drivers.fake import FakeCell
+from executive.drivers.sim.model_files import find_model
+from executive.mission.cell_file import load_cell
+from executive.mission.load import load_mission
+from executive.record.run_directory import read_cell
+from executive.testing.run_mission import run_mission
+from executive.text.findings import MissionError
+from executive.text.yaml_files import get_shipped_folder
+
+CELL = """\
+base: cells/overhead.yaml
+cell: bench
+arm:
+  file: arms/cobot.yaml
+  poses_deg: {home: [38, 33, 0, -88, 0, 59, 0], aside: [-38, 33, 0, -88, 0, 59, 0]}
+"""
+MISSION = "sort_bench.yaml"
+ARM = (get_shipped_folder() / "arms" / "iiwa14.yaml").read_text().replace("arm: iiwa14", "arm: cobot", 1)
+LIMITS = ARM[ARM.index("limits:") : ARM.index("# From the data sheet")]
+POSITIONS = "position_deg: [170, 120, 170, 120, 170, 120, 175]"
+
+
+@pytest.fixture(autouse=True)
+def _project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missions: Path) -> None:
+    """Work in a project with an arm that is the iiwa 14 under another name."""
+    monkeypatch.chdir(tmp_path)
+    Path("cells/arms").mkdir(parents=True)
+    Path("cells/bench.yaml").write_text(CELL)
+    Path("cells/arms/cobot.yaml").write_text(ARM)
+    mission = (missions / "sort_overhead.yaml").read_text()
+    Path(MISSION).write_text(mission.replace("cells/overhead.yaml", "cells/bench.yaml"))
+
+
+def change(file: str, old: str, new: str) -> None:
+    text = Path(file).read_text()
+    assert old in text
+    Path(file).write_text(text.replace(old, new))
+
+
+def test_an_arm_file_beside_the_cell_is_checked_and_run() -> None:
+    loaded = load_mission(MISSION, load_skills(), find_cell_kind=load_cell_kind)
+    assert (loaded.warnings, loaded.cell_config.arm.arm) == ((), "cobot")
+    result = run_mission(MISSION, FakeCell, seed=5)
+    assert (result.status, result.agrees, result.items["placed"]) == ("SUCCESS", True, result.items["seen"])
+
+
+@pytest.mark.slow
+def test_the_same_arm_under_another_name_moves_in_the_same_way() -> None:
+    results = [run_mission(name, load_cell_kind("sim"), seed=5) for name in (MISSION, "sort_overhead")]
+    assert results[0].status == "SUCCESS" and results[0].agrees
+    assert results[0].items == results[1].items
+    assert results[0].events[-1].clock == results[1].events[-1].clock
+
+
+def test_a_replay_needs_no_arm_file() -> None:
+    for *words, status in (
+        ("run", MISSION, "--set", "cell.kind=fake", "--quiet", "--runs", "runs", 0),
+        ("check", MISSION, 0),
+        ("replay", "latest", "--runs", "runs", 0),
+        ("check", MISSION, 2),
+    ):
+        if words[0] == "replay":
+            Path("cells/arms/cobot.yaml").unlink()
+        result = CliRunner().invoke(main, words)
+        assert result.exit_code == status, result.output
+
+
+def test_keys_of_the_cell_replace_keys_of_the_arm_file() -> None:
+    slow = [10.0] * 7
+    change(
+        "cells/bench.yaml", "  poses_deg", f"  limits: {{source: a test, velocity_deg: {slow}}}\n  poses_deg"
+    )
+    path = Path("cells/bench.yaml")
+    limits = load_cell(path, {"cell.arm.limits.jerk": "[9, 9, 9, 9, 9, 9, 9]"}).arm.limits
+    assert (limits.velocity_deg, limits.jerk, limits.position_deg[6]) == ((10,) * 7, (9,) * 7, 175)
+    assert load_cell(path, {"cell.arm.file": "arms/iiwa14.yaml"}).arm.arm == "iiwa14"
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "expected"),
+    [
+        ("arms/cobot.yaml", "solver: iiwa14", "solver: iiwa", 'cobot.yaml:6:9: error[robot]: the solver "iiwa" of the arm cobot is not installed. Did you mean "iiwa14"? Installed solvers: iiwa14.'),
+        ("arms/cobot.yaml", "{link: lbr_iiwa_link_7", "{link: flange", 'cobot.yaml:5:16: error[robot]: the model kuka_iiwa/model.urdf of the arm cobot has no link "flange". Links of the model: lbr_iiwa_link_0, lbr_iiwa_link_1, '),
+        ("arms/cobot.yaml", "{link: lbr_iiwa_link_7", "{link: lbr_iiwa_link_6", "cobot.yaml:8:1: error[robot]: the model kuka_iiwa/model.urdf must have 7 revolute joints up to the flange; it has: revolute, revolute, revolute, revolute, revolute, revolute"),
+        ("arms/cobot.yaml", LIMITS, "", 'cobot.yaml:3:1: error[missing-key]: the file needs the key "limits"'),
+        ("arms/cobot.yaml", "effort: [320, ", "effort: [", "cobot.yaml:21:1: error[wrong-value]: effort needs 7 values, not 6, for the joints in limits"),
+        ("arms/cobot.yaml", "0, 65, 0]", "65]", "cobot.yaml:23:1: error[wrong-value]: simulation needs 6 angles in sampling_pose_deg, not 4, for the joints in limits"),
+        ("arms/cobot.yaml", POSITIONS, "position_deg: [170]", "cobot.yaml:8:1: error[wrong-value]: limits has 7 values in velocity_deg and 1 in position_deg"),
+        ("arms/cobot.yaml", "link_radius: 0.09", "link_radius: -1", "cobot.yaml:35:16: error[out-of-range]: simulation.link_radius must be at least 0.0001, not -1"),
+        ("arms/cobot.yaml", "urdf: kuka", "urdf: ../kuka", 'cobot.yaml:4:7: error[outside]: "../kuka_iiwa/model.urdf" must be a relative path without ".."'),
+        ("arms/cobot.yaml", "urdf: kuka_iiwa/model", "urdf: cobot", "cobot.yaml:4:7: error[robot]: there is no model cobot.urdf"),
+        ("bench.yaml", "file: arms", "file: ../arms", 'bench.yaml:4:9: error[no-arm]: "../arms/cobot.yaml" is outside the folder of the file that names it; '),
+        ("bench.yaml", "file: arms/cobot.yaml", "urdf: cobot.urdf", 'bench.yaml:4:9: error[no-arm]: an arm other than iiwa14 needs the key "file"'),
+        ("bench.yaml", "file: arms/cobot.yaml", "file: 14", 'bench.yaml:4:9: error[no-arm]: there is no file "14" in cells or /'),
+    ],
+)  # fmt: skip
+def test_a_wrong_arm_has_one_finding_at_its_place(file: str, old: str, new: str, expected: str) -> None:
+    change(f"cells/{file}", old, new)
+    with pytest.raises(MissionError) as caught:
+        load_mission(MISSION, load_skills(), find_cell_kind=load_cell_kind)
+    (finding,) = caught.value.findings
+    assert str(finding).startswith(expected, str(finding).index(Path(file).name))
+
+
+def test_a_solver_for_another_arm_is_a_finding() -> None:
+    model = find_model("kuka_iiwa/model.urdf")
+    text = model.read_text().replace('filename="meshes/', f'filename="{model.parent}/meshes/')
+    Path("cells/arms/longer.urdf").write_text(text.replace('xyz="0 0.2045 0"', 'xyz="0 0.3045 0"'))
+    change("cells/arms/cobot.yaml", "kuka_iiwa/model.urdf", "longer.urdf")
+    config = load_cell(Path("cells/bench.yaml"))
+    ((keys, message),) = load_cell_kind("sim").check(config, Path("cells"))
+    assert (keys, message.partition(" does not describe")[0]) == (("arm", "solver"), 'the solver "iiwa14"')
+    assert "its tool is 0.100 m away from the tool of the model" in message
+
+
+def test_the_arm_of_an_earlier_record_is_completed(missions: Path) -> None:
+    cell = load_cell(missions / "cells" / "overhead.yaml")
+    content = cell.model_dump(mode="json")
+    content["arm"] = {key: content["arm"][key] for key in ("urdf", "limits", "poses_deg")}
+    Path("cell.yaml").write_text(yaml.safe_dump(content))
+    assert read_cell(Path()) == cell
