@@ -79,12 +79,12 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("executive.perception.evidence", "perception/evidence.py", ""),
     ],
     "Test kit: fake cell": [
-        ("fake = FakeCell()", "cells/fake.py", "FakeCell"),
-        ("fake.world", "cells/fake.py", "FakeWorld"),
-        ("fake.arm", "cells/fake.py", "FakeArm"),
-        ("fake.tool", "cells/fake.py", "FakeTool"),
-        ("fake.camera", "cells/fake.py", "FakeCamera"),
-        ("fake.detector", "cells/fake.py", "FakeDetector"),
+        ("fake = FakeCell()", "drivers/fake.py", "FakeCell"),
+        ("fake.world", "drivers/fake.py", "FakeWorld"),
+        ("fake.arm", "drivers/fake.py", "FakeArm"),
+        ("fake.tool", "drivers/fake.py", "FakeTool"),
+        ("fake.camera", "drivers/fake.py", "FakeCamera"),
+        ("fake.detector", "perception/detectors/simulated.py", "TruthDetector"),
     ],
     "Test kit: run a skill or a mission": [
         ("executive.testing.run_skill", "testing/run_skill.py", ""),

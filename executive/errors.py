@@ -82,7 +82,15 @@ class Crowded(Unavailable):
 
 
 class DeadlinePassed(Unavailable):
-    """A detector did not answer before its deadline."""
+    """A detector did not answer before its deadline.
+
+    Attributes:
+        timeout: Time from the request to the deadline [s].
+    """
+
+    def __init__(self, message: str, timeout: float = 0.0) -> None:
+        super().__init__(message)
+        self.timeout = timeout
 
 
 class NoDepth(ExecutiveError):

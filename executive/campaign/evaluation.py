@@ -21,7 +21,7 @@ from executive.text.findings import suggest_choice
 from executive.text.yaml_files import get_shipped_folder
 from executive.training import evaluate
 from executive.training.dataset import LabelledImage
-from executive.training.evaluate import CellDetector, Mistake
+from executive.training.evaluate import EvaluatedDetector, Mistake
 from executive.training.metrics import NO_OBJECT, Evaluation
 from executive.training.rendering import generate_dataset, render_run_frames
 from executive.training.samples import LabelledDataset
@@ -181,13 +181,13 @@ def measure_detector(
         known_classes = classes or find_detectable_labels(detector.configs, detector.base_folder)[name] or ()
         settings.dataset.match_classes(known_classes, f"detector {name}")
     with _open_images(detector.cell, settings, progress) as samples:
-        cell_detector = CellDetector(
+        evaluated_detector = EvaluatedDetector(
             detector.configs, name, base=detector.base_folder, camera=camera, view=settings.view,
             classes=classes,
         )  # fmt: skip
-        with contextlib.closing(cell_detector), progress(f"running {name}") as update:
+        with contextlib.closing(evaluated_detector), progress(f"running {name}") as update:
             return evaluate.evaluate(
-                cell_detector, _iterate_with_progress(samples, update), mistakes=mistakes,
+                evaluated_detector, _iterate_with_progress(samples, update), mistakes=mistakes,
                 localizer=localizer, cell=cell_of_images, threshold=settings.threshold,
             )  # fmt: skip
 

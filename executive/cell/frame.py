@@ -177,12 +177,20 @@ class Detection:
         return (left + right) / 2, (top + bottom) / 2
 
 
+@dataclass(frozen=True, eq=False)
+class TrueFrame(Frame):
+    """A frame of a fake or simulated world with ground truth.
+
+    Attributes:
+        true_detections: Detections, with confidence 1, of all objects that a perfect detector finds.
+    """
+
+    true_detections: tuple[Detection, ...]
+
+
 @dataclass(frozen=True)
 class Answer:
     """Result of a detector for one frame: its detections, grouped by certainty.
-
-    A detector puts all detections into `confident`. Before a skill reads the answer, the function
-    `executive.perception.detectors.requests.screen_answer` moves detections to `doubtful` and `unknown`.
 
     Attributes:
         detector: Name of the detector in the cell file.

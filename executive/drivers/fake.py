@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -15,12 +14,12 @@ from numpy.typing import NDArray
 
 from executive.cell.arm import Goal, Motion
 from executive.cell.config import CellConfig, DetectorConfig
-from executive.cell.frame import Box, Detection, Frame
+from executive.cell.frame import Box, Detection, Frame, TrueFrame
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
 from executive.cell.protocols import Clock, Ledger, Routes
 from executive.cell.workcell import CellOptions, TrueObject
 from executive.drivers.world_log import LogFile
-from executive.errors import InputError, Unavailable
+from executive.errors import InputError
 from executive.events import Emit, discard_event
 from executive.geometry import GRAVITY, Array, Pose
 from executive.mission.cell_file import load_cell
@@ -29,7 +28,9 @@ from executive.motion.configurations import find_configuration_pairs
 from executive.motion.planner import PlanningArm
 from executive.motion.straight_paths import StraightMotion, plan_straight_motion
 from executive.perception.camera_model import MountedCamera, compute_hull_mask
-from executive.perception.detectors.requests import PendingSearch
+from executive.perception.detectors.cell_detector import build_cell_detectors
+from executive.perception.detectors.detector_registry import DetectorContext
+from executive.perception.detectors.simulated import TruthDetector
 from executive.perception.localization import CellLocalizer
 from executive.station.view_check import find_view_errors
 from executive.station.without_hardware import CellWithoutHardware, SilentOperator
@@ -38,8 +39,6 @@ from executive.text.yaml_files import get_shipped_folder
 
 SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
 """Permitted bins of each class of the shipped cells."""
-DEFAULT_CONFIDENCE = 0.9
-"""Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""
 MAX_SEAL_OFFSET = 0.012
 """Maximum horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
 TOUCH_DISTANCE = 0.002
@@ -179,21 +178,38 @@ class FakeTool:
 
 
 class FakeCamera(MountedCamera):
-    """The camera of a cell file, with blank images.
+    """The camera of a cell file, with blank images and the true detections of all objects on the table.
 
     Attributes:
         occluded_regions: Regions of the image that frames mark as occluded [pixel]; set by tests.
     """
 
-    def __init__(self, config: CellConfig, arm: FakeArm, clock: Clock, ledger: Ledger) -> None:
+    def __init__(
+        self, world: FakeWorld, config: CellConfig, arm: FakeArm, clock: Clock, ledger: Ledger
+    ) -> None:
         name, camera = next(iter(config.cameras.items()))
         X_TF = Pose.of((0.0, 0.0, -config.tool.length))  # pose of the flange F in the frame T of the tool
         super().__init__(name, camera, lambda: arm.tool_pose @ X_TF, clock, lambda: ledger.change_count)
         self.occluded_regions: list[Box] = []
+        self._world = world
         self._corners = np.array([(x, y, 0.0) for x in config.table.x for y in config.table.y])
 
     def sees_table(self) -> bool:
         return compute_hull_mask(self._corners, self.matrix, self._compute_pose(), self._size) is not None
+
+    def capture(self) -> TrueFrame:
+        frame = super().capture()
+        return TrueFrame(**vars(frame), true_detections=tuple(self._find_true_detections(frame)))
+
+    def _find_true_detections(self, frame: Frame) -> Iterator[Detection]:
+        for fake_object in self._world.objects:
+            x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
+            if depth > 0 and fake_object is not self._world.held_object:
+                column = x / depth
+                row = y / depth
+                half_side = frame.matrix[0, 0] / depth * self._world.classes[fake_object.label].radius
+                box = (column - half_side, row - half_side, column + half_side, row + half_side)
+                yield Detection(fake_object.label, 1.0, box)
 
     def _capture_images(self) -> tuple[NDArray[np.uint8], None]:
         return np.zeros((self.config.height, self.config.width, 3), dtype=np.uint8), None
@@ -204,55 +220,6 @@ class FakeCamera(MountedCamera):
         for left, top, right, bottom in self.occluded_regions:
             mask[int(top) : int(bottom), int(left) : int(right)] = False
         return mask
-
-
-@dataclass(eq=False)
-class FakeDetector:
-    """A detector that finds every object in a view, unless a test replaces `make_answer`.
-
-    Attributes:
-        name: Name of the detector in the cell file.
-        config: Section of the detector in the cell file.
-        world: The world with the true objects.
-        clock: Clock of the run.
-        get_view_region: Returns the image region [pixel] of a view, which is `table` or `full`.
-        make_answer: Returns the detections, or a message if the detector is unavailable. Its arguments are
-            the number of the request (from 1) and the true detections.
-        request_count: Number of requests so far.
-    """
-
-    name: str
-    config: DetectorConfig
-    world: FakeWorld
-    clock: Clock
-    get_view_region: Callable[[str], Box]
-    make_answer: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = field(
-        default=lambda _request_number, true_detections: true_detections
-    )
-    request_count: int = 0
-
-    def request(self, frame: Frame, view: str) -> PendingSearch:
-        self.request_count += 1
-        left, top, right, bottom = self.get_view_region(view)
-        true_detections = []
-        for fake_object in self.world.objects:
-            x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
-            column = x / depth
-            row = y / depth
-            is_inside = depth > 0 and left <= column < right and top <= row < bottom
-            if is_inside and fake_object is not self.world.held_object:
-                half_side = frame.matrix[0, 0] / depth * self.world.classes[fake_object.label].radius
-                box = (column - half_side, row - half_side, column + half_side, row + half_side)
-                confidence = max(DEFAULT_CONFIDENCE, self.config.threshold)
-                true_detections.append(Detection(fake_object.label, confidence, box))
-        answer = self.make_answer(self.request_count, true_detections)
-        future: Future[list[Detection]] = Future()
-        if isinstance(answer, str):
-            future.set_exception(Unavailable(answer))
-        else:
-            future.set_result(list(answer))
-        answer_time = self.clock.now + self.config.latency
-        return PendingSearch(future, answer_time, self.clock, self.name, self.config.error_rates)
 
 
 def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
@@ -354,7 +321,7 @@ class FakeCell(CellWithoutHardware):
         arm: The fake arm.
         tool: The fake tool.
         camera: The fake camera.
-        detectors: The fake detectors by name.
+        detectors: What finds the objects in frames for each detector, by name of the detector.
         detector: The first detector.
         ledger: The ledger of the run, the same object as `accounts`.
 
@@ -382,11 +349,21 @@ class FakeCell(CellWithoutHardware):
         put_random_objects(self.world, config, seed)
         self.arm = FakeArm(self.world, config, clock, emit)
         self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position, config.tool.load_std)
-        self.camera = FakeCamera(config, self.arm, clock, self.ledger)
-        self.detectors = {
-            name: FakeDetector(name, detector, self.world, clock, self.camera.get_view_box)
-            for name, detector in config.detectors.items()
-        }
+        self.camera = FakeCamera(self.world, config, self.arm, clock, self.ledger)
+        self.detectors: dict[str, TruthDetector] = {}
+
+        def make_detector(section: DetectorConfig, context: DetectorContext) -> TruthDetector:
+            self.detectors[context.name] = TruthDetector.from_config(section, context)
+            return self.detectors[context.name]
+
+        detectors = build_cell_detectors(
+            config,
+            clock=clock,
+            cell_folder=options.cell_folder,
+            seed=seed,
+            classes=self.cell.classes,
+            make_kind=make_detector,
+        )
         self.detector = next(iter(self.detectors.values()))
         self._log: LogFile | None = None
         self._log_length = 0
@@ -394,7 +371,7 @@ class FakeCell(CellWithoutHardware):
             self._restore_state(options.resume.log_path)
             self.log_to(options.resume.log_path)
         localizer = CellLocalizer("plane", self.cell.classes, self.cell.bins.values())
-        self._connect(options, self.arm, self.tool, self.camera, self.detectors, localizer)
+        self._connect(options, self.arm, self.tool, self.camera, detectors, localizer)
 
     @staticmethod
     def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:

@@ -20,7 +20,6 @@ from executive.geometry import Array
 from executive.ledger.item import ItemRecord, State
 from executive.ledger.tracker import Tracker
 from executive.perception.camera_model import MountedCamera
-from executive.perception.detectors.requests import screen_detectors
 
 
 def count_outcomes(
@@ -171,9 +170,8 @@ class CellWithoutHardware:
         """Add the parts that skills use to `cell`; the camera of a resumed run continues to count."""
         if options.resume is not None:
             camera.set_counts(options.resume.frame_count, options.resume.pose_count)
-        screened = screen_detectors(detectors, self.cell.classes)
         self.cell = replace(
-            self.cell, arm=arm, tool=tool, camera=camera, detectors=screened, localizer=localizer
+            self.cell, arm=arm, tool=tool, camera=camera, detectors=detectors, localizer=localizer
         )
 
     def log_to(self, path: Path) -> None:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,6 @@ from executive.cell.frame import Answer
 from executive.cell.workcell import Workcell
 from executive.errors import InputError, NoDepth, Unavailable, Unreachable
 from executive.events import Emit, discard_event
-from executive.perception.detectors.requests import ChangedRequest
 from executive.testing.faulty_cell import Effect, FaultyCell, ObjectChoice, Occurrence, ScheduledFault
 from executive.testing.oracle import WorldAccess
 
@@ -254,13 +253,28 @@ def make_detector_effect(name: str, change_answer: AnswerChange | None = None, h
     return Effect(name, interceptors={"request": _change_answer}, arguments=(change_answer, hangs))
 
 
+@dataclass(frozen=True, eq=False)
+class _ChangedRequest:
+    """Pending answer of a detector or a planner, changed, or held back while `is_released` returns False."""
+
+    request: Any
+    change: Callable[[Any], Any] | None
+    is_released: Callable[[], bool]
+
+    @property
+    def ready(self) -> bool:
+        return self.request.ready and self.is_released()
+
+    def result(self) -> Any:
+        answer = self.request.result()
+        return self.change(answer) if self.change else answer
+
+
 def _change_answer(
     proceed: Callable[[], Any], occurrence: Occurrence, change: Callable[..., Any] | None, hangs: bool = False
-) -> ChangedRequest:
-    """Return the pending answer of a detector or a planner, changed, or held back until the fault ends."""
+) -> _ChangedRequest:
     occurrence.emit_event()
-    change = change or (lambda answer: answer)
-    return ChangedRequest(proceed(), change, is_released=lambda: occurrence.is_over or not hangs)
+    return _ChangedRequest(proceed(), change, lambda: occurrence.is_over or not hangs)
 
 
 def _raise_unavailable(answer: Answer) -> Answer:

@@ -8,20 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 
-from executive.cell.config import CellConfig, DetectorConfig
-from executive.cell.device_config import CameraConfig
-from executive.cell.frame import Detection, Frame
+from executive.cell.frame import Detection, TrueFrame
 from executive.cell.objects import UNKNOWN_LABEL
-from executive.cell.protocols import Clock
 from executive.cell.workcell import TrueObject, Workcell, find_innermost_cell
 from executive.drivers.fake import FakeCell
 from executive.drivers.sim.camera import Image, SimCamera
@@ -31,10 +26,7 @@ from executive.drivers.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import NEAR_PLANE, project
-from executive.perception.detectors.requests import PendingSearch
-
-ORACLE_CONFIDENCE = 0.9
-"""Confidence of all detections of an oracle."""
+from executive.perception.detectors.simulated import TruthDetector
 
 
 class WorldAccess:
@@ -119,17 +111,6 @@ class WorldAccess:
 
 
 @dataclass(frozen=True, eq=False)
-class TrueFrame(Frame):
-    """A frame with ground truth: the true detections of its objects.
-
-    Attributes:
-        true_detections: Detections of all objects with a class whose box centre no other object occludes.
-    """
-
-    true_detections: tuple[Detection, ...]
-
-
-@dataclass(frozen=True, eq=False)
 class _Outline:
     """Outline of an object in an image.
 
@@ -152,7 +133,7 @@ class _Outline:
 
 
 class TruthCamera(SimCamera):
-    """A simulated camera whose frames contain ground truth: the true detections.
+    """A simulated camera whose frames contain the true detections: no other object occludes their centres.
 
     Images are black unless `renders_images` is True or the camera measures depth.
     """
@@ -180,70 +161,17 @@ class TruthCamera(SimCamera):
                 pixels = project(camera_matrix, X_WC, vertices)
                 outlines.append(_Outline(label, pixels, float(distances.mean())))
         return tuple(
-            Detection(outline.label, ORACLE_CONFIDENCE, compute_bounding_box(outline.pixels))
+            Detection(outline.label, 1.0, compute_bounding_box(outline.pixels))
             for outline in outlines
             if outline.label != UNKNOWN_LABEL and not any(other.is_occluding(outline) for other in outlines)
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Oracle:
-    """A detector that returns the true detections of a `TrueFrame`; implements `cell.protocols.Detector`.
-
-    The detector omits boxes whose centre is outside the requested view or occluded by the arm.
-
-    Attributes:
-        name: Name of the detector in the cell file.
-        config: Section of the detector in the cell file; only threshold, error rates and latency are used.
-        camera: Camera of the frames.
-        clock: Clock of the run.
-        box_std: Standard deviation of the noise of each box coordinate [pixel].
-        seed: Random seed of the noise; each frame has its own noise.
-    """
-
-    name: str
-    config: DetectorConfig
-    camera: CameraConfig
-    clock: Clock
-    box_std: float
-    seed: int
-
-    def request(self, frame: Frame, view: str) -> PendingSearch:
-        """Request the true detections of `frame`, which are available after the latency of the detector."""
-        assert isinstance(frame, TrueFrame), "an oracle requires frames of a TruthCamera"
-        random_generator = np.random.default_rng([self.seed, frame.id])
-        detections = []
-        for true_detection in frame.true_detections:
-            box = np.array(true_detection.box) + random_generator.normal(0.0, self.box_std, 4)
-            detection = replace(true_detection, box=(box[0], box[1], box[2], box[3]))
-            column, row = detection.centre
-            left, top, right, bottom = self.camera.get_view_box(view)
-            if left <= column < right and top <= row < bottom and frame.visible[int(row), int(column)]:
-                detections.append(detection)
-        answer: Future[list[Detection]] = Future()
-        answer.set_result(detections)
-        answer_time = self.clock.now + self.config.latency
-        return PendingSearch(answer, answer_time, self.clock, self.name, self.config.error_rates)
-
-    def close(self) -> None:
-        """Do nothing: an oracle holds no resources."""
-
-
 def make_oracle_kind(*, box_std: float = 0.7, renders_images: bool = False) -> Callable[..., SimCell]:
-    """Return a factory of simulated cells with oracles as detectors, for `RunOptions.make_cell`.
+    """Return a factory of simulated cells with true detections, for `RunOptions.make_cell`.
 
     `box_std`: standard deviation of box coordinates [pixel]; if `renders_images` is False, images are black.
     """
     camera = partial(TruthCamera, renders_images=renders_images)
-    return partial(SimCell, build_camera=camera, build_detectors=partial(_build_oracles, box_std=box_std))
-
-
-def _build_oracles(
-    config: CellConfig, *, clock: Clock, base: Path, seed: int, folders: Sequence[Path], box_std: float
-) -> dict[str, Oracle]:
-    del base, folders  # An oracle loads no files from the folder of the cell file.
-    camera = next(iter(config.cameras.values()))
-    return {
-        name: Oracle(name, detector_config, camera, clock, box_std, seed)
-        for name, detector_config in config.detectors.items()
-    }
+    make_detector = partial(TruthDetector.from_config, box_std=box_std)
+    return partial(SimCell, build_camera=camera, make_detector=make_detector)

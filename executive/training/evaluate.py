@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import math
 import time
-from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,10 +16,10 @@ from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.device_config import CameraConfig
-from executive.cell.frame import Answer, Box, Detection, Frame
-from executive.cell.protocols import STEP, Localizer, StepClock
+from executive.cell.frame import Box, Detection, Frame
+from executive.cell.protocols import Localizer
 from executive.errors import Unavailable
-from executive.perception.detectors.detector_registry import build_detectors
+from executive.perception.detectors.detector_registry import build_kinds, close_kind
 from executive.perception.detectors.envelope import FrameRange, compute_frame_statistics
 from executive.training.dataset import LabelledImage
 from executive.training.metrics import (
@@ -36,10 +35,6 @@ MIN_CONFIDENCE = 0.01
 """Minimum confidence of the detections of a model file; the average precision needs low confidences."""
 MODEL_NAME = "model"
 """Name of the detector that is built from a model file."""
-REQUEST_INTERVAL = 1.0
-"""Simulated time between two requests [s], similar to the time between two frames in a run."""
-ANSWER_TIMEOUT = 60.0
-"""Maximum simulated time from a request to its answer [s]."""
 WHOLE_IMAGE_CAMERA = CameraConfig(
     mount="fixed", position=(0, 0, 1), look_at=(0, 0, 0), up=(1, 0, 0), fov_deg=60,
     table_view=(0, 0, 64, 64), scan_poses=("none",),
@@ -78,7 +73,7 @@ Picture = NDArray[np.uint8]
 
 
 def evaluate(
-    detector: CellDetector, samples: Iterable[LabelledImage], *, threshold: float | None = None,
+    detector: EvaluatedDetector, samples: Iterable[LabelledImage], *, threshold: float | None = None,
     localizer: Localizer | None = None, mistakes: list[Mistake] | None = None, cell: CellConfig | None = None,
 ) -> Evaluation:  # fmt: skip
     """Return the accuracy of a detector on labelled images; ignored objects do not count.
@@ -95,27 +90,27 @@ def evaluate(
     average_precision = AveragePrecision()
     statistics_of_frames: list[Mapping[str, float]] = []
     latencies: list[float] = []
-    answer_counts: Counter[str] = Counter()
+    answer_count = 0
     unavailable_count = 0
     unavailable_reason = ""
+    min_confidence = detector.threshold if threshold is None else threshold
     for number, sample in enumerate(samples, 1):
         frame = sample.to_frame(number)
         try:
-            answer, latency = detector.detect(frame)
+            detections, latency = detector.detect(frame)
         except Unavailable as error:
             unavailable_count += 1
             unavailable_reason = str(error) or repr(error)
             continue
-        answer_counts[answer.detector] += 1
+        answer_count += 1
         latencies.append(latency)
-        average_precision.add([entry for entry in answer.confident if not is_ignored(entry, sample)], sample)
-        min_confidence = answer.error_rates.threshold if threshold is None else threshold
-        matches = _match_confident(answer, sample, min_confidence)
+        average_precision.add([entry for entry in detections if not is_ignored(entry, sample)], sample)
+        matches = _match_confident(detections, sample, min_confidence)
         second_matches = None
         if sample.repeated_image is not None:
             with contextlib.suppress(Unavailable):
-                second_answer, _ = detector.detect(replace(frame, image=sample.repeated_image))
-                second_matches = _match_confident(second_answer, sample, min_confidence)
+                second_detections, _ = detector.detect(replace(frame, image=sample.repeated_image))
+                second_matches = _match_confident(second_detections, sample, min_confidence)
         errors.add(matches, second_matches, sample, frame)
         if cell is not None and (frame_statistics := compute_frame_statistics(frame, cell)):
             statistics_of_frames.append(frame_statistics)
@@ -124,8 +119,8 @@ def evaluate(
     map50, map50_95 = average_precision.compute()
     metrics_by_class = {label: errors.compute_metrics([label]) for label in errors.labels}
     return Evaluation(
-        threshold=detector.threshold if threshold is None else threshold,
-        images=unavailable_count + answer_counts.total(),
+        threshold=min_confidence,
+        images=unavailable_count + answer_count,
         **vars(errors.compute_metrics(errors.labels)),
         map50=map50,
         map50_95=map50_95,
@@ -138,16 +133,18 @@ def evaluate(
         confusion=errors.make_confusion_matrix(),
         unavailable=unavailable_count,
         why=unavailable_reason,
-        answered_by=dict(answer_counts),
+        answered_by={detector.name: answer_count} if answer_count else {},
         by_count={count: dict(counts) for count, counts in errors.counts_by_object_count.items()},
         reliability=errors.estimate_error_rates(),
         frames=FrameRange.compute(statistics_of_frames),
     )
 
 
-def _match_confident(answer: Answer, sample: LabelledImage, min_confidence: float) -> list[BoxMatch]:
+def _match_confident(
+    detections: Sequence[Detection], sample: LabelledImage, min_confidence: float
+) -> list[BoxMatch]:
     """Return the matches of detections with at least `min_confidence`; ignored objects are excluded."""
-    confident = [entry for entry in answer.confident if entry.confidence >= min_confidence]
+    confident = [entry for entry in detections if entry.confidence >= min_confidence]
     return match_detections([entry for entry in confident if not is_ignored(entry, sample)], sample)
 
 
@@ -181,8 +178,8 @@ class AveragePrecision:
         return sv.Detections(np.array(boxes, float).reshape(-1, 4), class_id=np.array(ids, dtype=int))
 
 
-class CellDetector:
-    """Detector of a cell file for the evaluation of its accuracy.
+class EvaluatedDetector:
+    """Detector of a cell file whose accuracy is evaluated.
 
     Args:
         configs: Detectors of the cell file by name; the evaluated detector may call other detectors.
@@ -201,43 +198,28 @@ class CellDetector:
         configs: Mapping[str, DetectorConfig], name: str, *, base: Path, camera: CameraConfig | None = None,
         view: str = "table", classes: Collection[str] | None = None,
     ) -> None:  # fmt: skip
+        self.name = name
         self.threshold = configs[name].threshold
-        self._name = name
         self._view = view if camera else "full"
         self._classes = classes
-        self._now = 0.0
-        clock = StepClock(lambda: self._now)
-        self._detectors = build_detectors(
-            configs, camera=camera or WHOLE_IMAGE_CAMERA, clock=clock, base=base, seed=0
-        )
+        self._kinds = build_kinds(configs, camera=camera or WHOLE_IMAGE_CAMERA, cell_folder=base, seed=0)
 
-    def detect(self, frame: Frame) -> tuple[Answer, float]:
-        """Return the answer of the detector to a frame, and its latency in wall time [ms].
+    def detect(self, frame: Frame) -> tuple[list[Detection], float]:
+        """Return the detections in a frame, and the time that the detector needed [ms].
 
         Raises:
             Unavailable: The detector gave no usable answer.
         """
         start_time = time.perf_counter()
-        request_time = self._now
-        try:
-            request = self._detectors[self._name].request(replace(frame, stamp=request_time), self._view)
-            while not request.ready:
-                if self._now - request_time > ANSWER_TIMEOUT:
-                    raise Unavailable(f"no answer within {ANSWER_TIMEOUT:g} s of simulated time")
-                self._now += STEP
-            answer = request.result()
-        finally:
-            self._now += REQUEST_INTERVAL
+        detections = self._kinds[self.name].detect(frame, self._view)
         latency = (time.perf_counter() - start_time) * 1000
-        if self._classes is not None:
-            detections = tuple(entry for entry in answer.confident if entry.label in self._classes)
-            answer = replace(answer, confident=detections)
-        return answer, latency
+        classes = self._classes
+        return [entry for entry in detections if classes is None or entry.label in classes], latency
 
     def close(self) -> None:
         """Release the resources of the detectors."""
-        for detector in self._detectors.values():
-            detector.close()
+        for kind in self._kinds.values():
+            close_kind(kind)
 
 
 def find_label_file(model: Path) -> Path:

@@ -20,7 +20,13 @@ from executive.training.dataset import (
     save_image,
     write_annotations,
 )
-from executive.training.evaluate import MODEL_NAME, CellDetector, evaluate, find_label_file, make_model_config
+from executive.training.evaluate import (
+    MODEL_NAME,
+    EvaluatedDetector,
+    evaluate,
+    find_label_file,
+    make_model_config,
+)
 from executive.training.metrics import Evaluation
 from executive.training.samples import LabelledDataset
 
@@ -86,7 +92,7 @@ def train(
     model = out / "model.onnx"
     export_onnx(out / "checkpoint_best_total.pth", len(labels), model)
     config = make_model_config(model, out / "labels.txt")
-    with contextlib.closing(CellDetector({MODEL_NAME: config}, MODEL_NAME, base=Path())) as detector:
+    with contextlib.closing(EvaluatedDetector({MODEL_NAME: config}, MODEL_NAME, base=Path())) as detector:
         accuracy = evaluate(detector, splits["valid"], threshold=CARD_THRESHOLD)
     card = render_card(
         title=f"Small RF-DETR trained on {splits['train'].folder.name}",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,8 +15,7 @@ from executive.drivers.sim.cell import SimCell, list_final_objects
 from executive.events import ItemChanged
 from executive.ledger.item import State
 from executive.mission.load import load_mission
-from executive.perception.detectors.envelope import build_rated_detectors
-from executive.perception.detectors.requests import ClosableDetector
+from executive.perception.detectors.detector_registry import KindMaker, make_installed_kind
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
@@ -32,8 +30,6 @@ WALL_TIME_LIMIT = 180.0
 """Wall time after which a run counts as hung and is killed, unless an option says otherwise [s]."""
 END_PLACES = ("wrong_bin", "right", "left", "elsewhere")
 """Keys of the audit of which a single object counts in one at most."""
-DetectorMaker = Callable[..., Mapping[str, ClosableDetector]]
-"""Makes the detectors of a cell, as `build_rated_detectors` does."""
 
 
 @dataclass(frozen=True)
@@ -182,12 +178,12 @@ def run_audited(
     seed: int,
     runs: Path,
     scene: Path | None = None,
-    detectors: DetectorMaker = build_rated_detectors,
+    make_detector: KindMaker = make_installed_kind,
     wall_time_limit: float = WALL_TIME_LIMIT,
 ) -> AuditedRun:
     """Record a run below `runs` in a forked process, which is killed after `wall_time_limit` [s]."""
     answer, problem = ForkRunner(wall_time_limit).call(
-        lambda: _run_in_this_process(mission, seed, runs, scene, detectors)
+        lambda: _run_in_this_process(mission, seed, runs, scene, make_detector)
     )
     if isinstance(answer, AuditedRun):
         return answer
@@ -195,12 +191,12 @@ def run_audited(
 
 
 def _run_in_this_process(
-    mission: str, seed: int, runs: Path, scene: Path | None, detectors: DetectorMaker
+    mission: str, seed: int, runs: Path, scene: Path | None, make_detector: KindMaker
 ) -> AuditedRun:
     cells: list[AuditedCell] = []
 
     def make_cell(*arguments: Any, **options: Any) -> AuditedCell:
-        cells.append(AuditedCell(*arguments, **options, build_detectors=detectors))
+        cells.append(AuditedCell(*arguments, **options, make_detector=make_detector))
         return cells[0]
 
     loaded = load_mission(mission, load_skills(), {}, load_cell_kind)

@@ -12,17 +12,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
 
 import yaml
 
 from executive.behaviours import load_skills
-from executive.cell.config import CellConfig
-from executive.cell.frame import Answer, Frame
+from executive.cell.config import CellConfig, DetectorConfig
+from executive.cell.frame import Detection, Frame
 from executive.drivers.sim.scene import load_scene
 from executive.mission.load import load_mission
-from executive.perception.detectors.envelope import build_rated_detectors
-from executive.perception.detectors.requests import ChangedRequest, ClosableDetector
+from executive.perception.detectors.detector_registry import (
+    DetectorContext,
+    DetectorKind,
+    make_installed_kind,
+)
 from executive.processes import WorkerPool
 from tests.benchmarks.ground_truth import FAULT, HUNG, WALL_TIME_LIMIT, AuditedRun, run_audited
 from tests.benchmarks.report import Figures, run_command, show_progress, write_json
@@ -71,28 +73,20 @@ def list_cases() -> list[Case]:
 
 @dataclass(frozen=True)
 class MisnamingDetector:
-    """Answers as another detector, but calls ducks cubes; implements `Detector`."""
+    """Finds what another detector finds, but calls ducks cubes; a kind of detector."""
 
-    other: ClosableDetector
+    other: DetectorKind
 
-    def request(self, frame: Frame, view: str) -> ChangedRequest:
-        """Ask the other detector about `frame`."""
-        return ChangedRequest(self.other.request(frame, view), _call_ducks_cubes)
-
-    def close(self) -> None:
-        """Close the other detector."""
-        self.other.close()
+    def detect(self, frame: Frame, view: str) -> list[Detection]:
+        """Return the detections of the other detector, in which ducks are cubes."""
+        found = self.other.detect(frame, view)
+        return [replace(one, label="cube") if one.label == "duck" else one for one in found]
 
 
-def _call_ducks_cubes(answer: Answer) -> Answer:
-    found = (replace(one, label="cube") if one.label == "duck" else one for one in answer.confident)
-    return replace(answer, confident=tuple(found))
-
-
-def build_with_misnaming(*arguments: Any, **options: Any) -> dict[str, ClosableDetector]:
-    """Return the detectors of a cell file; the one called `second` misnames ducks."""
-    built = build_rated_detectors(*arguments, **options)
-    return {**built, "second": MisnamingDetector(built["second"])}
+def make_misnaming(config: DetectorConfig, context: DetectorContext) -> DetectorKind:
+    """Return the detector of a section of a cell file; the one called `second` misnames ducks."""
+    made = make_installed_kind(config, context)
+    return MisnamingDetector(made) if context.name == "second" else made
 
 
 @dataclass(frozen=True)
@@ -131,8 +125,8 @@ def measure(
             if case.group == DECLARED or re.search(only, f"{case.mission}: {case.group}: {case.name}"):
                 scene = write_scene(case, Path(folder))
                 first = first_seed + SEEDS_PER_CASE * case.number
-                detectors = build_with_misnaming if case.group == MISNAMING else build_rated_detectors
-                run = partial(run_audited, detectors=detectors, wall_time_limit=wall_time_limit)
+                make_detector = make_misnaming if case.group == MISNAMING else make_installed_kind
+                run = partial(run_audited, make_detector=make_detector, wall_time_limit=wall_time_limit)
                 count = declared_runs if case.group == DECLARED else runs_per_scene
                 for seed in range(first, first + min(count, SEEDS_PER_CASE)):
                     jobs.append((case, pool.submit(run, case.mission, seed, runs_folder, scene)))

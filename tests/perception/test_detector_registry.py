@@ -11,7 +11,7 @@ from executive.cell.config import DetectorConfig
 from executive.errors import InputError
 from executive.perception.detectors import detector_registry
 from executive.perception.detectors.detector_registry import (
-    build_detectors,
+    build_kinds,
     find_detector_errors,
 )
 
@@ -34,8 +34,18 @@ class Oracle:
     def from_config(cls, config, context):
         return cls(config, context)
 
+    def detect(self, frame, view):
+        return []
+
     def close(self):
         self.closed = True
+
+
+class Former:
+    """A kind of detector of a former version."""
+
+    def request(self, frame, view):
+        raise NotImplementedError
 
 
 def oracle(**options):
@@ -43,15 +53,18 @@ def oracle(**options):
 
 
 def build(base=None, **configs):
-    return build_detectors(configs, camera=None, clock=None, base=base, seed=7)
+    return build_kinds(configs, camera=None, cell_folder=base, seed=7)
 
 
 @pytest.fixture
 def oracle_installed(monkeypatch):
-    """The kind `oracle` is installed beside the shipped ones."""
+    """The kinds `oracle` and `former` are installed beside the shipped ones."""
     found = detector_registry.find_detector_kinds()
-    oracle = EntryPoint("oracle", f"{__name__}:Oracle", detector_registry.DETECTOR_GROUP)
-    monkeypatch.setattr(detector_registry, "find_detector_kinds", lambda: {**found, "oracle": oracle})
+    own = {
+        kind.__name__.lower(): EntryPoint(kind.__name__, f"{__name__}:{kind.__name__}", "executive.detectors")
+        for kind in (Oracle, Former)
+    }
+    monkeypatch.setattr(detector_registry, "find_detector_kinds", lambda: {**found, **own})
     monkeypatch.setattr(Oracle, "made", [])
 
 
@@ -85,3 +98,14 @@ def test_where_one_cannot_be_built_the_others_are_closed(oracle_installed):
     with pytest.raises(InputError, match="it is broken"):
         build(a=oracle(), b=oracle(broken=True))
     assert Oracle.made[0].closed
+
+
+def test_a_kind_that_has_no_method_detect_is_told_what_to_write(oracle_installed, tmp_path):
+    configs = {"eye": DetectorConfig(kind="former")}
+    ((place, message),) = find_detector_errors(configs, tmp_path)
+    assert place == ("detectors", "eye", "kind")
+    with pytest.raises(
+        InputError, match=r"no method `detect`; replace `request` by `detect\(frame, view\)`"
+    ) as caught:
+        build(**configs)
+    assert str(caught.value) == message

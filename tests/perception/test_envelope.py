@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import TableConfig
-from executive.cell.frame import Answer, ErrorRates, Frame, assume_rates
+from executive.cell.frame import Frame, assume_rates
 from executive.mission.cell_file import load_cell
 from executive.perception.detectors.envelope import (
     FrameRange,
@@ -20,7 +20,7 @@ from executive.perception.detectors.envelope import (
     find_envelopes,
     find_unmeasured_detectors,
     format_measurements,
-    rate_answer,
+    rate_frame,
     read_measurements,
 )
 from tests.camera_poses import looking_down
@@ -127,9 +127,7 @@ def test_fake_cells_and_fake_detectors_are_not_measured(overhead, missions, tmp_
 @pytest.mark.parametrize(("colour", "doubted"), [(WOOD, False), ((60, 60, 60), True)])
 def test_rates_are_assumed_for_frames_outside_the_measured_ranges(overhead, colour, doubted):
     envelope = RATES.build_error_rates(0.5), WOOD_RANGE
-    answer = Answer("embedded", (), ErrorRates(0.5, 0.9, 0.9, 0.9, 9.0))
-    rated = rate_answer(answer, make_frame(colour), "table", envelope=envelope, config=overhead)
-    answered = rated.error_rates
+    answered = rate_frame(make_frame(colour), detector="embedded", envelope=envelope, config=overhead)
     doubt = answered.assumption_reason
     assert answered == (assume_rates(0.5, doubt) if doubted else RATES.build_error_rates(0.5))
     start = "the workspace differs from all images with which detector embedded was measured: "

@@ -10,7 +10,7 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.cell.frame import Detection
 from executive.errors import InputError
-from executive.perception.detectors.requests import DetectorContext
+from executive.perception.detectors.detector_registry import DetectorContext
 from executive.perception.detectors.rfdetr import LABELS_PATH, MODEL_PATH, EmbeddedDetector, RfdetrDetector
 
 ONNX = str(MODEL_PATH)
@@ -33,28 +33,15 @@ def show_spot(left, top):
     return SimpleNamespace(image=image)
 
 
-CLOCK = SimpleNamespace(now=0.0)
-
-
 def make_context(base=None):
     camera = SimpleNamespace(table_view=(192, 100, 448, 356))
-    return DetectorContext("eye", camera, CLOCK, base, seed=0, get_detector=None)
-
-
-def search(detector, frame, view):
-    """Return what the detector finds, waited for on its clock."""
-    request = detector.request(frame, view)
-    assert not request.ready
-    CLOCK.now += 0.05
-    assert request.ready
-    detector.close()
-    return request.result().confident
+    return DetectorContext("eye", camera, base, seed=0, get_detector=None)
 
 
 def find_spots(left, top, view):
     """Return the spots that a model finds."""
     detector = RfdetrDetector(BrightSpots(), DetectorConfig(kind="rfdetr"), make_context(), {})
-    return search(detector, show_spot(left, top), view)
+    return detector.detect(show_spot(left, top), view)
 
 
 @pytest.mark.parametrize(("left", "top"), [(0, 0), (620, 460), (180, 240)])
@@ -73,7 +60,7 @@ def test_any_exported_model_can_be_used_by_path_and_the_embedded_one_needs_no_op
     mine = configure(RfdetrDetector, model_path="model.onnx", labels="names.txt", threshold=0.6)
     for kind, config in ((RfdetrDetector, mine), (EmbeddedDetector, configure(EmbeddedDetector))):
         detector = kind.from_config(config, make_context(tmp_path))
-        assert search(detector, show_spot(640, 480), "table") == ()
+        assert detector.detect(show_spot(640, 480), "table") == []
 
 
 WRONG = [

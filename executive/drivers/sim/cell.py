@@ -22,8 +22,8 @@ from executive.drivers.world_log import CommandLog, read_commands
 from executive.errors import InputError
 from executive.events import Emit
 from executive.motion.planner import Planner
-from executive.perception.detectors.envelope import build_rated_detectors
-from executive.perception.detectors.requests import ClosableDetector
+from executive.perception.detectors.cell_detector import build_cell_detectors
+from executive.perception.detectors.detector_registry import KindMaker, make_installed_kind
 from executive.perception.localization import CellLocalizer
 from executive.station.without_hardware import CellWithoutHardware
 from executive.text.yaml_files import get_shipped_folder
@@ -42,7 +42,7 @@ class SimCell(CellWithoutHardware):
         emit: Receives the events of the cell.
         options: Options of the run.
         build_camera: Builds the camera from the arguments of `SimCamera`.
-        build_detectors: Builds the detectors from the arguments of `build_rated_detectors`.
+        make_detector: Makes the kind of each detector of the cell file.
 
     Raises:
         InputError: The simulated cell does not support the cell file, or the scene file is invalid.
@@ -57,7 +57,7 @@ class SimCell(CellWithoutHardware):
         emit: Emit,
         options: CellOptions,
         build_camera: Callable[..., SimCamera] = SimCamera,
-        build_detectors: Callable[..., Mapping[str, ClosableDetector]] = build_rated_detectors,
+        make_detector: KindMaker = make_installed_kind,
     ) -> None:
         for _, message in find_missing_depth_sensors(config):
             raise InputError(f"cell {config.cell}: {message}")
@@ -86,8 +86,14 @@ class SimCell(CellWithoutHardware):
         localizer = CellLocalizer(config.localization, classes, bins, self._world.cast_ray)
         # Detectors are built last, because their processes would outlive an exception in a later statement.
         folders = (options.cell_folder, get_shipped_folder() / "cells")
-        self._detectors = build_detectors(
-            config, clock=clock, base=options.cell_folder, seed=detector_seed, folders=folders
+        self._detectors = build_cell_detectors(
+            config,
+            clock=clock,
+            cell_folder=options.cell_folder,
+            seed=detector_seed,
+            classes=classes,
+            folders=folders,
+            make_kind=make_detector,
         )
         self.cell = replace(self.cell, classes=classes)
         self._connect(options, self._arm, self._tool, self._camera, self._detectors, localizer)

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from executive.cell.config import DetectorConfig
 from executive.cell.device_config import CameraConfig, Section
-from executive.cell.protocols import Clock
+from executive.cell.frame import Detection, Frame
 from executive.errors import InputError
-from executive.perception.detectors.requests import ClosableDetector, DetectorContext
 from executive.plugins import PluginEntry, list_entries
 from executive.text.validate import KeyPath
 
@@ -26,6 +26,57 @@ DETECTOR_GROUP = "executive.detectors"
 """Entry-point group of kinds of detectors."""
 FAKE_ERROR_RATE_KEYS = frozenset({"miss_rate", "confusion_rate", "false_detections", "jitter"})
 """Keys of error rates; only the section of a fake detector may contain them."""
+
+
+class DetectorKind(Protocol):
+    """A kind of detector: the search of frames.
+
+    Each entry point of the group `executive.detectors` is a class with this method and with a class method
+    `from_config(config, context)`, which raises InputError if the detector cannot be built. `CellDetector`
+    adds thread, latency, error rates and validation of the boxes. Optional members:
+
+    * `close()`: ends a running search, and releases processes, connections and files
+    * `check(config, base, all_configs)`: static, see `find_detector_errors`
+    * `labels(config, base)`: static, see `find_detectable_labels`
+    * `weights(config, base)`: static, returns the path of the model file; a measurement holds for its content
+    * `is_fake`: True if the error rates in the cell file are exact, so that they need not be measured
+    * `is_instant`: True if a search takes less than a millisecond, so that it needs no thread
+    """
+
+    def detect(self, frame: Frame, view: str) -> Sequence[Detection]:
+        """Search a view of a frame, `table` (the workspace) or `full`; return the detections, best first.
+
+        The method runs in a thread beside the control loop, and may wait for its result. It runs in two
+        threads at once if another detector of the cell is based on this one.
+
+        Raises:
+            Unavailable: A server or another program failed; other exceptions are faults and end the run.
+            Crowded: There are more boxes than objects fit into the cell.
+            DeadlinePassed: A server was late.
+        """
+
+
+@dataclass(frozen=True)
+class DetectorContext:
+    """Parts of the cell that a kind of detector uses.
+
+    Attributes:
+        name: Name of the detector in the cell file.
+        camera: The camera whose frames the detector searches.
+        cell_folder: Folder of the cell file, to which paths in options are relative.
+        seed: Random seed of the detector.
+        get_detector: Function that returns a detector of the cell by name; the caller must not close it.
+    """
+
+    name: str
+    camera: CameraConfig
+    cell_folder: Path
+    seed: int
+    get_detector: Callable[[str], DetectorKind]
+
+
+KindMaker: TypeAlias = Callable[[DetectorConfig, DetectorContext], DetectorKind]
+"""Returns the detector of a section of a cell file."""
 
 
 class DetectorOptions(Section):
@@ -73,45 +124,83 @@ def find_detector_kinds() -> dict[str, PluginEntry]:
     return list_entries(DETECTOR_GROUP, "kind of detector")
 
 
-def build_detectors(
-    configs: Mapping[str, DetectorConfig], *, camera: CameraConfig, clock: Clock, base: Path, seed: int
-) -> dict[str, ClosableDetector]:
-    """Return the detectors of a cell file by name, in the order of the file.
+def load_kind(name: str, kind: str, kinds: Mapping[str, PluginEntry]) -> Any:
+    """Return the class of the kind of the detector `name`; `kinds` are the installed kinds.
+
+    Raises:
+        InputError: The kind is not installed, cannot be loaded, or has no method `detect`.
+    """
+    if kind not in kinds:
+        installed_kinds = ", ".join(sorted(kinds)) or "none"
+        raise InputError(
+            f'detector "{name}" is of kind "{kind}", which is not installed; installed: {installed_kinds}'
+        )
+    kind_class = kinds[kind].load()
+    if not hasattr(kind_class, "detect"):
+        raise InputError(
+            f'detector "{name}" is of kind "{kind}" ({kinds[kind].value}), which has no method `detect`; '
+            "replace `request` by `detect(frame, view)`, which waits and returns a list of detections"
+        )
+    return kind_class
+
+
+def make_installed_kind(config: DetectorConfig, context: DetectorContext) -> DetectorKind:
+    """Return the detector of a section of a cell file, of its installed kind.
+
+    Raises:
+        InputError: The kind is not installed, or an option is invalid.
+    """
+    kind_class = load_kind(context.name, config.kind, find_detector_kinds())
+    kind: DetectorKind = kind_class.from_config(config, context)
+    return kind
+
+
+def build_kinds(
+    configs: Mapping[str, DetectorConfig],
+    *,
+    camera: CameraConfig,
+    cell_folder: Path,
+    seed: int,
+    make_kind: KindMaker = make_installed_kind,
+) -> dict[str, DetectorKind]:
+    """Return what searches the frames for each detector of a cell file, in the order of the file.
 
     Args:
         configs: The section `detectors` of the cell file.
         camera: The camera whose frames the detectors search.
-        clock: Clock of the run, which determines when answers become available.
-        base: Folder of the cell file.
+        cell_folder: Folder of the cell file.
         seed: Random seed of the detectors.
+        make_kind: Makes the kind of each detector.
 
     Raises:
         InputError: A kind is not installed, an option is invalid, or a detector depends on itself.
     """
-    kinds = find_detector_kinds()
-    detectors: dict[str, ClosableDetector] = {}
+    built: dict[str, DetectorKind] = {}
 
-    def build(dependents: tuple[str, ...], name: str) -> ClosableDetector:
-        if name in detectors:
-            return detectors[name]
+    def build(dependents: tuple[str, ...], name: str) -> DetectorKind:
+        if name in built:
+            return built[name]
         if name not in configs:
             raise InputError(f'the cell has no detector "{name}"; it has: {", ".join(configs)}')
         if name in dependents:
             raise InputError(f"the detectors {' -> '.join([*dependents, name])} depend on each other")
-        kind = configs[name].kind
-        if kind not in kinds:
-            raise InputError(_describe_missing_kind(name, kind, kinds))
         get_detector = partial(build, (*dependents, name))
-        context = DetectorContext(name, camera, clock, base, seed, get_detector)
-        detectors[name] = kinds[kind].load().from_config(configs[name], context)
-        return detectors[name]
+        context = DetectorContext(name, camera, cell_folder, seed, get_detector)
+        built[name] = make_kind(configs[name], context)
+        return built[name]
 
     try:
         return {name: build((), name) for name in configs}
     except BaseException:
-        for detector in detectors.values():
-            detector.close()
+        for kind in built.values():
+            close_kind(kind)
         raise
+
+
+def close_kind(kind: DetectorKind) -> None:
+    """Release the resources of a kind that has a method `close`."""
+    if close := getattr(kind, "close", None):
+        close()
 
 
 def find_detector_errors(configs: Mapping[str, DetectorConfig], base: Path) -> Iterator[tuple[KeyPath, str]]:
@@ -122,10 +211,11 @@ def find_detector_errors(configs: Mapping[str, DetectorConfig], base: Path) -> I
     """
     kinds = find_detector_kinds()
     for name, config in configs.items():
-        if config.kind not in kinds:
-            yield ("detectors", name, "kind"), _describe_missing_kind(name, config.kind, kinds)
+        try:
+            kind = load_kind(name, config.kind, kinds)
+        except InputError as error:
+            yield ("detectors", name, "kind"), str(error)
             continue
-        kind = kinds[config.kind].load()
         forbidden_keys = FAKE_ERROR_RATE_KEYS if not getattr(kind, "is_fake", False) else frozenset()
         for key in sorted(forbidden_keys & config.model_fields_set):
             remedy = "remove the key and run `executive evaluate --cell` with this cell"
@@ -148,8 +238,3 @@ def find_detectable_labels(
         find_labels = getattr(kinds[config.kind].load(), "labels", None) if config.kind in kinds else None
         labels[name] = find_labels(config, base) if find_labels else None
     return labels
-
-
-def _describe_missing_kind(name: str, kind: str, kinds: Mapping[str, PluginEntry]) -> str:
-    installed_kinds = ", ".join(sorted(kinds)) or "none"
-    return f'detector "{name}" is of kind "{kind}", which is not installed; installed: {installed_kinds}'

@@ -9,8 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -20,12 +18,10 @@ from pydantic import Field, ValidationError
 
 from executive.cell.config import CellConfig
 from executive.cell.device_config import Section
-from executive.cell.frame import Answer, ErrorRates, Frame, assume_rates
-from executive.cell.protocols import Clock
+from executive.cell.frame import ErrorRates, Frame, assume_rates
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, compute_hull_mask
-from executive.perception.detectors.detector_registry import build_detectors, find_detector_kinds
-from executive.perception.detectors.requests import ChangedDetector, ClosableDetector
+from executive.perception.detectors.detector_registry import find_detector_kinds
 
 MIN_PIXELS = 400
 """Minimum number of visible pixels of the workspace for the computation of statistics."""
@@ -247,45 +243,20 @@ Envelope: TypeAlias = tuple[ErrorRates, FrameRange | None]
 statistics in the measurement, in which the error rates apply; None if unknown or not measured."""
 
 
-def rate_answer(answer: Answer, frame: Frame, view: str, *, envelope: Envelope, config: CellConfig) -> Answer:
-    """Return an answer with the error rates of the envelope of its detector.
+def rate_frame(frame: Frame, *, detector: str, envelope: Envelope, config: CellConfig) -> ErrorRates:
+    """Return the error rates of a detector for a frame: those of its envelope.
 
-    Outside the measured conditions, the answer has assumed error rates; `config` declares the workspace.
+    Outside the measured conditions, the rates are assumed; `config` declares the workspace.
     """
-    del view
     error_rates, frame_range = envelope
     statistics = compute_frame_statistics(frame, config) if frame_range else None
     if frame_range and statistics and (difference := frame_range.describe_difference(statistics)):
         reason = (
-            f"the workspace differs from all images with which detector {answer.detector} was measured: "
+            f"the workspace differs from all images with which detector {detector} was measured: "
             f"{difference}; {describe_measurement_command(config)}"
         )
-        error_rates = assume_rates(error_rates.threshold, reason)
-    return replace(answer, error_rates=error_rates)
-
-
-def build_rated_detectors(
-    config: CellConfig, *, clock: Clock, base: Path, seed: int, folders: Sequence[Path]
-) -> dict[str, ClosableDetector]:
-    """Return the detectors of a cell by name, in the order of the cell file, with their error rates.
-
-    Args:
-        config: The cell file.
-        clock: Clock of the run.
-        base: Folder to which paths in the cell file are relative.
-        seed: Random seed of the detectors.
-        folders: Folders with measurement files `CELL.measured.json`.
-
-    Raises:
-        InputError: A detector cannot be built.
-    """
-    camera = next(iter(config.cameras.values()))
-    detectors = build_detectors(config.detectors, camera=camera, clock=clock, base=base, seed=seed)
-    envelopes = find_envelopes(config, base, folders)
-    for name, envelope in envelopes.items():
-        rate = partial(rate_answer, envelope=envelope, config=config)
-        detectors[name] = ChangedDetector(detectors[name], rate, detectors[name].close)
-    return detectors
+        return assume_rates(error_rates.threshold, reason)
+    return error_rates
 
 
 def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, Envelope]:

@@ -22,12 +22,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from executive.cell.config import DetectorConfig
-from executive.cell.frame import Box, Detection
+from executive.cell.frame import Box, Detection, Frame
 from executive.errors import InputError, Unavailable
-from executive.perception.detectors.detector_registry import DetectorOptions, OptionErrors
+from executive.perception.detectors.detector_registry import DetectorContext, DetectorOptions, OptionErrors
 from executive.perception.detectors.envelope import is_measured
-from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
-from executive.perception.detectors.views import Region, remove_duplicates, search_regions
+from executive.perception.detectors.views import list_regions, remove_duplicates, search_regions
 from executive.processes import build_command
 
 CHANNEL_MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)
@@ -227,21 +226,22 @@ class RfdetrOptions(DetectorOptions):
         return read_labels(base / self.labels) if isinstance(self.labels, str) else self.labels
 
 
-class RfdetrDetector(ThreadedDetector):
-    """Detector that runs an exported RF-DETR model, an ONNX file, in a thread.
+class RfdetrDetector:
+    """Detector that runs an exported RF-DETR model, an ONNX file.
 
     Args:
         model: The model.
         config: Section of the detector in the cell file.
-        context: Parts of the cell and of the run that the detector uses.
+        context: Parts of the cell that the detector uses.
         class_map: Class names of the cell by class names of the model, if the names differ.
     """
 
     def __init__(
         self, model: OnnxModel, config: DetectorConfig, context: DetectorContext, class_map: Mapping[str, str]
     ) -> None:
-        super().__init__(config, context)
         self._model = model
+        self._min_confidence = config.floor
+        self._table_view = context.camera.table_view
         self._class_map = class_map
 
     @classmethod
@@ -307,9 +307,12 @@ class RfdetrDetector(ThreadedDetector):
     def _read_options(config: DetectorConfig) -> RfdetrOptions:
         return RfdetrOptions.read(config)
 
-    def _search(self, image: NDArray[np.uint8], regions: Sequence[Region]) -> list[Detection]:
-        detect = partial(self._model.detect, min_confidence=self._config.floor)
-        return search_regions(image, regions, detect, self._class_map)
+    def detect(self, frame: Frame, view: str) -> list[Detection]:
+        """Search the regions of a view, and merge the detections."""
+        height, width = frame.image.shape[:2]
+        regions = list_regions(view, self._table_view, (width, height))
+        detect = partial(self._model.detect, min_confidence=self._min_confidence)
+        return search_regions(frame.image, regions, detect, self._class_map)
 
 
 class EmbeddedDetector(RfdetrDetector):

@@ -6,8 +6,8 @@ import contextlib
 import json
 import os
 import re
-import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,7 +17,7 @@ from stub_server import BODIES, MODEL, SPOILT, WORKFLOW, StubServer
 
 from executive.cell.config import DetectorConfig
 from executive.errors import DeadlinePassed, Unavailable
-from executive.perception.detectors.requests import DetectorContext
+from executive.perception.detectors.detector_registry import DetectorContext
 from executive.perception.detectors.roboflow.detector import RoboflowDetector
 
 SECRET = "SECRET1234567890"
@@ -28,8 +28,6 @@ NAMES = {"workspace": "acme", "workflow_id": "sorting", "workflow_input": "photo
 APIS = {"v1": V1, "v0": {**V1, "api": "v0"}, "workflow": {**V1, "api": "workflow", **NAMES}}
 """Options of a detector by its interface."""
 CAMERA = SimpleNamespace(table_view=(192, 100, 448, 356))
-CLOCK = SimpleNamespace(now=0.0)
-"""Clock of all detectors of this file."""
 
 
 def find_colours(image):
@@ -52,7 +50,7 @@ def show_spot(left=300, top=200, channel=0):
 
 def build(name, **options):
     config = DetectorConfig(kind="roboflow", **{"model_id": MODEL, "deadline": DEADLINE, **options})
-    return RoboflowDetector.from_config(config, DetectorContext(name, CAMERA, CLOCK, None, 0, None))
+    return RoboflowDetector.from_config(config, DetectorContext(name, CAMERA, None, 0, None))
 
 
 @pytest.fixture(scope="module")
@@ -88,16 +86,9 @@ def make(stub):
             detector.close()
 
 
-def search(detector, frame, view="table"):
-    request = detector.request(frame, view)
-    CLOCK.now += 60
-    assert request.ready
-    return request.result()
-
-
 def assert_unavailable(detector, *patterns):
     with pytest.raises(Unavailable) as caught:
-        search(detector, show_spot())
+        detector.detect(show_spot(), "table")
     text = str(caught.value)
     assert SECRET not in text
     for pattern in patterns:
@@ -109,11 +100,10 @@ def assert_unavailable(detector, *patterns):
 @pytest.mark.parametrize("api", APIS)
 def test_a_box_is_returned_in_the_frames_pixels_and_renamed(make, server, api, view):
     detector = make(**APIS[api])
-    answer = search(detector, show_spot(channel=2), view)
-    ((label, box),) = [(found.label, found.box) for found in answer.confident]
-    assert (label, answer.detector) == ("sphere", "server")
-    assert box == pytest.approx((300, 200, 330, 220), abs=1.0)
-    assert len(search(detector, show_spot(20, 20), view).confident) == (view == "full")
+    (found,) = detector.detect(show_spot(channel=2), view)
+    assert found.label == "sphere"
+    assert found.box == pytest.approx((300, 200, 330, 220), abs=1.0)
+    assert len(detector.detect(show_spot(20, 20), view)) == (view == "full")
     path, headers, body = server.asked[-1]
     assert headers["Authorization"] == f"Bearer {SECRET}"
     assert all(SECRET not in path and SECRET.encode() not in body for path, _, body in server.asked)
@@ -128,26 +118,26 @@ def test_a_box_is_returned_in_the_frames_pixels_and_renamed(make, server, api, v
 def test_tiles_and_whole_frames_take_the_stated_requests_within_one_deadline(make, server, api, requests):
     detector = make(**{**APIS[api], "full": "tiles", "deadline": 5.0})
     server.loaded.clear()
-    (found,) = search(detector, show_spot(180, 240), "full").confident
+    (found,) = detector.detect(show_spot(180, 240), "full")
     assert found.box == pytest.approx((180, 240, 210, 260), abs=1.0)
     # A server that has not loaded the model is asked to load it.
     assert len(server.asked) == 9 * requests + (api == "v1")
     server.asked.clear()
-    search(make(**APIS[api]), show_spot(), "full")
+    make(**APIS[api]).detect(show_spot(), "full")
     assert len(server.asked) == requests
     server.delay = 1.0
     start_time = time.monotonic()
     with pytest.raises(DeadlinePassed, match=r"^no answer within 5\.0 s from"):
-        search(detector, show_spot(), "full")
+        detector.detect(show_spot(), "full")
     assert 5.0 <= time.monotonic() - start_time < 6.0
 
 
 @pytest.mark.slow
 def test_what_is_below_the_floor_is_left_out_and_a_class_nobody_asked_for_is_not(make, server):
     server.faults = lambda look: "doubtful"
-    assert search(make(**V1), show_spot()).confident == ()
+    assert make(**V1).detect(show_spot(), "table") == []
     server.faults = lambda look: "strangers"
-    assert "cube" in [found.label for found in search(make(**V1), show_spot()).confident]
+    assert "cube" in [found.label for found in make(**V1).detect(show_spot(), "table")]
 
 
 FAULTS = {
@@ -190,14 +180,14 @@ def test_a_server_that_is_gone_and_comes_back(make, server):
         server.over.wait(5)
         server.start()
     server.faults = lambda look: ""
-    assert len(search(detector, show_spot()).confident) == 1
+    assert len(detector.detect(show_spot(), "table")) == 1
 
 
 @pytest.mark.slow
 def test_a_server_on_this_computer_is_asked_without_a_proxy(server, monkeypatch):
     monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
     with contextlib.closing(build("direct", url=server.url, **V1)) as detector:
-        assert len(search(detector, show_spot()).confident) == 1
+        assert len(detector.detect(show_spot(), "table")) == 1
 
 
 @pytest.mark.slow
@@ -222,24 +212,21 @@ def test_closing_does_not_wait_for_a_server_that_hangs(server):
     before = list_children()
     detector = build("closing", url=server.url, deadline=60.0)
     assert len(list_children()) == len(before) + 1
-    detector.request(show_spot(), "table")
-    start_time = time.monotonic()
-    detector.close()
+    with ThreadPoolExecutor(1) as thread:
+        request = thread.submit(detector.detect, show_spot(), "table")
+        start_time = time.monotonic()
+        detector.close()
+        assert isinstance(request.exception(), Unavailable)
     assert time.monotonic() - start_time < 2.0
-    assert not [thread for thread in threading.enumerate() if "closing" in thread.name]
     assert list_children() == before
 
 
-def test_a_server_that_never_answers_costs_its_deadline_and_shows_it_on_the_runs_clock(make, server):
+def test_a_server_that_never_answers_costs_its_deadline(make, server):
     detector = make(**V1)
-    assert len(search(detector, show_spot()).confident) == 1
+    assert len(detector.detect(show_spot(), "table")) == 1
     server.faults = lambda look: "hang"
-    CLOCK.now = 10.0
     start_time = time.monotonic()
-    request = detector.request(show_spot(), "table")
-    CLOCK.now = 10.05
-    assert not request.ready
+    with pytest.raises(DeadlinePassed, match=r"^no answer within 2\.0 s from http://127") as caught:
+        detector.detect(show_spot(), "table")
     assert DEADLINE - 0.05 < time.monotonic() - start_time < DEADLINE + 1.5
-    CLOCK.now = 10.0 + DEADLINE
-    with pytest.raises(DeadlinePassed, match=r"^no answer within 2\.0 s from http://127"):
-        request.result()
+    assert caught.value.timeout == DEADLINE

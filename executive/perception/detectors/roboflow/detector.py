@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import threading
 import time
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -17,10 +18,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from executive.cell.config import DetectorConfig
-from executive.cell.frame import Detection
+from executive.cell.frame import Detection, Frame
 from executive.errors import DeadlinePassed, InputError, Unavailable
-from executive.perception.detectors.detector_registry import DetectorOptions, OptionErrors
-from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
+from executive.perception.detectors.detector_registry import DetectorContext, DetectorOptions, OptionErrors
 from executive.perception.detectors.roboflow.inference_process import (
     KEY_VARIABLE,
     ApiKey,
@@ -29,7 +29,7 @@ from executive.perception.detectors.roboflow.inference_process import (
     read_answer,
     read_output,
 )
-from executive.perception.detectors.views import Region, remove_duplicates, search_regions
+from executive.perception.detectors.views import list_regions, remove_duplicates, search_regions
 
 HOSTED_URL = "https://serverless.roboflow.com"
 """Address of Roboflow's hosted server."""
@@ -233,17 +233,19 @@ def shorten_to_line(text: str) -> str:
     return line if len(line) <= MAX_DETAIL_LENGTH else f"{line[:MAX_DETAIL_LENGTH]}..."
 
 
-class RoboflowDetector(ThreadedDetector):
+class RoboflowDetector:
     """Detector that sends images to a Roboflow inference server, hosted or self-hosted.
 
     Args:
         config: Section of the detector in the cell file.
-        context: Parts of the cell and of the run that the detector uses.
+        context: Parts of the cell that the detector uses.
     """
 
     def __init__(self, config: DetectorConfig, context: DetectorContext) -> None:
         self._options = options = RoboflowOptions.read(config)
-        super().__init__(config, context, options.deadline)
+        self._min_confidence = config.floor
+        self._table_view = context.camera.table_view
+        self._lock = threading.Lock()  # The helper process answers one thread at a time.
         self._read_answer = read_output if options.api == "workflow" else read_answer
         server = options.model_dump(include={"url", "model_id", "api", *WORKFLOW_OPTIONS})
         # A proxy cannot reach a server on this computer.
@@ -271,21 +273,23 @@ class RoboflowDetector(ThreadedDetector):
             return None
         return tuple(options.class_map.get(name, name) for name in options.labels) or None
 
-    def _list_regions(self, view: str, size: tuple[int, ...]) -> list[Region]:
-        is_whole_image = view == "full" and self._options.full == "whole"
-        return [(0, 0, size[0], size[1])] if is_whole_image else super()._list_regions(view, size)
-
     def close(self) -> None:
-        """End the helper process and the thread; a running request fails."""
+        """End the helper process; a running request fails."""
         self._process.stop()
-        super().close()
-        self._process.close()
+        with self._lock:
+            self._process.close()
 
-    def _search(self, image: NDArray[np.uint8], regions: Sequence[Region]) -> list[Detection]:
-        self._process.wait_until_ready()
-        deadline = time.monotonic() + self._options.deadline
-        detect = partial(self._detect_in_crop, deadline=deadline)
-        return search_regions(image, regions, detect, self._options.class_map)
+    def detect(self, frame: Frame, view: str) -> list[Detection]:
+        """Send the regions of a view, or the whole image, to the server, and merge the detections."""
+        height, width = frame.image.shape[:2]
+        regions = list_regions(view, self._table_view, (width, height))
+        if view == "full" and self._options.full == "whole":
+            regions = [(0, 0, width, height)]
+        with self._lock:
+            self._process.wait_until_ready()
+            deadline = time.monotonic() + self._options.deadline
+            detect = partial(self._detect_in_crop, deadline=deadline)
+            return search_regions(frame.image, regions, detect, self._options.class_map)
 
     def _detect_in_crop(self, crop: NDArray[np.uint8], deadline: float) -> list[Detection]:
         """Return the detections of the server in a crop of a frame, with boxes in pixels of the crop."""
@@ -293,7 +297,7 @@ class RoboflowDetector(ThreadedDetector):
             message = self._process.request(crop, deadline)
         except NoAnswer as error:
             text = describe_missed_deadline(error.retry_causes, self._options)
-            raise DeadlinePassed(text) from None
+            raise DeadlinePassed(text, self._options.deadline) from None
         if "failure" in message:
             raise Unavailable(describe_failure(message, self._options))
         try:
@@ -301,5 +305,5 @@ class RoboflowDetector(ThreadedDetector):
         except (ValueError, RecursionError) as error:
             text = describe_invalid_answer(str(error), self._options)
             raise Unavailable(text) from None
-        detections = [detection for detection in detections if detection.confidence >= self._config.floor]
+        detections = [detection for detection in detections if detection.confidence >= self._min_confidence]
         return remove_duplicates(sorted(detections, key=lambda detection: -detection.confidence))

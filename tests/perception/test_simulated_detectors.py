@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from executive.cell.config import DetectorConfig
-from executive.cell.frame import Answer, Detection
-from executive.perception.detectors.noisy import NoisyDetector
-from executive.perception.detectors.requests import DetectorContext
+from executive.cell.frame import Detection
+from executive.perception.detectors.detector_registry import DetectorContext
+from executive.perception.detectors.simulated import NoisyDetector
 
 CLASSES = ("cube", "sphere", "duck")
 LOOKS = 1000
@@ -21,9 +21,7 @@ THINGS = tuple(
     for label, x in zip(CLASSES, (210, 300, 400), strict=True)
 )
 VIEWS = {"table": TABLE, "full": (0, 0, 640, 480)}
-KNOWN = SimpleNamespace(
-    request=lambda frame, view: SimpleNamespace(ready=True, result=lambda: Answer("known", THINGS, None))
-)
+KNOWN = SimpleNamespace(detect=lambda frame, view: THINGS)
 """A detector that always sees the same three things."""
 
 
@@ -33,23 +31,22 @@ def answers(seed=1, view="table", **errors):
     context = DetectorContext(
         "noisy",
         SimpleNamespace(get_view_box=lambda view: VIEWS[view]),
-        None,
         Path(),
         seed,
         lambda name: KNOWN,
     )
     detector = NoisyDetector.from_config(config, context)
     frames = [SimpleNamespace(id=number, image=np.zeros((480, 640, 3))) for number in range(LOOKS)]
-    return [detector.request(frame, view).result() for frame in frames]
+    return [detector.detect(frame, view) for frame in frames]
 
 
 def test_it_overlooks_as_many_as_it_says():
-    share = 1 - np.mean([len(answer.confident) for answer in answers(miss_rate=0.2)]) / len(THINGS)
+    share = 1 - np.mean([len(answer) for answer in answers(miss_rate=0.2)]) / len(THINGS)
     assert share == pytest.approx(0.2, abs=0.02)
 
 
 def test_it_confuses_as_many_as_it_says_and_is_then_not_confident():
-    found = [one for answer in answers(confusion_rate=0.1) for one in answer.confident]
+    found = [one for answer in answers(confusion_rate=0.1) for one in answer]
     wrong = [one for one in found if one.confidence != 0.9]
     assert len(wrong) / len(found) == pytest.approx(0.1, abs=0.015)
     assert max(one.confidence for one in wrong) <= 0.75
@@ -58,7 +55,7 @@ def test_it_confuses_as_many_as_it_says_and_is_then_not_confident():
 
 def test_its_boxes_are_off_by_as_much_as_it_says_and_keep_their_size():
     moved = {thing.label: thing.centre for thing in THINGS}
-    found = [one for answer in answers(jitter=5.0) for one in answer.confident]
+    found = [one for answer in answers(jitter=5.0) for one in answer]
     shifts = [np.subtract(one.centre, moved[one.label]) for one in found]
     assert np.std(shifts, axis=0) == pytest.approx([5.0, 5.0], rel=0.05)
     assert np.mean(shifts, axis=0) == pytest.approx([0.0, 0.0], abs=0.3)
@@ -67,7 +64,7 @@ def test_its_boxes_are_off_by_as_much_as_it_says_and_keep_their_size():
 
 @pytest.mark.parametrize(("view", "part"), VIEWS.items())
 def test_what_it_invents_lies_in_the_searched_part(view, part):
-    found = [one for answer in answers(false_detections=0.5, view=view) for one in answer.confident]
+    found = [one for answer in answers(false_detections=0.5, view=view) for one in answer]
     invented = [one for one in found if one.confidence != 0.9]
     assert len(invented) / LOOKS == pytest.approx(0.5, abs=0.06)
     centres = np.array([one.centre for one in invented])

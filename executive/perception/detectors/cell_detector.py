@@ -1,0 +1,226 @@
+"""Detectors as skills see them: searches beside the control loop, with error rates and screened answers.
+
+A kind of detector only searches a frame. This file adds all that every detector of a cell has in common.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from executive.cell.config import CellConfig
+from executive.cell.frame import Answer, Detection, ErrorRates, Frame
+from executive.cell.objects import ObjectClass
+from executive.cell.protocols import Clock
+from executive.errors import Crowded, DeadlinePassed, Unavailable
+from executive.perception.detectors.detector_registry import (
+    DetectorKind,
+    KindMaker,
+    build_kinds,
+    close_kind,
+    make_installed_kind,
+)
+from executive.perception.detectors.envelope import find_envelopes, rate_frame
+from executive.processes import wait_until_done
+
+CLOCK_ROUNDING_ERROR = 1e-9
+"""Maximum rounding error of a time on the clock [s]."""
+MIN_VISIBLE_FRACTION = 0.7
+"""Minimum unoccluded fraction of a box; boxes that the arm occludes more are ignored."""
+MAX_BOXES = 60
+"""Maximum number of boxes in one answer, including doubtful boxes and unknown labels. Shipped cells have at
+most 20 objects, and the time for the assignment of boxes to items grows more than linearly."""
+MIN_BOX_SIDE = 2.0
+"""Minimum longer side of a box [pixel]; a box in fractions of the image is smaller."""
+MAX_BOX_SIDE = 1e5
+"""Maximum longer side of a box [pixel]; all images are smaller, and squares of it do not overflow."""
+MAX_LABEL_LENGTH = 100
+"""Maximum number of characters of a label, which appears in messages and on the terminal."""
+MAX_SECOND_CLASS_RATIO = 0.5
+"""Maximum confidence of the second class of a confident detection, as a fraction of the first confidence."""
+
+
+def build_cell_detectors(
+    config: CellConfig,
+    *,
+    clock: Clock,
+    cell_folder: Path,
+    seed: int,
+    classes: Mapping[str, ObjectClass],
+    folders: Sequence[Path] = (),
+    make_kind: KindMaker = make_installed_kind,
+) -> dict[str, CellDetector]:
+    """Return the detectors of a cell by name, in the order of the cell file; the first is the default.
+
+    Args:
+        config: The cell file.
+        clock: Clock of the run, which determines when answers become available.
+        cell_folder: Folder of the cell file, to which paths in the file are relative.
+        seed: Random seed of the detectors.
+        classes: Classes of the cell by label.
+        folders: Folders with measurement files `CELL.measured.json`.
+        make_kind: Makes the kind of each detector; fake cells and tests substitute `TruthDetector`.
+
+    Raises:
+        InputError: A detector cannot be built.
+    """
+    camera = next(iter(config.cameras.values()))
+    kinds = build_kinds(
+        config.detectors, camera=camera, cell_folder=cell_folder, seed=seed, make_kind=make_kind
+    )
+    has_real_kind = not all(getattr(kind, "is_fake", False) for kind in kinds.values())
+    envelopes = find_envelopes(config, cell_folder, folders) if has_real_kind else {}
+    label_map = {label: object_class.detected_label for label, object_class in classes.items()}
+    detectors = {}
+    for name, kind in kinds.items():
+        section = config.detectors[name]
+        envelope = envelopes.get(name, (section.error_rates, None))
+        rate = partial(rate_frame, detector=name, envelope=envelope, config=config)
+        detectors[name] = CellDetector(name, kind, section.latency, clock, rate, label_map)
+    return detectors
+
+
+@dataclass(eq=False)
+class CellDetector:
+    """A detector of a cell; implements `executive.cell.protocols.Detector`.
+
+    Attributes:
+        name: Name of the detector in the cell file.
+        kind: Finds the detections in a frame.
+        latency: Minimum time from a request to its answer, on the clock of the run [s].
+        clock: Clock of the run.
+        rate: Returns the error rates of the detector for a frame.
+        label_map: For each class of the cell, the class that detectors report for it.
+    """
+
+    name: str
+    kind: DetectorKind
+    latency: float
+    clock: Clock
+    rate: Callable[[Frame], ErrorRates]
+    label_map: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        is_instant = getattr(self.kind, "is_instant", False)
+        self._thread = None if is_instant else ThreadPoolExecutor(1, f"detector-{self.name}")
+
+    def request(self, frame: Frame, view: str) -> PendingAnswer:
+        """Start the search of a view of a frame, in the thread of the detector."""
+        search = partial(self._search, frame, view)
+        future = _call_at_once(search) if self._thread is None else self._thread.submit(search)
+        now = self.clock.now
+        return PendingAnswer(future, self.clock, now, now + self.latency)
+
+    def close(self) -> None:
+        """End the running search, cancel all searches that have not started, and release all resources."""
+        if self._thread is not None:
+            self._thread.shutdown(wait=False, cancel_futures=True)
+        close_kind(self.kind)
+        if self._thread is not None:
+            self._thread.shutdown()
+
+    def _search(self, frame: Frame, view: str) -> Answer:
+        """Return the screened answer for a frame.
+
+        Boxes that the arm occludes, and doubtful boxes with unknown labels are omitted. The label of a class
+        that looks like another class is replaced by the label of the other class.
+        """
+        try:
+            detections = tuple(self.kind.detect(frame, view))
+        except Unavailable as error:
+            error.args = (f"detector {self.name}: {error}",)
+            raise
+        self._check_boxes(detections, frame, view)
+        error_rates = self.rate(frame)
+        confident: list[Detection] = []
+        doubtful: list[Detection] = []
+        unknown: list[Detection] = []
+        for detection in detections:
+            if frame.compute_visible_fraction(detection.box) < MIN_VISIBLE_FRACTION:
+                continue
+            label = self.label_map.get(detection.label)
+            max_second_confidence = MAX_SECOND_CLASS_RATIO * detection.confidence
+            is_above_threshold = detection.confidence >= error_rates.threshold
+            is_confident = is_above_threshold and detection.second_confidence <= max_second_confidence
+            if label:
+                (confident if is_confident else doubtful).append(replace(detection, label=label))
+            elif is_confident:
+                unknown.append(detection)
+        return Answer(self.name, tuple(confident), error_rates, tuple(doubtful), tuple(unknown))
+
+    def _check_boxes(self, detections: Sequence[Detection], frame: Frame, view: str) -> None:
+        """Raise Crowded if there are too many boxes, and Unavailable if a detection is invalid."""
+        if len(detections) > MAX_BOXES:
+            problem = f"found {len(detections)} boxes in the view {view}, which cannot all be objects"
+            advice = "raise `floor` of the detector in the cell file, or use another detector"
+            raise Crowded(f"detector {self.name} {problem}; at most {MAX_BOXES} are allowed: {advice}")
+        if invalid := next((found for found in detections if not _is_valid(found, frame)), None):
+            box = f"{invalid.label[:MAX_LABEL_LENGTH]!r} {invalid.confidence:g} at {invalid.box}"
+            image = f"an image of {frame.visible.shape[1]} x {frame.visible.shape[0]} pixels"
+            raise Unavailable(f"detector {self.name} returned an invalid box: {box} in {image}")
+
+
+@dataclass(frozen=True, eq=False)
+class PendingAnswer:
+    """Running or finished search; implements `executive.cell.protocols.Request`.
+
+    Attributes:
+        future: Screened answer of the search, or its error.
+        clock: Clock of the run.
+        request_time: Time of the request [s].
+        due_time: Time from which the answer is available [s].
+    """
+
+    future: Future[Answer]
+    clock: Clock
+    request_time: float
+    due_time: float
+
+    @property
+    def ready(self) -> bool:
+        """True from `due_time` on; the error of a missed deadline is available when the deadline has passed.
+
+        On a simulated clock, this property waits at `due_time` for the search. The time at which an answer
+        becomes available therefore does not depend on the speed of the computer.
+        """
+        if self.clock.now < self.due_time - CLOCK_ROUNDING_ERROR:
+            return False
+        if getattr(self.clock, "is_simulated", True):
+            wait_until_done(self.future)
+        elif not self.future.done():
+            return False
+        error = self.future.exception()
+        if not isinstance(error, DeadlinePassed):
+            return True
+        return self.clock.now >= self.request_time + error.timeout - CLOCK_ROUNDING_ERROR
+
+    def result(self) -> Answer:
+        """Return the answer of the detector."""
+        if not self.ready:
+            problem = f"the answer is due at {self.due_time:.3f} s, and the time is {self.clock.now:.3f} s"
+            raise RuntimeError(f"{problem}; wait until `ready` is true")
+        return self.future.result()
+
+
+def _call_at_once(search: Callable[[], Answer]) -> Future[Answer]:
+    future: Future[Answer] = Future()
+    try:
+        future.set_result(search())
+    except Exception as error:
+        future.set_exception(error)
+    return future
+
+
+def _is_valid(detection: Detection, frame: Frame) -> bool:
+    """Return True if a detection has a valid confidence, a printable label, and a valid box in the image."""
+    left, top, right, bottom = detection.box
+    height, width = frame.visible.shape
+    # These comparisons also reject NaN.
+    sides = (right - left, bottom - top)
+    is_box = min(sides) >= 0 and MIN_BOX_SIDE <= max(sides) <= MAX_BOX_SIDE
+    is_in_image = right >= 0 and bottom >= 0 and left <= width and top <= height
+    is_printable = detection.label.isprintable() and len(detection.label) <= MAX_LABEL_LENGTH
+    return is_box and is_in_image and 0 <= detection.confidence <= 1 and is_printable
