@@ -90,7 +90,6 @@ def evaluate(
     average_precision = AveragePrecision()
     statistics_of_frames: list[Mapping[str, float]] = []
     latencies: list[float] = []
-    answer_count = 0
     unavailable_count = 0
     unavailable_reason = ""
     min_confidence = detector.threshold if threshold is None else threshold
@@ -102,7 +101,6 @@ def evaluate(
             unavailable_count += 1
             unavailable_reason = str(error) or repr(error)
             continue
-        answer_count += 1
         latencies.append(latency)
         average_precision.add([entry for entry in detections if not is_ignored(entry, sample)], sample)
         matches = _match_confident(detections, sample, min_confidence)
@@ -120,7 +118,7 @@ def evaluate(
     metrics_by_class = {label: errors.compute_metrics([label]) for label in errors.labels}
     return Evaluation(
         threshold=min_confidence,
-        images=unavailable_count + answer_count,
+        images=unavailable_count + len(latencies),
         **vars(errors.compute_metrics(errors.labels)),
         map50=map50,
         map50_95=map50_95,
@@ -133,7 +131,7 @@ def evaluate(
         confusion=errors.make_confusion_matrix(),
         unavailable=unavailable_count,
         why=unavailable_reason,
-        answered_by={detector.name: answer_count} if answer_count else {},
+        answered_by={detector.name: len(latencies)} if latencies else {},
         by_count={count: dict(counts) for count, counts in errors.counts_by_object_count.items()},
         reliability=errors.estimate_error_rates(),
         frames=FrameRange.compute(statistics_of_frames),

@@ -44,15 +44,9 @@ MAX_SECOND_CLASS_RATIO = 0.5
 
 
 def build_cell_detectors(
-    config: CellConfig,
-    *,
-    clock: Clock,
-    cell_folder: Path,
-    seed: int,
-    classes: Mapping[str, ObjectClass],
-    folders: Sequence[Path] = (),
-    make_kind: KindMaker = make_installed_kind,
-) -> dict[str, CellDetector]:
+    config: CellConfig, *, clock: Clock, cell_folder: Path, seed: int, classes: Mapping[str, ObjectClass],
+    folders: Sequence[Path] = (), make_kind: KindMaker = make_installed_kind,
+) -> dict[str, CellDetector]:  # fmt: skip
     """Return the detectors of a cell by name, in the order of the cell file; the first is the default.
 
     Args:

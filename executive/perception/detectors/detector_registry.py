@@ -124,23 +124,19 @@ def find_detector_kinds() -> dict[str, PluginEntry]:
     return list_entries(DETECTOR_GROUP, "kind of detector")
 
 
-def load_kind(name: str, kind: str, kinds: Mapping[str, PluginEntry]) -> Any:
+def load_kind(name: str, config: DetectorConfig, kinds: Mapping[str, PluginEntry]) -> Any:
     """Return the class of the kind of the detector `name`; `kinds` are the installed kinds.
 
     Raises:
         InputError: The kind is not installed, cannot be loaded, or has no method `detect`.
     """
-    if kind not in kinds:
-        installed_kinds = ", ".join(sorted(kinds)) or "none"
-        raise InputError(
-            f'detector "{name}" is of kind "{kind}", which is not installed; installed: {installed_kinds}'
-        )
-    kind_class = kinds[kind].load()
+    start = f'detector "{name}" is of kind "{config.kind}", which'
+    if config.kind not in kinds:
+        raise InputError(f"{start} is not installed; installed: {', '.join(sorted(kinds)) or 'none'}")
+    kind_class = kinds[config.kind].load()
     if not hasattr(kind_class, "detect"):
-        raise InputError(
-            f'detector "{name}" is of kind "{kind}" ({kinds[kind].value}), which has no method `detect`; '
-            "replace `request` by `detect(frame, view)`, which waits and returns a list of detections"
-        )
+        advice = "replace `request` by `detect(frame, view)`, which waits and returns a list of detections"
+        raise InputError(f"{start} has no method `detect` ({kinds[config.kind].value}); {advice}")
     return kind_class
 
 
@@ -150,19 +146,14 @@ def make_installed_kind(config: DetectorConfig, context: DetectorContext) -> Det
     Raises:
         InputError: The kind is not installed, or an option is invalid.
     """
-    kind_class = load_kind(context.name, config.kind, find_detector_kinds())
-    kind: DetectorKind = kind_class.from_config(config, context)
+    kind: DetectorKind = load_kind(context.name, config, find_detector_kinds()).from_config(config, context)
     return kind
 
 
 def build_kinds(
-    configs: Mapping[str, DetectorConfig],
-    *,
-    camera: CameraConfig,
-    cell_folder: Path,
-    seed: int,
+    configs: Mapping[str, DetectorConfig], *, camera: CameraConfig, cell_folder: Path, seed: int,
     make_kind: KindMaker = make_installed_kind,
-) -> dict[str, DetectorKind]:
+) -> dict[str, DetectorKind]:  # fmt: skip
     """Return what searches the frames for each detector of a cell file, in the order of the file.
 
     Args:
@@ -212,7 +203,7 @@ def find_detector_errors(configs: Mapping[str, DetectorConfig], base: Path) -> I
     kinds = find_detector_kinds()
     for name, config in configs.items():
         try:
-            kind = load_kind(name, config.kind, kinds)
+            kind = load_kind(name, config, kinds)
         except InputError as error:
             yield ("detectors", name, "kind"), str(error)
             continue

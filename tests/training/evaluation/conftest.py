@@ -7,19 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from executive.cell.frame import Answer, Detection, ErrorRates
+from executive.cell.frame import Detection
 from executive.errors import Unavailable
 from executive.training.dataset import LabelledImage
 
 CUBE, DUCK, HALF_HIDDEN = (10.0, 10.0, 40.0, 40.0), (100.0, 100.0, 140.0, 130.0), (200.0, 20.0, 230.0, 50.0)
 
 
-ERROR_RATES = ErrorRates(threshold=0.5, miss_rate=0.1, confusion_rate=0.1, false_detections=0.1, jitter=1.0)
-
-
 class Scripted:
     """Gives one answer after the other, the last one for ever; one that is text is why it is unavailable."""
 
+    name = "scripted"
     threshold = 0.5
 
     def __init__(self, *answers):
@@ -31,8 +29,8 @@ class Scripted:
         answer = self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
         if isinstance(answer, str):
             raise Unavailable(answer)
-        found = tuple(Detection(label, confidence, box) for label, confidence, box in answer)
-        return Answer("scripted", found, ERROR_RATES), 10.0 * len(self.frames)
+        found = [Detection(label, confidence, box) for label, confidence, box in answer]
+        return found, 10.0 * len(self.frames)
 
 
 @pytest.fixture
