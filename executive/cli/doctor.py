@@ -86,12 +86,14 @@ def check_packages() -> Iterator[CheckResult]:
 def check_plugins() -> Iterator[CheckResult]:
     """Load all installed skills, kinds of cells and kinds of detectors."""
     from executive.behaviours import load_skills
+    from executive.cell.tools import load_tool_models
     from executive.cell.workcell import CELL_KIND_GROUP
     from executive.perception.detectors.detector_registry import find_detector_kinds
     from executive.plugins import list_entries
 
     for entry in (*list_entries(CELL_KIND_GROUP, "kind of cell").values(), *find_detector_kinds().values()):
         entry.load()
+    load_tool_models()
     yield CheckResult("ok", "plugins", f"{len(load_skills())} skills")
 
 

@@ -18,6 +18,7 @@ from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.frame import Box, Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
 from executive.cell.protocols import Clock, Ledger, Routes
+from executive.cell.tools import ToolModel
 from executive.cell.workcell import CellOptions, TrueObject
 from executive.drivers.world_log import LogFile
 from executive.errors import InputError, Unavailable
@@ -40,10 +41,10 @@ SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yello
 """Permitted bins of each class of the shipped cells."""
 DEFAULT_CONFIDENCE = 0.9
 """Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""
-MAX_SEAL_OFFSET = 0.012
-"""Maximum horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
+MAX_GRIP_OFFSET = 0.012
+"""Maximum horizontal distance between the tool and the contact points of an object for a grip [m]."""
 TOUCH_DISTANCE = 0.002
-"""Maximum vertical distance between the cup and the top of an object for contact [m]."""
+"""Maximum vertical distance between the tool and the top of an object for contact [m]."""
 
 
 @dataclass(eq=False)
@@ -112,13 +113,13 @@ class FakeWorld:
         return next((bin for margin, bin in places if bin.contains(fake_object.position, margin)), None)
 
     def find_touched_object(self, tip_position: Array) -> TrueObject | None:
-        """Return the object that a cup at `tip_position` `(3,)` [m] touches from above, or None."""
+        """Return the object that a tool at `tip_position` `(3,)` [m] touches from above, or None."""
         for fake_object in self.objects:
             object_class = self.classes[fake_object.label]
             distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))
-            seal_offset = abs(distance - object_class.contact_radius)
+            offset = abs(distance - object_class.contact_radius)
             gap = abs(float(fake_object.position[2]) + object_class.height / 2 - tip_position[2])
-            is_touched = seal_offset <= MAX_SEAL_OFFSET and gap <= TOUCH_DISTANCE
+            is_touched = offset <= MAX_GRIP_OFFSET and gap <= TOUCH_DISTANCE
             if is_touched and fake_object is not self.held_object:
                 return fake_object
         return None
@@ -126,19 +127,19 @@ class FakeWorld:
 
 @dataclass(eq=False)
 class FakeTool:
-    """A suction cup that seals on every touched object, unless `can_seal` returns False.
+    """A tool that grips every touched object that its model can hold, unless `can_hold` returns False.
 
     Attributes:
-        can_seal: Function that returns True if the cup can seal on the touched object; set by tests.
-        breakaway_force: Force that every seal withstands [N].
+        can_hold: Function that returns True if the tool can hold the touched object; set by tests.
+        force: Force with which the tool holds every object [N].
         load_error: Error of `load` [N]; set by tests.
     """
 
     world: FakeWorld
     get_tip_position: Callable[[], Array]
-    load_std: float
-    can_seal: Callable[[], bool] = field(default=lambda: True)
-    breakaway_force: float = 7.9
+    model: ToolModel
+    can_hold: Callable[[], bool] = field(default=lambda: True)
+    force: float = 7.9
     load_error: float = 0.0
     _noise: float = 1e-9  # It alternates, so that the load cell does not seem broken.
 
@@ -153,7 +154,11 @@ class FakeTool:
 
     @property
     def holding_force(self) -> float:
-        return self.breakaway_force if self.holding else 0.0
+        return self.force if self.holding else 0.0
+
+    @property
+    def load_std(self) -> float:
+        return self.model.load_std
 
     @property
     def load(self) -> float:
@@ -165,7 +170,9 @@ class FakeTool:
     def close(self) -> None:
         self.world.is_commanded = True
         touched = self.world.find_touched_object(self.get_tip_position())
-        if touched is not None and self.can_seal():
+        if touched is None or self.model.explain_unsuitable(self.world.classes[touched.label]):
+            return
+        if self.can_hold():
             touched.is_dropped = False
             self.world.held_object = touched
 
@@ -173,7 +180,7 @@ class FakeTool:
         self.world.is_commanded = True
         self.world.release()
 
-    def break_seal(self) -> None:
+    def lose_grip(self) -> None:
         """Drop the held object; it rolls off other objects and bin walls."""
         self.world.release(is_dropped=True)
 
@@ -296,6 +303,7 @@ class FakeArm(PlanningArm[StraightMotion]):
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
         self._world = world
+        self._tool_model = config.tool
         self._path: list[Array] = []
         self._half_length = 0
 
@@ -336,8 +344,9 @@ class FakeArm(PlanningArm[StraightMotion]):
             return
         self.q = self._path.pop(0)
         if (held := self._world.held_object) is not None:
-            height = self._world.classes[held.label].height
-            held.position[:] = self.tool_pose.position - np.array([0.0, 0.0, height / 2])
+            object_class = self._world.classes[held.label]
+            depth = self._tool_model.get_hold_height(object_class) - object_class.height / 2
+            held.position[:] = self.tool_pose.position - np.array([0.0, 0.0, depth])
         if self.next_obstacle is not None and len(self._path) <= self._half_length:
             self.contact_point = self.tool_pose.position.tolist()
             self.stop_after_collision(self.next_obstacle)
@@ -347,7 +356,8 @@ class FakeArm(PlanningArm[StraightMotion]):
 class FakeCell(CellWithoutHardware):
     """The cell of a cell file without physics; by default the shipped cell `overhead` without objects.
 
-    The arm moves on straight joint paths, the tool always seals, and every detector finds all objects.
+    The arm moves on straight joint paths, the tool holds every object that its kind can hold, and every
+    detector finds all objects.
 
     Attributes:
         world: Objects and bins.
@@ -381,7 +391,7 @@ class FakeCell(CellWithoutHardware):
         self.world = FakeWorld(self.cell.classes, self.cell.bins.values())
         put_random_objects(self.world, config, seed)
         self.arm = FakeArm(self.world, config, clock, emit)
-        self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position, config.tool.load_std)
+        self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position, config.tool)
         self.camera = FakeCamera(config, self.arm, clock, self.ledger)
         self.detectors = {
             name: FakeDetector(name, detector, self.world, clock, self.camera.get_view_box)

@@ -74,7 +74,7 @@ class LogFile:
             os.close(file)
 
 
-FILE_HEADER = b"executive world 3\n"
+FILE_HEADER = b"executive world 4\n"
 """First line of every log of commands, with the version of the format."""
 
 RUN_STEP = "step"
@@ -86,9 +86,9 @@ JOINT_TARGETS = "joints"
 MOTION = "motion"
 """Kind of the start of a motion; the arguments are its duration [s] and its samples as base64."""
 MOTION_END = "rest"
-VACUUM_ON = "vacuum on"
-VACUUM_OFF = "vacuum off"
-SEAL_BREAK = "seal break"
+CLOSE = "close"
+OPEN = "open"
+GRIP_LOST = "grip lost"
 SET_POSE = "pose"
 """Kind of a new pose of an object; the arguments are its body, its position [m] and its quaternion."""
 REMOVE = "remove"

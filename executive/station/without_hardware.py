@@ -133,7 +133,15 @@ class CellWithoutHardware:
         classes = {label: section.build_class(label) for label, section in config.objects.items()}
         ignored = set(config.unknown.ignore).difference(classes)
         self.accounts = Tracker(
-            config.ledger, config.table, bins, classes, self.routes, options.quotas, emit, ignored
+            config.ledger,
+            config.table,
+            bins,
+            classes,
+            self.routes,
+            options.quotas,
+            emit,
+            ignored,
+            config.tool.find_distinct_labels(classes),
         )
         no_device: Any = None
 
@@ -150,9 +158,8 @@ class CellWithoutHardware:
             routes=self.routes,
             localizer=no_device,
             safe_place=np.array(config.safe_place),
-            descent=config.motion.descent,
-            slow_descent=config.motion.slow_descent,
-            descent_speed=config.motion.descent_speed,
+            tool_model=config.tool,
+            motion=config.motion,
             report_selection=lambda target, bin: emit(
                 TargetSelected(target.item, target.label, target.frame, bin)
             ),

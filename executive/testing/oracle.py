@@ -113,9 +113,9 @@ class WorldAccess:
             self.world.place_object(true_object.body, Pose(X_WO.rotation, position))
 
     def release(self, true_object: TrueObject) -> None:
-        """Break the seal on an object if the tool holds it."""
+        """Let an object fall if the tool holds it."""
         if self.held_object is not None and self.held_object.body == true_object.body:
-            self.cell.tool.break_seal()
+            self.cell.tool.lose_grip()
 
 
 @dataclass(frozen=True, eq=False)

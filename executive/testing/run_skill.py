@@ -20,7 +20,7 @@ from executive.tree.tree_node import SkillRun
 
 _INTERCEPTED_ROLES = ("arm", "tool", "camera", "detector", "ledger", "operator")
 _LOGGED_CALLS = COMMANDS | {
-    "camera.capture", "camera.next_pose", "operator.ask", "ledger.observe", "ledger.record_touch",
+    "camera.capture", "camera.next_pose", "operator.ask", "ledger.observe", "ledger.record_measurement",
     "ledger.record_failed_pick", "ledger.record_grasp", "ledger.record_drop", "ledger.record_placement",
     "ledger.record_put_down", "ledger.reject", "ledger.defer", "ledger.invalidate_positions",
 }  # fmt: skip

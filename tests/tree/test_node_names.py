@@ -16,10 +16,7 @@ PERMITTED = {
     ("skill.py", '"any"'),  # any state of the tool
     ("record/diagnosis.py", '"repeat"'),  # label before the command that repeats a run
     # The table of former and foreign words states what to write instead.
-    *(
-        ("text/findings.py", f'"{word}"')
-        for word in ("all", "any", "fallback", "for_each", "repeat", "try")
-    ),
+    *(("text/findings.py", f'"{word}"') for word in ("all", "any", "fallback", "for_each", "repeat", "try")),
 }
 """The words that belong to the grammar, and words that mean something else."""
 

@@ -228,7 +228,7 @@ def find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, st
 
 
 MAX_LOAD_OFFSET = 0.015
-"""Maximum distance of the centre of a held object from the axis of the suction cup [m]."""
+"""Maximum distance of the centre of a held object from the axis of the tool [m]."""
 TOOL_SPHERE_RADIUS = 0.02
 """Radius of the spheres that enclose the tool, including tube and fittings [m]."""
 SPHERES_PER_SEGMENT = 9
@@ -284,7 +284,7 @@ class SimCamera(MountedCamera):
         # T is the frame of the tool, F the frame of the flange.
         self._X_TF = Pose.of([0.0, 0.0, -config.tool.length])
         self._load_radius = max(model.radius for model in config.objects.values()) + MAX_LOAD_OFFSET
-        self._load_height = config.max_object_height
+        self._load_height = config.max_hold_height
         heights = (0.0, config.max_pile_height)
         self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
         region = (0, 0, *self._size)

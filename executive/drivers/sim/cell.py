@@ -16,7 +16,7 @@ from executive.drivers.sim.collision import ClearanceChecker
 from executive.drivers.sim.models import build_simulated_class
 from executive.drivers.sim.rebuild import WorldRebuilder
 from executive.drivers.sim.scene import build_initial_world, derive_seeds, load_scene
-from executive.drivers.sim.tool import SuctionTool
+from executive.drivers.sim.tool import SimTool
 from executive.drivers.sim.world import SimVisuals, World
 from executive.drivers.world_log import CommandLog, read_commands
 from executive.errors import InputError
@@ -69,7 +69,7 @@ class SimCell(CellWithoutHardware):
         world = self._world = build_initial_world(config, seed, gui=options.gui, scene=scene)
         self._clearance_checker = ClearanceChecker(config)
         planner = Planner(config, self._clearance_checker.check)
-        self._tool = SuctionTool(world, config.tool, load_seed)
+        self._tool: SimTool = config.tool.build_sim(world, load_seed)
         rebuilder = None if options.resume is None else self._rebuild_world(options.resume.log_path)
         self._arm = SimArm(world, planner, config, clock, lambda: self._tool.held_body, emit, rebuilder)
         self._camera = build_camera(
@@ -126,7 +126,7 @@ class SimCell(CellWithoutHardware):
         return rebuilder
 
 
-def list_final_objects(world: World, tool: SuctionTool, bins: Mapping[str, Bin]) -> Iterator[TrueObject]:
+def list_final_objects(world: World, tool: SimTool, bins: Mapping[str, Bin]) -> Iterator[TrueObject]:
     """Yield the objects of a simulated world, including removed objects, at the end of a run."""
     for body, positions in world.rest_positions.items():
         final_object = world.removed_objects.get(body) or world.describe_object(body)

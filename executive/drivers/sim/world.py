@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from string import Template
-from typing import Any
 
 import cv2
 import numpy as np
@@ -19,7 +18,7 @@ import pybullet
 from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.cell.config import NECK_LENGTH, TOOL_RADIUS, BinConfig, CellConfig, ObjectConfig
+from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.device_config import Colour
 from executive.cell.objects import BIN_THICKNESS
 from executive.cell.protocols import STEP
@@ -97,6 +96,33 @@ CYLINDER_MARGIN = 0.001
 """Collision margin that Bullet adds on all sides to a cylinder of a URDF [m]."""
 TOOL_MASS = 0.1
 """Mass of the tool [kg]."""
+TOOL_URDF = Template("""
+  <link name="tool">
+    <inertial>
+      <origin xyz="0 0 $centre"/>
+      <mass value="$mass"/>
+      <inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-5"/>
+    </inertial>$parts
+  </link>
+  <joint name="tool_joint" type="fixed">
+    <parent link="$flange_link"/>
+    <child link="tool"/>
+    <origin xyz="0 0 $flange_offset"/>
+  </joint>
+</robot>
+""")
+"""End of the URDF of an arm, with the tool."""
+TOOL_PART_URDF = Template("""
+    <visual>
+      <origin xyz="0 0 $centre"/>
+      <geometry><cylinder length="$length" radius="$radius"/></geometry>
+      <material name="Grey"/>
+    </visual>
+    <collision>
+      <origin xyz="0 0 $centre"/>
+      <geometry><cylinder length="$collision_length" radius="$collision_radius"/></geometry>
+    </collision>""")
+"""Cylinder of a tool in `TOOL_URDF`."""
 MAX_RAY_LENGTH = 5.0
 """Maximum length of a ray [m]."""
 RAY_RESTART_DISTANCE = 1e-4
@@ -258,7 +284,7 @@ class World:
         return Pose.of(*state[4:6]) @ Pose.of([0, 0, self.robot.flange_offset])
 
     def get_tool_pose(self) -> Pose:
-        """Return `X_WT`, the pose of the tool centre point: the centre of the lip of the cup."""
+        """Return `X_WT`, the pose of the tool centre point."""
         return self.get_flange_pose() @ Pose.of([0, 0, self.config.tool.length])
 
     def cast_ray(self, origin: Array, direction: Array) -> Array | None:
@@ -292,18 +318,24 @@ class World:
         path = find_model(self.config.arm.urdf)
         text = path.read_text().replace('filename="meshes/', f'filename="{path.parent}/meshes/')
         tool = self.config.tool
-        values: dict[str, Any] = {"centre": tool.length / 2, "mass": TOOL_MASS}
-        shaft_length = tool.length - NECK_LENGTH
-        for part, length, radius, centre in (
-            ("shaft", shaft_length, TOOL_RADIUS, shaft_length / 2),
-            ("neck", NECK_LENGTH, tool.cup_radius, tool.length - NECK_LENGTH / 2),
-        ):
-            values |= {f"{part}_length": length, f"{part}_radius": radius, f"{part}_centre": centre}
-            values[f"{part}_collision_length"] = length - 2 * CYLINDER_MARGIN
-            values[f"{part}_collision_radius"] = radius - CYLINDER_MARGIN
-        values |= {"flange_link": self.robot.flange_link, "flange_offset": self.robot.flange_offset}
-        template = Template(Path(__file__).with_name("tool.urdf").read_text())
-        text = text.replace("</robot>", template.substitute(values))
+        parts = "".join(
+            TOOL_PART_URDF.substitute(
+                centre=tool.length - part.offset - part.length / 2,
+                length=part.length,
+                radius=part.radius,
+                collision_length=part.length - 2 * CYLINDER_MARGIN,
+                collision_radius=part.radius - CYLINDER_MARGIN,
+            )
+            for part in tool.parts
+        )
+        urdf = TOOL_URDF.substitute(
+            centre=tool.length / 2,
+            mass=TOOL_MASS,
+            parts=parts,
+            flange_link=self.robot.flange_link,
+            flange_offset=self.robot.flange_offset,
+        )
+        text = text.replace("</robot>", urdf)
         with tempfile.TemporaryDirectory() as folder:
             urdf_path = Path(folder) / "arm_with_tool.urdf"
             urdf_path.write_text(text)
