@@ -8,6 +8,7 @@ from functools import partial
 from executive.cell.arm import Goal, Task
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps, Tool
+from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL
 from executive.manipulation.motions import follow, plan
 from executive.manipulation.tool_goals import choose_grasp
 from executive.skill import EMPTY, In, Metres, Skill, param, port
@@ -33,8 +34,8 @@ class Approach(Skill):
     """
 
     target: In[Target] = port(doc="the target to touch")
-    overtravel: Metres | None = param(None, ge=0, le=0.03, doc="depth of the descent below the surface")
-    offset: Metres | None = param(None, ge=0, le=0.02, doc="spacing of the contact points of the attempts")
+    overtravel: Metres = param(OVERTRAVEL, ge=0, le=0.03, doc="depth of the descent below the surface")
+    offset: Metres = param(CONTACT_SPACING, ge=0, le=0.02, doc="spacing of the contact points of attempts")
     reasons = ("stale", "unreachable", "blocked", "contradicted", "no_contact")
     uses = ("arm", "tool")
     moves = True

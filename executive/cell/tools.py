@@ -7,7 +7,9 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from executive.cell.arm import Goal
 from executive.cell.device_config import Length, MotionConfig, Section
@@ -20,6 +22,11 @@ TOOL_GROUP = "executive.tools"
 """Entry-point group of kinds of tools."""
 DEFAULT_KIND = "suction"
 """Kind of a tool section without the key `kind`, as in all cell files before there were several kinds."""
+
+OVERTRAVEL = 0.015
+"""Default distance by which a guarded motion continues below the expected surface of an object [m]."""
+CONTACT_SPACING = 0.0025
+"""Default distance between the contact points of repeated attempts [m]."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +134,16 @@ class ToolModel(Section):
             return cls.select_class(section).model_validate_json(json.dumps(section), strict=True)
         return parse(section)
 
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Return the schema of a kind of tool; for this base class, of all installed kinds."""
+        if cls is not ToolModel:
+            return handler(schema)
+        kinds = [handler(model.__pydantic_core_schema__) for model in load_tool_models().values()]
+        return kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
+
     @property
     def parts(self) -> Sequence[ToolPart]:
         """Parts of the tool, from the flange to the tip."""
@@ -153,8 +170,8 @@ class ToolModel(Section):
         *,
         attempt: int = 0,
         is_confirmed: bool = False,
-        overtravel: float | None = None,
-        spacing: float | None = None,
+        overtravel: float = OVERTRAVEL,
+        spacing: float = CONTACT_SPACING,
     ) -> Sequence[Grasp]:
         """Return the possible grasps of an object, at least one, the best first.
 
@@ -164,8 +181,8 @@ class ToolModel(Section):
             motion: Heights and speed of guarded motions.
             attempt: Number of failed attempts before this one.
             is_confirmed: True if a measurement of the tool has confirmed the properties of the class.
-            overtravel: Continuation of the motion below the expected surface [m]; None: that of the tool.
-            spacing: Distance between the contact points of repeated attempts [m]; None: that of the tool.
+            overtravel: Distance by which a guarded motion continues below the expected surface [m].
+            spacing: Distance between the contact points of repeated attempts [m].
         """
         raise NotImplementedError
 
@@ -175,7 +192,7 @@ class ToolModel(Section):
         position: Array,  # noqa: ARG002
         height: float,  # noqa: ARG002
         classes: Mapping[str, ObjectClass],  # noqa: ARG002
-        overtravel: float | None = None,  # noqa: ARG002
+        overtravel: float = OVERTRAVEL,  # noqa: ARG002
     ) -> Measurement:
         """Return the evidence of a contact with an object; the default is no evidence.
 

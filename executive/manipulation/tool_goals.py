@@ -13,7 +13,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.frame import Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, Item, ObjectClass, Obstacle, Target, is_quota_reached
 from executive.cell.protocols import Cell
-from executive.cell.tools import Grasp
+from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, Grasp
 from executive.errors import NoDepth
 
 MAX_ROLL_DISTANCE = 0.002
@@ -106,15 +106,15 @@ def _list_bin_obstacles(cell: Cell, excluded_item: Item | None) -> Iterator[Obst
 
 
 def choose_grasp(
-    cell: Cell, target: Target, overtravel: float | None = None, spacing: float | None = None
+    cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = CONTACT_SPACING
 ) -> tuple[Grasp, Task]:
     """Return the best grasp of a target, and the task of the approach; each attempt has another grasp.
 
     Args:
         cell: The work cell.
         target: Target to grasp.
-        overtravel: Continuation of the motion below the expected surface [m]; None: that of the tool.
-        spacing: Distance between the contact points of repeated attempts [m]; None: that of the tool.
+        overtravel: Distance by which a guarded motion continues below the expected surface [m].
+        spacing: Distance between the contact points of repeated attempts [m].
     """
     grasp = cell.tool_model.list_grasps(
         cell.classes[target.label],

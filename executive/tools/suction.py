@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -14,7 +14,7 @@ from pydantic import Field
 from executive.cell.arm import Goal
 from executive.cell.device_config import Force, Length, MotionConfig
 from executive.cell.objects import ObjectClass, list_top_heights
-from executive.cell.tools import Grasp, Measurement, ToolModel, ToolPart
+from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, Grasp, Measurement, ToolModel, ToolPart
 from executive.geometry import Array, Pose
 
 if TYPE_CHECKING:
@@ -25,14 +25,10 @@ SHAFT_RADIUS = 0.012
 """Radius of the body of the tool [m]."""
 NECK_LENGTH = 0.015
 """Length of the thin end of the tool [m]; the thin end has the radius of the cup."""
-OVERTRAVEL = 0.015
-"""Default distance by which a guarded motion continues below the expected surface of an object [m]."""
 PROBE_CLEARANCE = 0.005
 """Height above the table at which a probe (an approach almost down to the table) ends [m]."""
 ATTEMPTS_BEFORE_PROBE = 3
 """Number of failed attempts after which each approach is a probe."""
-SPIRAL_SPACING = 0.0025
-"""Default scale of the Vogel spiral on which the contact points of the attempts lie [m]."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 """Angle between two successive points of a Vogel spiral [rad]."""
 MAX_TOUCH_HEIGHT_ERROR = 0.003
@@ -52,6 +48,7 @@ class Suction(ToolModel):
 
     noun: ClassVar[str] = "seal"
 
+    kind: Literal["suction"] = "suction"
     cup_radius: Length
     """Radius of the lip [m]."""
     reach: Length = 0.002
@@ -84,8 +81,8 @@ class Suction(ToolModel):
         *,
         attempt: int = 0,
         is_confirmed: bool = False,
-        overtravel: float | None = None,
-        spacing: float | None = None,
+        overtravel: float = OVERTRAVEL,
+        spacing: float = CONTACT_SPACING,
     ) -> tuple[Grasp]:
         """Return the grasp from above at the contact point of an attempt.
 
@@ -97,8 +94,7 @@ class Suction(ToolModel):
         # After n failed attempts, the contact point on a solid object lies on a Vogel spiral, at the distance
         # spacing * sqrt(n) and the angle n * GOLDEN_ANGLE; on an object with a hole, it lies on the ring.
         angle = attempt * GOLDEN_ANGLE
-        spiral_spacing = SPIRAL_SPACING if spacing is None else spacing
-        distance = object_class.contact_radius or spiral_spacing * math.sqrt(attempt)
+        distance = object_class.contact_radius or spacing * math.sqrt(attempt)
         contact_x = x + distance * math.cos(angle)
         contact_y = y + distance * math.sin(angle)
         end_height = _compute_min_contact_height(object_class, z, overtravel)
@@ -124,7 +120,7 @@ class Suction(ToolModel):
         position: Array,
         height: float,
         classes: Mapping[str, ObjectClass],
-        overtravel: float | None = None,
+        overtravel: float = OVERTRAVEL,
     ) -> Measurement:
         """Return the evidence of the height of a touch.
 
@@ -165,15 +161,12 @@ class Suction(ToolModel):
         return SimTool(world, self, find_grip, self.reach, noise_seed)
 
 
-def _compute_min_contact_height(
-    object_class: ObjectClass, centre_height: float, overtravel: float | None
-) -> float:
+def _compute_min_contact_height(object_class: ObjectClass, centre_height: float, overtravel: float) -> float:
     """Return the minimum height of a contact with an object [m]; a lower contact misses the object.
 
     The guarded motion continues below the expected surface by `overtravel` [m], at most to the centre.
     """
-    distance = OVERTRAVEL if overtravel is None else overtravel
-    return max(centre_height + object_class.height / 2 - distance, centre_height)
+    return max(centre_height + object_class.height / 2 - overtravel, centre_height)
 
 
 def _compute_height_error(label: str, height: float, classes: Mapping[str, ObjectClass]) -> float:
