@@ -40,7 +40,12 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("obstacle = Obstacle(...)", "cell/objects.py", "Obstacle"),
         ("tool_pose = cell.arm.tool_pose", "geometry.py", "Pose"),
     ],
-    "Tool": [("cell.tool", "cell/protocols.py", "Tool")],
+    "Tool": [
+        ("cell.tool", "cell/protocols.py", "Tool"),
+        ("cell.tool_model", "cell/tools.py", "ToolModel"),
+        ("grasp = cell.tool_model.list_grasps(...)[0]", "cell/tools.py", "Grasp"),
+        ("measurement = cell.tool_model.measure_contact(...)", "cell/tools.py", "Measurement"),
+    ],
     "Camera": [
         ("cell.camera", "cell/protocols.py", "Camera"),
         ("frame = cell.camera.capture()", "cell/frame.py", "Frame"),
@@ -79,12 +84,12 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("executive.perception.evidence", "perception/evidence.py", ""),
     ],
     "Test kit: fake cell": [
-        ("fake = FakeCell()", "cells/fake.py", "FakeCell"),
-        ("fake.world", "cells/fake.py", "FakeWorld"),
-        ("fake.arm", "cells/fake.py", "FakeArm"),
-        ("fake.tool", "cells/fake.py", "FakeTool"),
-        ("fake.camera", "cells/fake.py", "FakeCamera"),
-        ("fake.detector", "cells/fake.py", "FakeDetector"),
+        ("fake = FakeCell()", "drivers/fake.py", "FakeCell"),
+        ("fake.world", "drivers/fake.py", "FakeWorld"),
+        ("fake.arm", "drivers/fake.py", "FakeArm"),
+        ("fake.tool", "drivers/fake.py", "FakeTool"),
+        ("fake.camera", "drivers/fake.py", "FakeCamera"),
+        ("fake.detector", "drivers/fake.py", "FakeDetector"),
     ],
     "Test kit: run a skill or a mission": [
         ("executive.testing.run_skill", "testing/run_skill.py", ""),
@@ -125,7 +130,7 @@ def _format_table(expression: str, file: str, name: str) -> str:
         title = f"### {name}: `{expression}`"
     text, entries = _parse_docstring(owner)
     attributes = dict(entries.get("Attributes", ()))
-    if file.startswith("cells/") and name != "FakeWorld":
+    if file.startswith("drivers/") and name != "FakeWorld":
         # The methods are those of the protocols.
         rows = [(_format_code(attribute), _escape(meaning)) for attribute, meaning in attributes.items()]
     else:
@@ -140,7 +145,8 @@ def _list_rows(owner: ast.AST, attributes: dict[str, str]) -> Iterator[Row]:
         if isinstance(member, ast.AnnAssign) and isinstance(owner, ast.ClassDef):
             name = ast.unparse(member.target)
             code = re.sub(r": ClassVar\[(.*)\] =", r": \1 =", ast.unparse(member))
-            meaning = attributes[name]
+            if (meaning := attributes.get(name)) is None:
+                continue  # A key of a cell file, which the reference of missions explains.
         elif isinstance(member, ast.FunctionDef) and not member.name.startswith("_"):
             code, meaning = _format_signature(member), _describe(member)
         else:
