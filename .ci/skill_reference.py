@@ -40,7 +40,12 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("obstacle = Obstacle(...)", "cell/objects.py", "Obstacle"),
         ("tool_pose = cell.arm.tool_pose", "geometry.py", "Pose"),
     ],
-    "Tool": [("cell.tool", "cell/protocols.py", "Tool")],
+    "Tool": [
+        ("cell.tool", "cell/protocols.py", "Tool"),
+        ("cell.tool_model", "cell/tools.py", "ToolModel"),
+        ("grasp = cell.tool_model.list_grasps(...)[0]", "cell/tools.py", "Grasp"),
+        ("measurement = cell.tool_model.measure_contact(...)", "cell/tools.py", "Measurement"),
+    ],
     "Camera": [
         ("cell.camera", "cell/protocols.py", "Camera"),
         ("frame = cell.camera.capture()", "cell/frame.py", "Frame"),
@@ -140,7 +145,8 @@ def _list_rows(owner: ast.AST, attributes: dict[str, str]) -> Iterator[Row]:
         if isinstance(member, ast.AnnAssign) and isinstance(owner, ast.ClassDef):
             name = ast.unparse(member.target)
             code = re.sub(r": ClassVar\[(.*)\] =", r": \1 =", ast.unparse(member))
-            meaning = attributes[name]
+            if (meaning := attributes.get(name)) is None:
+                continue  # A key of a cell file, which the reference of missions explains.
         elif isinstance(member, ast.FunctionDef) and not member.name.startswith("_"):
             code, meaning = _format_signature(member), _describe(member)
         else:

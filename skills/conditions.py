@@ -6,7 +6,6 @@ from typing import TypeAlias
 
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
-from executive.manipulation.tool_goals import make_object_goal
 from executive.skill import ANY, HOLDING, In, Seconds, Skill, param, port
 
 Plain: TypeAlias = str | int | float | bool
@@ -98,14 +97,14 @@ class IsHolding(Skill):
     tool_state_after_failure = {"empty": ANY}
 
     def run(self, cell: Cell) -> None:
-        """Compare the vacuum sensor with the ledger."""
+        """Compare the sensor of the tool with the ledger."""
         item = cell.ledger.find_held_item()
-        is_sealed = cell.tool.holding
-        if not is_sealed:
+        noun = cell.tool_model.noun
+        if not cell.tool.holding:
             known = f", but the ledger reports {item} in the tool" if item else ""
-            raise self.failure("empty", f"the sensor detects no seal{known}")
+            raise self.failure("empty", f"the sensor detects no {noun}{known}")
         if item is None:
-            raise self.failure("empty", "the sensor detects a seal, but the ledger knows no held item")
+            raise self.failure("empty", f"the sensor detects a {noun}, but the ledger knows no held item")
 
 
 class IsPlaced(Skill):
@@ -134,6 +133,7 @@ class IsReachable(Skill):
     def run(self, cell: Cell) -> None:
         """Solve the inverse kinematics of the arm, without planning a motion."""
         object_class = cell.classes[self.target.label]
-        goal = make_object_goal(object_class, self.target.position, cell.descent, cell.descent_speed)
-        if problem := cell.arm.describe_unreachable(goal):
-            raise self.failure("unreachable", f"{self.target.item}: {problem}")
+        grasps = cell.tool_model.list_grasps(object_class, self.target.position, cell.motion)
+        problems = [cell.arm.describe_unreachable(grasp.goal) for grasp in grasps]
+        if all(problems):
+            raise self.failure("unreachable", f"{self.target.item}: {problems[0]}")

@@ -23,17 +23,19 @@ class ConfirmGrasp(Skill):
     tool_state_after_failure = {"empty": EMPTY}
 
     def run(self, cell: Cell) -> None:
-        """Compare the vacuum sensor with the ledger; unless both report an item, open the tool and fail."""
+        """Compare sensor and ledger; unless both report an item, open the tool and fail."""
         item = cell.ledger.find_held_item()
-        is_sealed = cell.tool.holding
-        if is_sealed and item is not None:
+        noun = cell.tool_model.noun
+        is_holding = cell.tool.holding
+        if is_holding and item is not None:
             self.held = item
             return
         cell.tool.open()
         if item is not None:
             cell.ledger.record_drop(item)
-            raise self.failure("empty", f"the sensor detects no seal; {item} was dropped")
-        if is_sealed:
-            cell.ledger.invalidate_positions()
-        seal = "a seal, but the ledger knows no held item; the tool was opened" if is_sealed else "no seal"
-        raise self.failure("empty", f"the sensor detects {seal}")
+            raise self.failure("empty", f"the sensor detects no {noun}; {item} was dropped")
+        if not is_holding:
+            raise self.failure("empty", f"the sensor detects no {noun}")
+        cell.ledger.invalidate_positions()
+        message = f"the sensor detects a {noun}, but the ledger knows no held item; the tool was opened"
+        raise self.failure("empty", message)

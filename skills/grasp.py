@@ -10,7 +10,7 @@ from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 class Grasp(Skill):
     """Close the tool on the target and verify the grasp.
 
-    The skill succeeds if the tool's sensor reports a seal after the settling time `settle`.
+    The skill succeeds if the tool's sensor reports an object after the settling time `settle`.
     """
 
     target: In[Target] = port(doc="the target that the tool touches")
@@ -22,18 +22,20 @@ class Grasp(Skill):
     waits = "settle"
 
     def run(self, cell: Cell) -> Steps:
-        """Close the tool, wait, and read the vacuum sensor."""
+        """Close the tool, wait, and read its sensor."""
         cell.tool.close()
-        is_sealed = False
+        is_holding = False
         try:
             yield from cell.clock.sleep(self.settle)
-            is_sealed = cell.tool.holding
+            is_holding = cell.tool.holding
         finally:
             # A halted skill must not leave an object in the tool, because the ledger has recorded no grasp.
-            if not is_sealed:
+            if not is_holding:
                 cell.tool.open()
-        if not is_sealed:
+        if not is_holding:
             cell.ledger.record_failed_pick(self.target.item)
-            raise self.failure("missed", f"no seal on {self.target.item} {self.settle:.2f} s after contact")
+            noun = cell.tool_model.noun
+            message = f"no {noun} on {self.target.item} {self.settle:.2f} s after contact"
+            raise self.failure("missed", message)
         cell.ledger.record_grasp(self.target.item)
         self.held = self.target.item

@@ -38,14 +38,15 @@ class PutDown(Skill):
         item = self.held
         object_class = cell.classes[cell.ledger.get_label(item)]
         goal = make_put_down_goal(cell, object_class, self.drop, item)
-        top_height = float(cell.safe_place[2]) + object_class.height
+        table_height = float(cell.safe_place[2])
+        lying_height = table_height + cell.tool_model.get_hold_height(object_class)
         try:
             yield from transport(self, cell, item, goal, "the safe place")
         except SkillFailed as failure:
             # An item that still lies on the table is released there.
-            if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > top_height + MIN_LIFT_HEIGHT:
+            if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > lying_height + MIN_LIFT_HEIGHT:
                 raise
         x, y, _ = cell.arm.tool_pose.position
-        centre = np.array((x, y, top_height - object_class.height / 2))
+        centre = np.array((x, y, table_height + object_class.height / 2))
         record_put_down = partial(cell.ledger.record_put_down, item, centre)
         yield from release(self, cell, item, self.settle, record_put_down, falls=False)

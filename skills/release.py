@@ -27,7 +27,7 @@ class Release(Skill):
     waits = "settle"
 
     def run(self, cell: Cell) -> Steps:
-        """Open the tool, wait, and read the sensors of vacuum and contact."""
+        """Open the tool, wait, and read the sensors of grip and contact."""
         item = self.held
         bin = self.bin
         if cell.ledger.find_held_item() == item:

@@ -13,7 +13,7 @@ class Transit(Skill):
     """Transport the held item to a position above a free slot of a bin.
 
     The arm makes one motion: up, over all walls, and down into the bin. The accelerations are so low that the
-    seal holds with a safety factor of two. The skill reads the vacuum sensor during the whole motion.
+    tool holds the item with a safety factor of two. The skill reads its sensor during the whole motion.
 
     The skill fails with `blocked` if the bin depends on the weight of the item, and no weighing made the
     class of the item certain.
@@ -29,7 +29,7 @@ class Transit(Skill):
     tool_state_after_failure = {"dropped": EMPTY, "halt": ANY}
 
     def run(self, cell: Cell) -> Steps:
-        """Plan the motion, and follow it while the seal holds."""
+        """Plan the motion, and follow it while the tool holds the item."""
         if doubt := explain_uncertain_bin(cell, self.bin, self.held):
             raise self.failure("blocked", doubt)
         goal = make_bin_goal(cell, self.bin, self.held, self.drop)

@@ -12,9 +12,7 @@ from executive.cell.objects import ObjectClass
 from executive.perception.evidence import (
     describe_size_contradiction,
     describe_top_contradiction,
-    describe_touch_contradiction,
     describe_unknown_labels,
-    may_have_missed_top,
 )
 from executive.perception.localization import CellLocalizer
 from tests.camera_poses import looking_down
@@ -29,27 +27,6 @@ FRAME = Frame(
     np.ones((480, 640), bool), 0,
 )  # fmt: skip
 AREA: Box = (192.0, 100.0, 448.0, 356.0)
-
-
-@pytest.mark.parametrize(
-    ("label", "height", "contradiction"),
-    [
-        ("cube", 0.0504, ""),
-        ("cube", 0.1004, ""),  # on another cube
-        ("cube", 0.06, "it was touched 60 mm above the table, and a cube is 50 mm high"),
-        ("sphere", 0.056, "it was touched 56 mm above the table, and a sphere is 60 mm high"),
-    ],
-)
-def test_the_height_of_a_touch_has_to_be_that_of_the_class(label, height, contradiction):
-    assert describe_touch_contradiction(label, height, CLASSES) == contradiction
-
-
-@pytest.mark.parametrize(
-    ("label", "height", "is_possible"),
-    [("sphere", 0.04, True), ("sphere", 0.05, False), ("sphere", 0.065, False), ("cube", 0.035, True)],
-)
-def test_a_touch_that_is_too_low_for_all_classes_may_have_missed_the_top(label, height, is_possible):
-    assert may_have_missed_top(label, height, CLASSES) is is_possible
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ from executive.behaviours import SKILL_GROUP
 from executive.campaign.jobs import SweepJob
 from executive.campaign.results import RunRecord
 from executive.cell.devices import DRIVER_GROUP
+from executive.cell.tools import TOOL_GROUP
 from executive.errors import InputError, explain_os_errors
 from executive.motion.arms import IK_SOLVER_GROUP
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
@@ -45,7 +46,9 @@ TEXT_SUFFIXES = (".yaml", ".yml", ".urdf", ".obj", ".mtl")
 """Suffixes of files that name further files: libraries, cells, weights, labels, meshes and textures."""
 _FILE_NAME_PATTERN = re.compile(r""""([^"\n]+)"|'([^'\n]+)'|([^\s"'<>,\[\]{}]+)""")
 """Pattern of a possible file name in a text: a quoted text or a word."""
-PLUGIN_GROUPS = (SKILL_GROUP, CONTROL_NODE_GROUP, DETECTOR_GROUP, DRIVER_GROUP, IK_SOLVER_GROUP)
+PLUGIN_GROUPS = (
+    SKILL_GROUP, CONTROL_NODE_GROUP, DETECTOR_GROUP, DRIVER_GROUP, IK_SOLVER_GROUP, TOOL_GROUP,
+)  # fmt: skip
 """Groups of entry points with which a package extends this project."""
 PROJECT_PACKAGES = ("executive", "skills")
 """Top-level packages of this project, which each worker has."""

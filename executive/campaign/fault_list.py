@@ -20,7 +20,7 @@ from executive.tree.specification import SkillNode
 FAULT_DURATIONS = (0.5, 5.0)
 """Durations of short faults of detectors and tool [s]."""
 OCCASIONS: Mapping[str, float] = {"first": 0.25, "middle": 0.5, "late": 0.75}
-"""Fractions of a run, or of a motion, after which faults of objects and of the seal occur, by occasion."""
+"""Fractions of a run, or of a motion, after which faults of objects and of the grip occur, by occasion."""
 REPEATED_ACTIVATIONS = tuple(range(1, 21))
 """Numbers of the activations with a repeated fault, if the fault must end before the end of the run."""
 ENDLESS_REASONS = ("stale", "rescan")
@@ -136,8 +136,8 @@ class FaultLister:
         self._table = mission.loaded.cell_config.table
         # Effects on the cell that cause failures of skills, by reason.
         self._causes = {
-            "missed": effects.seal_fails(),
-            "dropped": effects.seal_breaks(),
+            "missed": effects.grip_fails(),
+            "dropped": effects.grip_lost(),
             "no_contact": effects.object_bumped(self._table.x, self._table.y),
             "blocked": effects.arm_collides(),
             "unreachable": effects.no_path(),
@@ -212,18 +212,18 @@ class FaultLister:
                         yield self._plan(node, f"target: {effect.name}", occasion, fault)
 
     def _list_tool_faults(self) -> Iterator[PlannedFault]:
-        """Yield losses of the seal during a transport, and times in which the suction cup cannot seal."""
+        """Yield losses of the object during a transport, and times in which the tool cannot grip."""
         for node in self._list_moving_nodes():
             if self._skills[node.skill].tool_state[0] is HOLDING:
                 for occasion, fraction in OCCASIONS.items():
-                    fault = during(node.path, effects.seal_breaks(fraction), activations=1)
-                    yield self._plan(node, "seal breaks", occasion, fault)
+                    fault = during(node.path, effects.grip_lost(fraction), activations=1)
+                    yield self._plan(node, "grip lost", occasion, fault)
         start = self._duration / 2
         for duration in FAULT_DURATIONS:
-            fault = between(start, start + duration, effects.seal_fails())
-            yield PlannedFault("tool", "tool", f"no seal for {duration:g} s", "middle", fault)
-        unsealable = after(0.0, effects.object_unsealable(1))
-        yield PlannedFault("tool", "tool", "no seal on an object", "lasting", unsealable)
+            fault = between(start, start + duration, effects.grip_fails())
+            yield PlannedFault("tool", "tool", f"no grip for {duration:g} s", "middle", fault)
+        ungrippable = after(0.0, effects.object_ungrippable(1))
+        yield PlannedFault("tool", "tool", "no grip on an object", "lasting", ungrippable)
 
     def _list_object_effects(self, choice: ObjectChoice, fraction: float | None) -> list[Effect]:
         bumped = effects.object_bumped(self._table.x, self._table.y, choice, fraction)

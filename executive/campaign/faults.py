@@ -36,7 +36,7 @@ MIN_TIMEOUT = 60.0
 """Minimum timeout of a run with faults, on the run's clock [s]."""
 TIMEOUT_FACTOR = 10.0
 """Additional timeout of a run with faults, as a multiple of the duration of the run without faults."""
-DISPLACING_EFFECTS = frozenset({"object_removed", "object_moved", "seal_breaks"})
+DISPLACING_EFFECTS = frozenset({"object_removed", "object_moved", "grip_lost"})
 """Values of `FaultInjected.name` for the faults that may move an object out of reach of the arm."""
 
 FaultNumbers = tuple[int, ...]

@@ -59,7 +59,8 @@ class Goal:
 
     Attributes:
         position: Position of the tool centre point `(x, y, z)` [m].
-        yaw: Rotation of the tool about the vertical axis [rad]; None: the planner chooses the rotation.
+        yaws: Permitted rotations of the tool about the vertical axis [rad]; the planner chooses the fastest.
+            If empty, every rotation is permitted.
         guarded_length: Length of the guarded descent [m]; 0: no guarded descent. The guarded descent is the
             end of the motion, during which the tool may touch the target.
         guarded_speed: Maximum tool speed of the slow end of the guarded descent [m/s].
@@ -68,7 +69,7 @@ class Goal:
     """
 
     position: tuple[float, float, float]
-    yaw: float | None = None
+    yaws: tuple[float, ...] = ()
     guarded_length: float = 0.0
     guarded_speed: float = math.inf
     fast_length: float = 0.0
@@ -85,7 +86,7 @@ class Task:
 
     Attributes:
         load: Class of the object in the tool, or None.
-        holding_force: Maximum force that the seal of the suction cup withstands [N].
+        holding_force: Maximum force with which the tool holds the load [N].
         obstacles: Obstacles that are not in the cell file: objects on the table and in the bins.
         target: Obstacle that the tool may touch during the guarded descent, or None.
     """

@@ -9,7 +9,15 @@ from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Field,
+    SerializeAsAny,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from executive.cell.arm_config import ArmConfig
 from executive.cell.device_config import (
@@ -27,17 +35,12 @@ from executive.cell.device_config import (
     Range,
     Seconds,
     Section,
-    ToolConfig,
     Vector,
     check_ascending,
 )
 from executive.cell.frame import ErrorRates
 from executive.cell.objects import Bin, ObjectClass
-
-TOOL_RADIUS = 0.012
-"""Radius of the body of the tool [m]."""
-NECK_LENGTH = 0.015
-"""Length of the thin end of the tool [m]; the thin end has the radius of the cup."""
+from executive.cell.tools import ToolModel
 
 
 class ObjectConfig(Section):
@@ -210,8 +213,8 @@ class CellConfig(Section):
     name of an entry point of the group `executive.cells`."""
     arm: ArmConfig
     """Robot arm."""
-    tool: ToolConfig
-    """Suction tool."""
+    tool: SerializeAsAny[ToolModel]
+    """Tool at the flange of the arm."""
     motion: MotionConfig = MotionConfig()
     """Distances, speeds and times of motion planning."""
     clock: ClockConfig = ClockConfig()
@@ -245,6 +248,12 @@ class CellConfig(Section):
         return max(section.height for section in self.objects.values())
 
     @property
+    def max_hold_height(self) -> float:
+        """Largest distance from the tool centre point down to the underside of a held object [m]."""
+        classes = (section.build_class(label) for label, section in self.objects.items())
+        return max(map(self.tool.get_hold_height, classes))
+
+    @property
     def max_pile_height(self) -> float:
         """Maximum height of a pile on the table [m]: two objects if `stacked` is above 0, else one."""
         return (2 if self.table.stacked else 1) * self.max_object_height
@@ -253,7 +262,7 @@ class CellConfig(Section):
     def travel_height(self) -> float:
         """Tool height [m] at which a held object of any class clears all bin walls and piles."""
         wall_top = max(bin.position[2] + bin.size[2] for bin in self.bins.values())
-        return max(wall_top, self.max_pile_height) + self.max_object_height + self.motion.clearance
+        return max(wall_top, self.max_pile_height) + self.max_hold_height + self.motion.clearance
 
     def build_bins(self) -> dict[str, Bin]:
         """Return the bins by name."""

@@ -88,30 +88,6 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class ToolConfig(Section):
-    """A suction tool with one bellows cup; `tests/benchmarks/suction_map.py` justifies the constants."""
-
-    length: Length = 0.12
-    """Distance from the flange to the lip of the cup [m]."""
-    cup_radius: Length
-    """Radius of the lip [m]."""
-    reach: Length = 0.002
-    """Maximum distance between lip and surface at which the lip seals [m]."""
-    force: Force
-    """Breakaway force of a perfect seal [N]."""
-    gap: Length
-    """Gap between lip and surface at which the breakaway force is zero [m]."""
-    tilt_deg: float = Field(ge=1, lt=90)
-    """Angle between surface normal and tool axis at which the breakaway force is zero [degree]."""
-    min_force: Force
-    """Minimum breakaway force at which the vacuum sensor reports a seal [N]."""
-    load_std: float = Field(0.05, gt=0, le=100)
-    """Standard deviation of a reading of the load [N]. The default is assumed: 0.5 % of 10 N, the range of a
-    small load cell."""
-    source: str
-    """Source of the constants."""
-
-
 class ClockConfig(Section):
     """The clock of the cell."""
 

@@ -114,10 +114,13 @@ class ObjectClass:
         return self.looks_like or self.label
 
 
-SAFETY_FACTOR = 2.0
-"""Ratio of the maximum force that a seal withstands to the largest force on the seal during a motion."""
-MIN_LIFT_ACCELERATION = 0.5
-"""Lower limit of the maximum acceleration of a lift, even if the seal withstands less [m/s²]."""
+def list_top_heights(label: str, classes: Mapping[str, ObjectClass]) -> list[float]:
+    """Return all possible heights above the table [m] of the top of an object of a class, ascending.
+
+    The object may stand on the table or on one object of any class.
+    """
+    support_heights = {0.0, *(object_class.height for object_class in classes.values())}
+    return sorted(classes[label].height + support_height for support_height in support_heights)
 
 
 @dataclass(frozen=True)

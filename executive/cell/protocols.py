@@ -12,8 +12,10 @@ from enum import Enum
 from typing import NamedTuple, Protocol
 
 from executive.cell.arm import Arm
+from executive.cell.device_config import MotionConfig
 from executive.cell.frame import Answer, Box, Detection, Detections, Frame, Observation
 from executive.cell.objects import Bin, Item, KnownItem, ObjectClass, Quotas, Target
+from executive.cell.tools import Measurement, ToolModel
 from executive.geometry import Array
 
 
@@ -81,8 +83,8 @@ class Ledger(Protocol):
     def is_certain(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough to pick it."""
 
-    def is_height_confirmed(self, label: str) -> bool:
-        """Return True if the tool has touched an object of a class at the height of the class."""
+    def is_confirmed_by_tool(self, label: str) -> bool:
+        """Return True if a measurement of the tool has agreed with a class before."""
 
     def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
         """Return True if almost certainly no object that the mission still sorts is visible on the table.
@@ -149,14 +151,8 @@ class Ledger(Protocol):
     def record_empty_load(self, load: float) -> None:
         """Record the load of the empty tool at rest [N]."""
 
-    def record_touch(self, item: Item, contradiction: str = "", *, may_have_missed_top: bool = False) -> bool:
-        """Record a touch of an item, and return False if the touch contradicts the class of the item.
-
-        Args:
-            item: The item.
-            contradiction: Sentence that states how the height of the touch contradicts the class, or "".
-            may_have_missed_top: True if the cup may have touched the item below its top.
-        """
+    def record_measurement(self, item: Item, measurement: Measurement) -> bool:
+        """Record a contact with an item, and return False if its measurement contradicts the class."""
 
     def record_weight(self, item: Item, weight: float, std: float) -> str:
         """Record the weight of an item, which determines its class among the classes that look alike.
@@ -240,19 +236,19 @@ class Clock(Protocol):
 
 
 class Tool(Protocol):
-    """A suction tool with a contact sensor, a vacuum sensor and a load cell."""
+    """A tool with a contact sensor, a sensor of the grip, and a load cell."""
 
     @property
     def touching(self) -> bool:
-        """True while the lip of the cup touches something."""
+        """True while the tip of the tool touches something."""
 
     @property
     def holding(self) -> bool:
-        """True while the vacuum sensor reports a seal."""
+        """True while the sensor of the grip reports an object."""
 
     @property
     def holding_force(self) -> float:
-        """Maximum force that the seal withstands [N], computed from the vacuum; 0 without a seal."""
+        """Maximum force with which the tool holds the object [N], from its sensor; 0 without an object."""
 
     @property
     def load(self) -> float:
@@ -263,10 +259,10 @@ class Tool(Protocol):
         """Standard deviation of one reading of `load` [N]."""
 
     def close(self) -> None:
-        """Switch the vacuum on, which holds a touched object if its surface allows a seal."""
+        """Begin to grip, which holds a touched object if the tool can hold it."""
 
     def open(self) -> None:
-        """Switch the vacuum off and release the object."""
+        """Stop to grip, and release the object."""
 
 
 class Camera(Protocol):
@@ -400,10 +396,8 @@ class Cell:
         routes: Names of the permitted bins by class label, from the mission.
         localizer: The localizer, which computes the positions of detected objects.
         safe_place: Position on the table for putting down a held object `(3,)` [m].
-        descent: Height above the expected surface at which the guarded descent of an approach starts [m].
-        slow_descent: Height above the expected surface from which the guarded descent is slow [m], if a touch
-            has confirmed the height of the class; else, the whole guarded descent is slow.
-        descent_speed: Tool speed of the slow part of the guarded descent [m/s].
+        tool_model: Grasps, measurements and limits of the tool.
+        motion: Heights and speed of guarded motions.
         report_selection: Function that reports a selected target and the name of its bin to the run.
         quotas: Maximum numbers of objects in the bins, from the mission.
         behaviours: Behaviours of other projects.
@@ -421,9 +415,8 @@ class Cell:
     routes: Routes
     localizer: Localizer
     safe_place: Array
-    descent: float
-    slow_descent: float
-    descent_speed: float
+    tool_model: ToolModel
+    motion: MotionConfig
     report_selection: Callable[[Target, str], None]
     quotas: Quotas
     behaviours: Behaviours = field(default_factory=Behaviours)

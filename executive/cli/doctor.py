@@ -88,6 +88,7 @@ def check_plugins() -> Iterator[CheckResult]:
     from executive.behaviours import load_skills
     from executive.cell.devices import DRIVER_GROUP
     from executive.motion.arms import IK_SOLVER_GROUP
+    from executive.cell.tools import load_tool_models
     from executive.perception.detectors.detector_registry import find_detector_kinds
     from executive.plugins import list_entries
 
@@ -95,6 +96,7 @@ def check_plugins() -> Iterator[CheckResult]:
     solvers = list_entries(IK_SOLVER_GROUP, "solver")
     for entry in (*drivers.values(), *find_detector_kinds().values(), *solvers.values()):
         entry.load()
+    load_tool_models()
     yield CheckResult("ok", "plugins", f"{len(load_skills())} skills")
 
 

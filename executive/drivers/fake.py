@@ -18,6 +18,7 @@ from executive.cell.devices import DEFAULT_ROLE, CameraImage, DriverOptions, Ste
 from executive.cell.frame import Box, Detection
 from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
 from executive.cell.protocols import Clock
+from executive.cell.tools import ToolModel
 from executive.drivers.world_log import LogFile
 from executive.errors import InputError
 from executive.geometry import GRAVITY, Array, Pose
@@ -26,10 +27,10 @@ from executive.motion.configurations import find_configuration_pairs
 from executive.perception.camera_model import compute_calibration
 from executive.text.validate import KeyPath
 
-MAX_SEAL_OFFSET = 0.012
-"""Maximum horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
+MAX_GRIP_OFFSET = 0.012
+"""Maximum horizontal distance between the tool and the contact points of an object for a grip [m]."""
 TOUCH_DISTANCE = 0.002
-"""Maximum vertical distance between the cup and the top of an object for contact [m]."""
+"""Maximum vertical distance between the tool and the top of an object for contact [m]."""
 
 
 MAX_STEP_ERROR = 1e-6
@@ -102,13 +103,13 @@ class FakeWorld:
         return next((bin for margin, bin in places if bin.contains(fake_object.position, margin)), None)
 
     def find_touched_object(self, tip_position: Array) -> TrueObject | None:
-        """Return the object that a cup at `tip_position` `(3,)` [m] touches from above, or None."""
+        """Return the object that a tool at `tip_position` `(3,)` [m] touches from above, or None."""
         for fake_object in self.objects:
             object_class = self.classes[fake_object.label]
             distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))
-            seal_offset = abs(distance - object_class.contact_radius)
+            offset = abs(distance - object_class.contact_radius)
             gap = abs(float(fake_object.position[2]) + object_class.height / 2 - tip_position[2])
-            is_touched = seal_offset <= MAX_SEAL_OFFSET and gap <= TOUCH_DISTANCE
+            is_touched = offset <= MAX_GRIP_OFFSET and gap <= TOUCH_DISTANCE
             if is_touched and fake_object is not self.held_object:
                 return fake_object
         return None
@@ -116,19 +117,19 @@ class FakeWorld:
 
 @dataclass(eq=False)
 class FakeTool:
-    """A suction cup that seals on every touched object, unless `can_seal` returns False.
+    """A tool that grips every touched object that its model can hold, unless `can_hold` returns False.
 
     Attributes:
-        can_seal: Function that returns True if the cup can seal on the touched object; set by tests.
-        breakaway_force: Force that every seal withstands [N].
+        can_hold: Function that returns True if the tool can hold the touched object; set by tests.
+        force: Force with which the tool holds every object [N].
         load_error: Error of `load` [N]; set by tests.
     """
 
     world: FakeWorld
     get_tip_position: Callable[[], Array]
-    load_std: float
-    can_seal: Callable[[], bool] = field(default=lambda: True)
-    breakaway_force: float = 7.9
+    model: ToolModel
+    can_hold: Callable[[], bool] = field(default=lambda: True)
+    force: float = 7.9
     load_error: float = 0.0
     _noise: float = 1e-9  # It alternates, so that the load cell does not seem broken.
 
@@ -143,7 +144,11 @@ class FakeTool:
 
     @property
     def holding_force(self) -> float:
-        return self.breakaway_force if self.holding else 0.0
+        return self.force if self.holding else 0.0
+
+    @property
+    def load_std(self) -> float:
+        return self.model.load_std
 
     @property
     def load(self) -> float:
@@ -155,7 +160,9 @@ class FakeTool:
     def close(self) -> None:
         self.world.is_commanded = True
         touched = self.world.find_touched_object(self.get_tip_position())
-        if touched is not None and self.can_seal():
+        if touched is None or self.model.explain_unsuitable(self.world.classes[touched.label]):
+            return
+        if self.can_hold():
             touched.is_dropped = False
             self.world.held_object = touched
 
@@ -163,7 +170,7 @@ class FakeTool:
         self.world.is_commanded = True
         self.world.release()
 
-    def break_seal(self) -> None:
+    def lose_grip(self) -> None:
         """Drop the held object; it rolls off other objects and bin walls."""
         self.world.release(is_dropped=True)
 
@@ -248,6 +255,7 @@ class FakeArm:
         self.commands: list[str] = []
         self._kinematics = build_planning_kinematics(config)
         self._world = world
+        self._tool_model = config.tool
         self._path: list[Array] = []
         self._half_length = 0
         self._guard = Guard()
@@ -301,8 +309,9 @@ class FakeArm:
             return
         self.q = self._path.pop(0)
         if (held := self._world.held_object) is not None:
-            height = self._world.classes[held.label].height
-            held.position[:] = self.tool_pose.position - np.array([0.0, 0.0, height / 2])
+            object_class = self._world.classes[held.label]
+            depth = self._tool_model.get_hold_height(object_class) - object_class.height / 2
+            held.position[:] = self.tool_pose.position - np.array([0.0, 0.0, depth])
         if self.next_obstacle is not None and len(self._path) <= self._half_length:
             self.contact_point = self.tool_pose.position.tolist()
             self.stop_after_collision(self.next_obstacle)
@@ -319,7 +328,7 @@ class FakeArm:
 class FakeDriver:
     """The devices of a cell without physics; implements `executive.cell.devices.Driver`.
 
-    The arm follows motions exactly, the tool always holds what it touches, and images contain the true
+    The arm follows motions exactly, the tool holds what its kind can hold, and images contain the true
     detections of all objects.
 
     Args:
@@ -347,7 +356,7 @@ class FakeDriver:
         self.clock = clock or StepClock(config.clock.step)
         self.clock.on_tick = self._advance
         self.arm = FakeArm(self.world, config)
-        self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position, config.tool.load_std)
+        self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position, config.tool)
         self.arm.tool = self.tool
         self.camera = FakeCamera(config, self.world, self.arm, self.clock)
         self.arms = {DEFAULT_ROLE: self.arm}
@@ -436,7 +445,7 @@ class FakeDriver:
         true_object.rest_positions.append(true_object.position.copy())
 
     def drop_held_object(self) -> None:
-        self.tool.break_seal()
+        self.tool.lose_grip()
 
     def collide(self, message: str) -> None:
         self.arm.stop_after_collision(message)

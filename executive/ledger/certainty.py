@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from executive.cell.config import LedgerConfig
+from executive.cell.tools import Measurement
 from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, State
 
 MIN_EXISTENCE_PROBABILITY = 0.9
@@ -28,8 +29,8 @@ MIN_LOG_RATIO_OF_WEIGHT = math.log(0.01)
 the minimum, the class and an undeclared class (prior odds 0.01) are equally probable."""
 MIN_REPEATS_FOR_SATURATION = 2
 """Number of repeated classes after which more looks from a viewpoint add hardly any evidence."""
-MAX_CLASS_ERROR_FOR_TOUCH = 0.2
-"""Maximum class error of an item that the tool may touch to determine the class by the height."""
+MAX_CLASS_ERROR_FOR_MEASUREMENT = 0.2
+"""Maximum class error of an item that the tool may touch to determine the class by a measurement."""
 MIN_UNCERTAIN_LOOKS_TO_REJECT = 10
 """Minimum number of looks in a row with only doubtful detections of a rejected item."""
 
@@ -40,11 +41,11 @@ class Certainty:
 
     Attributes:
         config: Thresholds of the ledger, from the cell file.
-        labels_with_unique_height: Classes whose height distinguishes them from all others.
+        distinct_labels: Classes that a measurement of the tool distinguishes from all others.
     """
 
     config: LedgerConfig
-    labels_with_unique_height: Collection[str]
+    distinct_labels: Collection[str]
 
     def is_certain(self, record: ItemRecord) -> bool:
         """Return True if an item's existence, class and position are certain enough to touch the item.
@@ -67,13 +68,13 @@ class Certainty:
         """Return True if an item's class is certain enough to touch the item.
 
         A larger class error is permitted if further looks from the same viewpoint cannot prove the class, but
-        the height of a touch can.
+        a measurement of the tool can.
         """
         is_saturated = record.belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
-        has_unique_height = record.label in self.labels_with_unique_height
+        is_distinct = record.label in self.distinct_labels
         max_error = self.config.max_class_error
-        if is_saturated and has_unique_height:
-            max_error = MAX_CLASS_ERROR_FOR_TOUCH
+        if is_saturated and is_distinct:
+            max_error = MAX_CLASS_ERROR_FOR_MEASUREMENT
         return record.belief.class_error <= max_error
 
     def is_class_certain_by_weight(self, record: ItemRecord) -> bool:
@@ -120,26 +121,26 @@ class Certainty:
             # A rejected item counts as existing, so that the end of the run does not discard it as a phantom.
             belief.log_odds = max(belief.log_odds, 0.0)
 
-    def add_touch(self, record: ItemRecord, contradiction: str, *, may_have_missed_top: bool) -> bool:
-        """Update an item with a touch; return False if the height of the touch contradicts the class.
+    def add_measurement(self, record: ItemRecord, measurement: Measurement) -> bool:
+        """Update an item with a measurement of the tool; return False if it contradicts the class.
 
-        After a touch at the height of the class, other heights are no contradiction, because the item may
-        have tipped over. The first touch that may have missed the top is no contradiction if the looks prove
-        the class.
+        After a measurement that agrees with the class, others are no contradiction, because the item may have
+        tipped over. The first measurement that may be wrong is no contradiction if the looks prove the class.
         """
         record.belief.is_confirmed = True
         record.had_contact = True
         record.empty_probe_count = 0
-        if not contradiction:
-            record.touched_label = record.label
-            record.low_touch_count = 0
-        if record.touched_label == record.label:
+        if not measurement.contradiction:
+            record.confirmed_label = record.label
+            record.doubtful_measurement_count = 0
+        if record.confirmed_label == record.label:
             return True
-        if may_have_missed_top:
-            record.low_touch_count += 1
-            if record.low_touch_count == 1 and record.belief.class_error <= self.config.max_class_error:
+        if measurement.may_be_wrong:
+            record.doubtful_measurement_count += 1
+            is_first = record.doubtful_measurement_count == 1
+            if is_first and record.belief.class_error <= self.config.max_class_error:
                 return True
-        record.last_contradiction = contradiction
+        record.last_contradiction = measurement.contradiction
         return False
 
     def _needs_other_viewpoint(self, record: ItemRecord) -> bool:
@@ -149,7 +150,7 @@ class Certainty:
             belief.class_error > self.config.max_class_error
             and belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
             and len(belief.last_label_by_viewpoint) == 1
-            and record.label not in self.labels_with_unique_height
+            and record.label not in self.distinct_labels
         )
 
 
@@ -160,7 +161,12 @@ FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
 
 
 def find_final_state(
-    record: ItemRecord, certainty: Certainty, *, skip_reason: str, is_completed: bool, has_touched_item: bool
+    record: ItemRecord,
+    certainty: Certainty,
+    *,
+    skip_reason: str,
+    is_completed: bool,
+    has_confirmed_item: bool,
 ) -> tuple[State, str] | None:
     """Return the final state of an item and the reason, or None if the current state is final.
 
@@ -170,7 +176,7 @@ def find_final_state(
     2. An item is rejected if all its detections are doubtful and all later images of its place show it.
     3. An item whose probability of existence is below 0.5 is a phantom.
     4. An item that the tool never touched in at least `MIN_EMPTY_PROBES` descents to the table is a phantom,
-       if the tool has touched another item at the expected height.
+       if a measurement of the tool has confirmed the class of another item.
     5. A dropped item that the tool may have moved while the journal was incomplete is rejected.
     6. An item is lost if it was dropped, or if its position on the table is now empty.
     7. An item that is already rejected stays rejected.
@@ -184,7 +190,7 @@ def find_final_state(
         certainty: Criteria for an item with sufficient evidence.
         skip_reason: Reason why the mission does not sort objects of the item's class, or "".
         is_completed: True if the behaviour tree succeeded.
-        has_touched_item: True if the tool has touched any item at the height of its class.
+        has_confirmed_item: True if a measurement of the tool has confirmed the class of any item.
     """
     belief = record.belief
     if record.state is State.HELD:
@@ -195,7 +201,7 @@ def find_final_state(
         return State.REJECTED, REASON_UNCERTAIN
     if not belief.is_probable:
         return State.PHANTOM, REASON_NOT_FOUND
-    if record.empty_probe_count >= MIN_EMPTY_PROBES and has_touched_item and not record.had_contact:
+    if record.empty_probe_count >= MIN_EMPTY_PROBES and has_confirmed_item and not record.had_contact:
         count = record.empty_probe_count
         return State.PHANTOM, f"the tool found only the table at its position, {count} times"
     if record.state is State.DROPPED or certainty.is_position_empty(record):

@@ -82,10 +82,10 @@ class ItemRecord:
         drop_count: Number of times that the tool dropped the item.
         empty_probe_count: Number of descents that found only the table, since the item was moved or touched.
         had_contact: True if the tool has touched the item at any height.
-        touched_label: Class whose height the last touch confirmed, or "".
-        low_touch_count: Number of touches below the height of the class, since the last confirmed height.
+        confirmed_label: Class that the last measurement of the tool confirmed, or "".
+        doubtful_measurement_count: Number of measurements that may be wrong, since the last confirmed class.
         contradiction_count: Number of images that contradict the class since the last possible move.
-        last_contradiction: Last evidence of size, height or weight against the class, as a sentence, or "".
+        last_contradiction: Last evidence of an image, measurement or weight against the class, or "".
         bin_log_odds: For each bin, log odds that the dropped item lies in the bin.
         deferral_count: Number of times that the item was deferred.
         deferral_rank: Rank among the deferred items; 0 if the item is not deferred.
@@ -116,8 +116,8 @@ class ItemRecord:
     drop_count: int = 0
     empty_probe_count: int = 0
     had_contact: bool = False
-    touched_label: str = ""
-    low_touch_count: int = 0
+    confirmed_label: str = ""
+    doubtful_measurement_count: int = 0
     contradiction_count: int = 0
     last_contradiction: str = ""
     bin_log_odds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
@@ -239,8 +239,8 @@ class ItemRecord:
             is_confirmed = self.belief.is_confirmed
             self.belief = new_item.belief
             self.belief.is_confirmed |= is_confirmed
-            self.touched_label = ""
-            self.low_touch_count = 0
+            self.confirmed_label = ""
+            self.doubtful_measurement_count = 0
         self.empty_probe_count = 0
         self.was_taken_away = False
         # `first_position` stays the position before the move.

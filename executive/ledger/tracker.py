@@ -13,6 +13,7 @@ from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.frame import Detections, Frame, FrameCaptured, Observation
 from executive.cell.objects import Bin, Item, KnownItem, ObjectClass, Quotas, Target
 from executive.cell.protocols import Presence, Routes
+from executive.cell.tools import Measurement
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
@@ -46,6 +47,7 @@ class Tracker:
         quotas: Maximum numbers of objects in the bins.
         emit: Function that receives the events.
         ignored_labels: Labels that are not in the cell file, of objects that may lie on the table.
+        distinct_labels: Classes that a measurement of the tool distinguishes from all others.
         unknown_labels: Other labels that are not in the cell file, each with its maximum number of boxes per
             frame.
         ignored_positions: Positions `(3,)` [m] of all detections with an ignored label so far.
@@ -61,6 +63,7 @@ class Tracker:
     quotas: Quotas
     emit: Emit
     ignored_labels: Collection[str] = ()
+    distinct_labels: Collection[str] = ()
 
     def __post_init__(self) -> None:
         self.unknown_labels: Counter[str] = Counter()
@@ -70,7 +73,7 @@ class Tracker:
         self._bodies: list[tuple[Array, int]] = []
         """Objects of no item: position `(3,)` [m], and number of further looks until it is forgotten."""
         self._records = ItemRecords(self.emit)
-        self._certainty = Certainty(self.config, evidence.find_classes_distinct_by_touch(self.classes))
+        self._certainty = Certainty(self.config, self.distinct_labels)
         self._bin_contents = BinContents(self.config, self.bins, self.routes, self._records, self.quotas)
         self._coverage = Coverage(self.table)
         self._deferral_count = 0
@@ -131,9 +134,9 @@ class Tracker:
     def record_empty_load(self, load: float) -> None:
         self.empty_load = load
 
-    def record_touch(self, item: Item, contradiction: str = "", *, may_have_missed_top: bool = False) -> bool:
+    def record_measurement(self, item: Item, measurement: Measurement) -> bool:
         record = self._records.find(item)
-        if self._certainty.add_touch(record, contradiction, may_have_missed_top=may_have_missed_top):
+        if self._certainty.add_measurement(record, measurement):
             return True
         self._coverage.record_change(record.position, self.config.neighbourhood)
         self._records.emit(record)
@@ -221,14 +224,14 @@ class Tracker:
             self._add_body(np.array(point))
 
     def set_final_states(self, *, completed: bool) -> None:
-        has_touched_item = any(record.touched_label for record in self._records.all)
+        has_confirmed_item = any(record.confirmed_label for record in self._records.all)
         dropped = self._records.filter_by_state(State.DROPPED)
         dropped_items = [record for record in dropped if not record.was_taken_away]
         for record in self._records.all:
             self._settle_undeclared(record)
             final_state = find_final_state(
                 record, self._certainty, skip_reason=self._explain_skipped_item(record),
-                is_completed=completed, has_touched_item=has_touched_item,
+                is_completed=completed, has_confirmed_item=has_confirmed_item,
             )  # fmt: skip
             if bin := find_probable_bin(record):
                 record.bin = bin
@@ -296,8 +299,8 @@ class Tracker:
     def is_certain(self, item: Item) -> bool:
         return self._certainty.is_certain(self._records.find(item))
 
-    def is_height_confirmed(self, label: str) -> bool:
-        return any(record.touched_label == label for record in self._records.all)
+    def is_confirmed_by_tool(self, label: str) -> bool:
+        return any(record.confirmed_label == label for record in self._records.all)
 
     def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
         routed_labels = [routed_label for routed_label in self.routes if label in (None, routed_label)]

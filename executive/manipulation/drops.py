@@ -16,19 +16,19 @@ MAX_PREDICTABLE_SPEED = 0.2
 
 
 def fail_if_dropped(skill: Skill, cell: Cell, item: Item, place: str) -> None:
-    """If the seal on `item` is broken, record the drop, open the tool, and fail.
+    """If the tool has lost `item`, record the drop, open the tool, and fail.
 
     `place` describes the place of the drop in the error message.
 
     Raises:
-        SkillFailed: The seal broke; the reason is `dropped`.
+        SkillFailed: The tool lost the item; the reason is `dropped`.
     """
     if detect_and_record_drop(cell, item):
         x, y, z = cell.arm.tool_pose.position
         cell.tool.open()
-        raise skill.failure(
-            "dropped", f"the seal on {item} broke {place}, near ({x:.2f}, {y:.2f}, {z:.2f}) m"
-        )
+        noun = cell.tool_model.noun
+        message = f"the {noun} on {item} broke {place}, near ({x:.2f}, {y:.2f}, {z:.2f}) m"
+        raise skill.failure("dropped", message)
 
 
 def detect_and_record_drop(cell: Cell, item: Item) -> bool:
@@ -41,10 +41,14 @@ def detect_and_record_drop(cell: Cell, item: Item) -> bool:
         return False
     if cell.ledger.find_held_item() == item:
         velocity = cell.arm.tool_velocity
-        height = cell.classes[cell.ledger.get_label(item)].height
         is_predictable = float(np.linalg.norm(velocity)) <= MAX_PREDICTABLE_SPEED
-        # Each read of the tool pose is written to the journal, so it is read only if it is needed.
-        landing = predict_landing(cell.arm.tool_pose.position, velocity, height) if is_predictable else None
+        landing = None
+        if is_predictable:
+            object_class = cell.classes[cell.ledger.get_label(item)]
+            # Each read of the tool pose is written to the journal, so it is read only if it is needed.
+            underside = cell.arm.tool_pose.position.copy()
+            underside[2] -= cell.tool_model.get_hold_height(object_class)
+            landing = predict_landing(underside, velocity, object_class.height)
         cell.ledger.record_drop(item, landing)
     return True
 
@@ -53,12 +57,12 @@ def predict_landing(position: Array, velocity: Array, height: float) -> Array:
     """Return the centre of a dropped object `(3,)` [m] after a ballistic fall without rolling.
 
     Args:
-        position: Position of the tool centre point at the drop `(3,)` [m].
+        position: Centre of the underside of the object at the drop `(3,)` [m].
         velocity: Velocity of the tool at the drop `(3,)` [m/s].
         height: Height of the object [m].
     """
     vertical_speed = float(velocity[2])
-    fall_height = max(float(position[2]) - height, 0.0)
+    fall_height = max(float(position[2]), 0.0)
     # Ballistic fall: positive solution t of fall_height + vertical_speed * t - GRAVITY / 2 * t**2 = 0.
     fall_time = (vertical_speed + math.sqrt(vertical_speed**2 + 2 * GRAVITY * fall_height)) / GRAVITY
     x, y = (position + velocity * fall_time)[:2]

@@ -147,13 +147,13 @@ def follow(
 
 
 def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, goal_name: str) -> Steps:
-    """Yield until the arm has moved `item` to `goal`; read the vacuum sensor in every control step.
+    """Yield until the arm has moved `item` to `goal`; read the sensor of the tool in every control step.
 
     `goal_name` is the name of the goal in error messages.
 
     Raises:
         SkillFailed: No motion was found, or the arm collided; the reason is `unreachable` or `blocked`.
-        SkillFailed: The seal broke; the reason is `dropped`. The arm is at rest, and the tool is open.
+        SkillFailed: The tool lost the item; the reason is `dropped`. The arm rests, and the tool is open.
     """
     try:
         motion = yield from plan(skill, cell.arm, lambda: (goal, make_transport_task(cell, item)))
@@ -169,11 +169,11 @@ def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, goal_name: str) 
 def release(
     skill: Skill, cell: Cell, item: Item, settle: float, record_release: Callable[[], None], *, falls: bool
 ) -> Steps:
-    """Switch the vacuum off, and yield for `settle` [s] until the item lies still.
+    """Open the tool, and yield for `settle` [s] until the item lies still.
 
     `record_release` records the new position of the item in the ledger, even if the skill is halted
-    during the wait, provided that the tool is empty. `falls` is True if the item falls away from the lip, so
-    that a lip that still touches something shows an item that sticks to the cup.
+    during the wait, provided that the tool is empty. `falls` is True if the item falls away from the tool,
+    so that a tool that still touches something shows an item that sticks to it.
 
     Raises:
         SkillFailed: The item still hangs on the tool; the reason is `stuck`.

@@ -13,28 +13,18 @@ from executive.cell.arm import Goal, Task
 from executive.cell.frame import Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, Item, ObjectClass, Obstacle, Target, is_quota_reached
 from executive.cell.protocols import Cell
+from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, Grasp
 from executive.errors import NoDepth
-from executive.geometry import Array
 
 MAX_ROLL_DISTANCE = 0.002
 """Maximum distance that an object rolls in a bin after its release [m]."""
 DROP_HEIGHT = 0.01
 """Default clearance between an item and the surface below at the release [m]."""
-OVERTRAVEL = 0.015
-"""Default distance by which a guarded motion continues below the expected surface of an object [m]."""
-PROBE_CLEARANCE = 0.005
-"""Height above the table at which a probe (an approach almost down to the table) ends [m]."""
-ATTEMPTS_BEFORE_PROBE = 3
-"""Number of failed attempts after which each approach is a probe."""
-SPIRAL_SPACING = 0.0025
-"""Default scale of the Vogel spiral on which the contact points of the attempts lie [m]."""
 MIN_GAP = 0.02
 """Minimum gap between the object in the tool and other objects after a put-down [m]."""
 GRID_HALF_WIDTH = 2
 """Half width of the grid of candidate positions around `cell.safe_place`, where objects are put down [grid
 steps]."""
-GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
-"""Angle between two successive points of a Vogel spiral [rad]."""
 
 
 def list_obstacles(cell: Cell, excluded_item: Item | None = None) -> tuple[Obstacle, ...]:
@@ -115,79 +105,27 @@ def _list_bin_obstacles(cell: Cell, excluded_item: Item | None) -> Iterator[Obst
             yield Obstacle(float(x), float(y), radius, top, f"the objects in slot {index + 1} of {bin_name}")
 
 
-def make_approach(
-    cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = SPIRAL_SPACING
-) -> tuple[Goal, Task]:
-    """Return goal and task of an approach to a target; the arm stops on contact in the last, guarded part.
-
-    The whole guarded part is slow until a touch confirms the height of the class.
-
-    Each attempt has another horizontal offset. After `ATTEMPTS_BEFORE_PROBE` failed attempts, the motion ends
-    `PROBE_CLEARANCE` above the table, because the item may be a false detection.
+def choose_grasp(
+    cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = CONTACT_SPACING
+) -> tuple[Grasp, Task]:
+    """Return the best grasp of a target, and the task of the approach; each attempt has another grasp.
 
     Args:
         cell: The work cell.
-        target: Target to touch.
-        overtravel: Continuation below the expected surface [m], at most half the height of the object.
-        spacing: Scale of the spiral of contact points [m].
+        target: Target to grasp.
+        overtravel: Distance by which a guarded motion continues below the expected surface [m].
+        spacing: Distance between the contact points of repeated attempts [m].
     """
-    is_height_confirmed = cell.ledger.is_height_confirmed(target.label)
-    goal = make_object_goal(
-        cell.classes[target.label], target.position, cell.descent, cell.descent_speed,
-        slow_descent=cell.slow_descent if is_height_confirmed else cell.descent,
-        failed_attempts=cell.ledger.describe(target.item).attempts, overtravel=overtravel, spacing=spacing,
-    )  # fmt: skip
-    return goal, Task(obstacles=list_obstacles(cell, target.item), target=make_obstacle(cell, target))
-
-
-def make_object_goal(
-    object_class: ObjectClass,
-    position: Array,
-    descent: float,
-    descent_speed: float,
-    *,
-    slow_descent: float = math.inf,
-    failed_attempts: int = 0,
-    overtravel: float = OVERTRAVEL,
-    spacing: float = SPIRAL_SPACING,
-) -> Goal:
-    """Return the goal of an approach to an object.
-
-    Args:
-        object_class: Class of the object.
-        position: Centre of the object `(3,)` [m].
-        descent: Height above the expected surface at which the guarded part begins [m].
-        descent_speed: Tool speed in the slow part of the guarded part [m/s].
-        slow_descent: Height above the expected surface from which the guarded part is slow [m]. After a
-            failed attempt, the whole guarded part is slow, because the expected height may be wrong.
-        failed_attempts: Number of failed attempts before this approach.
-        overtravel: Distance that the motion continues below the expected surface [m].
-        spacing: Scale of the spiral of contact points [m].
-    """
-    x, y, z = map(float, position)
-    # After n failed attempts, the contact point on a solid object lies on a Vogel spiral, at the distance
-    # spacing * sqrt(n) and the angle n * GOLDEN_ANGLE; on an object with a hole, it lies on the ring.
-    angle = failed_attempts * GOLDEN_ANGLE
-    distance = object_class.contact_radius or spacing * math.sqrt(failed_attempts)
-    contact_x = x + distance * math.cos(angle)
-    contact_y = y + distance * math.sin(angle)
-    end_height = compute_min_contact_height(object_class, z, overtravel)
-    if failed_attempts >= ATTEMPTS_BEFORE_PROBE:
-        end_height = min(end_height, z - object_class.height / 2 + PROBE_CLEARANCE)
-    guarded_length = z + object_class.height / 2 + descent - end_height
-    fast_length = 0.0 if failed_attempts else max(0.0, descent - slow_descent)
-    return Goal((contact_x, contact_y, end_height), None, guarded_length, descent_speed, fast_length)
-
-
-def compute_min_contact_height(object_class: ObjectClass, centre_height: float, overtravel: float) -> float:
-    """Return the minimum height of a contact with an object [m]; a lower contact misses the object.
-
-    Args:
-        object_class: Class of the object.
-        centre_height: Height of the centre of the object [m].
-        overtravel: Distance that the motion continues below the expected surface [m].
-    """
-    return max(centre_height + object_class.height / 2 - overtravel, centre_height)
+    grasp = cell.tool_model.list_grasps(
+        cell.classes[target.label],
+        target.position,
+        cell.motion,
+        attempt=cell.ledger.describe(target.item).attempts,
+        is_confirmed=cell.ledger.is_confirmed_by_tool(target.label),
+        overtravel=overtravel,
+        spacing=spacing,
+    )[0]
+    return grasp, Task(obstacles=list_obstacles(cell, target.item), target=make_obstacle(cell, target))
 
 
 def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]:
@@ -248,26 +186,26 @@ def explain_uncertain_bin(cell: Cell, bin_name: str, item: Item) -> str:
 def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
     """Return the tool goal at which `item` is `drop_height` [m] above the next slot of a bin."""
     next_slot_index = predict_next_slot_index(cell, bin_name, item)
-    height = cell.classes[cell.ledger.get_label(item)].height
+    hold_height = cell.tool_model.get_hold_height(cell.classes[cell.ledger.get_label(item)])
     max_height = find_max_object_height(cell)
-    return make_slot_goal(cell.bins[bin_name], next_slot_index, height, max_height, drop_height)
+    return make_slot_goal(cell.bins[bin_name], next_slot_index, hold_height, max_height, drop_height)
 
 
 def make_slot_goal(
-    bin: Bin, slot_index: int, height: float, max_object_height: float, drop_height: float = DROP_HEIGHT
+    bin: Bin, slot_index: int, hold_height: float, max_object_height: float, drop_height: float = DROP_HEIGHT
 ) -> Goal:
     """Return the goal of a transit to a position above the next slot of a bin.
 
     Args:
         bin: The bin.
         slot_index: Index of the next slot; a new layer begins after the last slot of the bin.
-        height: Height of the object in the tool [m].
+        hold_height: Distance from the tool centre point down to the underside of the object [m].
         max_object_height: Height of the tallest class of objects, and thickness of each layer [m].
         drop_height: Height of the object's underside above the layer below, or above the floor [m].
     """
     layer, index_in_layer = divmod(slot_index, len(bin.slots))
     x, y = map(float, bin.slots[index_in_layer])
-    return Goal((x, y, compute_layer_height(bin, layer, max_object_height) + height + drop_height))
+    return Goal((x, y, compute_layer_height(bin, layer, max_object_height) + hold_height + drop_height))
 
 
 def make_put_down_goal(cell: Cell, object_class: ObjectClass, drop_height: float, item: Item | None) -> Goal:
@@ -282,7 +220,7 @@ def make_put_down_goal(cell: Cell, object_class: ObjectClass, drop_height: float
     sorted_offsets = sorted(product(offsets, offsets), key=lambda offset: math.hypot(*offset))
     candidates = ((x + dx, y + dy) for dx, dy in sorted_offsets)
     free_positions = (xy for xy in candidates if _is_free(cell, xy, object_class.radius + MIN_GAP, item))
-    height = table_height + object_class.height + drop_height
+    height = table_height + cell.tool_model.get_hold_height(object_class) + drop_height
     goals = (Goal((*xy, height)) for xy in free_positions)
     return next((goal for goal in goals if not cell.arm.describe_unreachable(goal)), Goal((x, y, height)))
 

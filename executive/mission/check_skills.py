@@ -9,7 +9,6 @@ from typing import Annotated
 from pydantic import Field, TypeAdapter
 
 from executive.cell.config import CellConfig, ObjectConfig
-from executive.cell.objects import MIN_LIFT_ACCELERATION, SAFETY_FACTOR
 from executive.errors import InputError
 from executive.geometry import GRAVITY
 from executive.manipulation.tool_goals import MAX_ROLL_DISTANCE
@@ -223,18 +222,23 @@ def check_quotas(context: CheckContext) -> Iterator[Finding]:
             yield make_warning(limit.span, "large-quota", message + limit.origin_note, hint)
 
 
-def check_weights(
+def check_loads(
     cell: CellFile, config: CellConfig, mission: Mission, compute_mass: Callable[[ObjectConfig], float] | None
 ) -> Iterator[Finding]:
-    """Yield an error for each routed class that is too heavy for the tool, or a warning if it may be dropped.
+    """Yield an error for each routed class that the tool cannot hold, or a warning if it may be dropped.
 
-    The planner limits the accelerations so that the seal withstands `SAFETY_FACTOR` times the force, but it
-    never lifts with less than `MIN_LIFT_ACCELERATION`. `compute_mass` is that of `CellKind`; if it is None,
-    only classes with a declared mass are checked.
+    The planner limits the accelerations so that the tool holds `safety_factor` times the force on the load,
+    but it never lifts with less than `min_lift_acceleration`. `compute_mass` is that of `CellKind`; if it is
+    None, only classes with a declared mass are checked.
     """
-    force = config.tool.force
+    force = config.tool.max_holding_force
+    safety_factor = config.tool.safety_factor
     for label in sorted(mission.routes.keys() & config.objects.keys()):
         section = config.objects[label]
+        if problem := config.tool.explain_unsuitable(section.build_class(label)):
+            hint = "Delete the route, or use another tool."
+            yield make_error(cell.find_span(("objects", label), at_key=True), "unsuitable", problem, hint)
+            continue
         key = "mass" if section.mass is not None else "urdf" if section.urdf else "mesh"
         span = cell.find_span(("objects", label, key))
         hint = "Correct the mass, delete the route, or use a tool with a larger force."
@@ -245,12 +249,12 @@ def check_weights(
             continue
         problem = f"a {label} of {mass:g} kg"
         weight = mass * GRAVITY
-        pull = mass * (GRAVITY + MIN_LIFT_ACCELERATION)
+        pull = mass * (GRAVITY + config.tool.min_lift_acceleration)
         if weight > force:
             message = f"{problem} weighs {weight:.1f} N, more than the {force:g} N that the tool withstands"
             yield make_error(span, "too-heavy", message, hint)
-        elif pull > force / SAFETY_FACTOR:
-            limit = f"{force:g} N / safety factor {SAFETY_FACTOR:g} = {force / SAFETY_FACTOR:.3g} N"
+        elif pull > force / safety_factor:
+            limit = f"{force:g} N / safety factor {safety_factor:g} = {force / safety_factor:.3g} N"
             message = f"{problem} pulls with {pull:.1f} N in the slowest lift, more than {limit}"
             yield make_warning(span, "too-heavy", message, hint)
 

@@ -277,7 +277,7 @@ def load_mission(
             classes_by_detector = dict(checker.labels(config, folder))
             # The computation would fail for an invalid model.
             compute_mass = None if cell_findings else checker.compute_mass
-            findings += check_skills.check_weights(cell, config, mission, compute_mass)
+            findings += check_skills.check_loads(cell, config, mission, compute_mass)
             findings += check_skills.check_slots(cell, config, mission)
     expansion = expand(mission, skills, _make_predefined_lists(mission, config) if config else {})
     mission = replace(mission, quotas=expansion.quotas)

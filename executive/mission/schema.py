@@ -53,8 +53,11 @@ class Draft07(GenerateJsonSchema):
         """Return the schema of a section of the cell file, without title."""
         section_schema = super().model_schema(schema)
         del section_schema["title"]
-        for name, docstring in find_attribute_docstrings(schema["cls"]).items():
-            section_schema["properties"][name]["description"] = docstring
+        ancestors = reversed(schema["cls"].__mro__[:-1])
+        sections = (each for each in ancestors if issubclass(each, BaseModel) and each is not BaseModel)
+        for section in sections:
+            for name, docstring in find_attribute_docstrings(section).items():
+                section_schema["properties"][name]["description"] = docstring
         return section_schema
 
     def field_title_should_be_set(self, _schema: object) -> bool:

@@ -93,7 +93,7 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
     safe_position = np.array([config.safe_place[:2]])
     places.append((("safe_place",), "the safe place", safe_position, config.safe_place[2]))
     for key_path, place_name, positions, surface_height in places:
-        height = surface_height + config.max_object_height
+        height = surface_height + config.max_hold_height
         approach_height = max(0.0, config.travel_height - height)
         try:
             for x, y in positions.tolist():

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.config import NECK_LENGTH, TOOL_RADIUS, CellConfig
+from executive.cell.config import CellConfig
 from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array, format_point
@@ -55,14 +55,22 @@ class Discs(NamedTuple):
 
 
 def make_tool_discs(config: CellConfig, load: ObjectClass | None) -> Discs:
-    """Return the discs of the tool and its load."""
+    """Return the discs of the tool and its load: one at the lower end of each part, two of the load.
+
+    Parts inside the cylinder of the load have no disc.
+    """
+    parts = config.tool.parts[::-1]
     if load is None:
-        radii = np.array([config.tool.cup_radius, TOOL_RADIUS])
-        return Discs(np.array([0.0, -NECK_LENGTH]), radii, MIN_COSINE_UNLOADED)
+        radii = np.array([part.radius for part in parts])
+        return Discs(np.array([-part.offset for part in parts]), radii, MIN_COSINE_UNLOADED)
     load_radius = load.radius + load.contact_radius + POSITION_TOLERANCE
+    bottom = config.tool.get_hold_height(load)
+    top = bottom - load.height
+    outer_parts = [part for part in parts if -part.offset < top or part.radius > load_radius]
     # The load has a disc at its bottom and one at its top, because the tool may tilt.
-    offsets = np.array([load.height, 0.0, -NECK_LENGTH])
-    return Discs(offsets, np.array([load_radius, load_radius, TOOL_RADIUS]), MIN_COSINE_LOADED)
+    offsets = np.array([bottom, top, *(-part.offset for part in outer_parts)])
+    radii = np.array([load_radius, load_radius, *(part.radius for part in outer_parts)])
+    return Discs(offsets, radii, MIN_COSINE_LOADED)
 
 
 class Prisms(NamedTuple):

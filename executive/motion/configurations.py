@@ -62,7 +62,8 @@ def find_configuration_pairs(
 ) -> ConfigurationPairs:
     """Return all pairs of configurations in the joint range at a goal and `length` [m] above the goal.
 
-    If the yaw of the goal is free, the last joint turns as little as possible from `q_start` `(n,)` [rad].
+    There is a pair for each permitted yaw of the goal. If every yaw is permitted, the last joint turns as
+    little as possible from `q_start` `(n,)` [rad].
 
     Raises:
         Unreachable: No pair is in the joint range; the message states the position and the cause.
@@ -72,10 +73,14 @@ def find_configuration_pairs(
     for angle_step, margin in ((COARSE_ANGLE_STEP, PREFERRED_LIMIT_DISTANCE), (FINE_ANGLE_STEP, 0.0)):
         (upper_qs, _), (lower_qs, branches) = (kinematics.solve_all(p, q_start, angle_step) for p in poses)
         joint_range = kinematics.joint_range.shrink(margin)
-        _turn_last_joint(upper_qs, lower_qs, joint_range, goal.yaw, float(q_start[-1]))
+        pairs_by_yaw = [
+            _turn_last_joint(upper_qs, lower_qs, joint_range, yaw, float(q_start[-1]))
+            for yaw in goal.yaws or (None,)
+        ]
+        upper_qs, lower_qs = map(np.concatenate, zip(*pairs_by_yaw, strict=True))
         is_inside = joint_range.contains(upper_qs) & joint_range.contains(lower_qs)
         if is_inside.any():
-            inside_branches = tuple(branches[index] for index in np.flatnonzero(is_inside))
+            inside_branches = tuple(branches[index % len(branches)] for index in np.flatnonzero(is_inside))
             return ConfigurationPairs(upper_qs[is_inside], lower_qs[is_inside], inside_branches)
     raise _make_unreachable_error(kinematics, poses, (upper_qs, lower_qs))
 
@@ -119,11 +124,13 @@ def _solve_waypoints(kinematics: Kinematics, X_WT: Pose, length: float, branch: 
 
 def _turn_last_joint(
     upper_qs: Array, lower_qs: Array, joint_range: JointRange, yaw: float | None, last_joint_start: float
-) -> None:
-    """Turn the last joint of pairs `(N, n)` [rad] in place, from the yaw 0 of the tool to `yaw` [rad].
+) -> tuple[Array, Array]:
+    """Return pairs `(N, n)` [rad] with the last joint turned from the yaw 0 of the tool to `yaw` [rad].
 
     If `yaw` is None, the last joint gets the position in its range nearest to `last_joint_start` [rad].
     """
+    upper_qs = upper_qs.copy()
+    lower_qs = lower_qs.copy()
     change = wrap_angles(upper_qs[:, -1] - lower_qs[:, -1])
     if yaw is not None:
         lower_qs[:, -1] = wrap_angles(lower_qs[:, -1] - yaw)
@@ -133,6 +140,7 @@ def _turn_last_joint(
         largest = joint_range.upper[-1] - np.maximum(change, 0.0)
         lower_qs[:, -1] = np.clip(last_joint_start, smallest, largest)
     upper_qs[:, -1] = lower_qs[:, -1] + change
+    return upper_qs, lower_qs
 
 
 def _make_unreachable_error(

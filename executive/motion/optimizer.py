@@ -1,6 +1,6 @@
 """Trajectory optimization: the fastest motion between two states that avoids all obstacles.
 
-The load limits the acceleration: the seal of the suction cup must hold with a safety factor.
+The load limits the acceleration: the grip of the tool must hold with a safety factor.
 
 Sequential quadratic programming: each step linearizes the distances of the iterate (the current motion) from
 the obstacles, and finds the fastest motion near the iterate. The initial motion approximates a slow motion
@@ -18,7 +18,8 @@ import numpy as np
 
 from executive.cell.arm import JointState
 from executive.cell.device_config import STEP
-from executive.cell.objects import MIN_LIFT_ACCELERATION, SAFETY_FACTOR, ObjectClass
+from executive.cell.objects import ObjectClass
+from executive.cell.tools import ToolModel
 from executive.geometry import GRAVITY, Array
 from executive.motion.clearance_model import ClearanceModel, NearestPairs
 from executive.motion.configurations import Candidate
@@ -40,7 +41,7 @@ SAMPLE_STRIDE = 4
 _SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])  # Product with three samples: acceleration * sample_time²
 _FINITE_DIFFERENCE_STEP = 1e-4  # [rad]
 MIN_ACCELERATION_FRACTION = 0.2
-"""Minimum fraction of the planned accelerations after a slowdown, even if the seal withstands less."""
+"""Minimum fraction of the planned accelerations after a slowdown, even if the tool holds with less force."""
 MAX_SLACK = 0.03
 """Constraints with a larger slack are left out of a quadratic program [m]."""
 INITIAL_TRUST_RADIUS = 0.3
@@ -58,20 +59,22 @@ CONVERGENCE_TOLERANCE = 2e-3
 
 
 class PayloadLimit:
-    """Acceleration limit of a load, whose seal must withstand weight and inertia with the safety factor.
+    """Acceleration limit of a load: the grip must withstand weight and inertia with the safety factor.
 
-    The force on the seal is `m |a + g|`, with the mass `m` of the load, the acceleration `a` of its centre,
+    The force on the grip is `m |a + g|`, with the mass `m` of the load, the acceleration `a` of its centre,
     and `g` = 9.81 m/s² upwards.
 
     Attributes:
         max_lift_acceleration: Maximum upward acceleration [m/s²].
     """
 
-    def __init__(self, load: ObjectClass, holding_force: float, kinematics: Kinematics) -> None:
+    def __init__(
+        self, load: ObjectClass, holding_force: float, tool: ToolModel, kinematics: Kinematics
+    ) -> None:
         # Maximum of |a + g| [m/s²].
-        self._max_specific_force = holding_force / SAFETY_FACTOR / load.mass
-        self.max_lift_acceleration = max(self._max_specific_force - GRAVITY, MIN_LIFT_ACCELERATION)
-        self._centre_offset = load.height / 2
+        self._max_specific_force = holding_force / tool.safety_factor / load.mass
+        self.max_lift_acceleration = max(self._max_specific_force - GRAVITY, tool.min_lift_acceleration)
+        self._centre_offset = tool.get_hold_height(load) - load.height / 2
         self._kinematics = kinematics
 
     def find_acceleration_fraction(self, trajectory: Trajectory) -> float:
@@ -97,7 +100,7 @@ class PayloadLimit:
         return trajectory if fraction >= 1 else trajectory.make_slower_copy(speed_factor)
 
     def linearize(self, qs: Array, sample_time: float, max_slack: float) -> LinearizedConstraints:
-        """Return the constraints that keep the seal closed, linearized about a motion.
+        """Return the constraints that keep the load in the tool, linearized about a motion.
 
         Args:
             qs: Samples of the joint positions `(M, n)` [rad] of the motion, without start and end.

@@ -1,6 +1,6 @@
 """Motion planner: motions from rest to rest, as fast as the limits allow, without collision.
 
-The planner chooses the branch of the inverse kinematics and, if the yaw of the goal is free, the final yaw.
+The planner chooses the branch of the inverse kinematics and, among the permitted ones, the final yaw.
 The planner prefers the direct motion, and optimizes a detour if an obstacle blocks the direct motion. Each
 motion is checked for collisions, optionally in a more exact model. The search has a maximum number of steps
 instead of a timeout, so that equal queries have equal results.
@@ -61,7 +61,7 @@ class Planner:
         """Return a fast motion from rest at `q_start` `(n,)` [rad] to a goal or to joint positions `(n,)`.
 
         The motion is the first one of the search that passes all checks. With a load, it is then slowed down
-        until the seal of the load holds.
+        until the tool holds the load.
 
         Raises:
             Unreachable: The goal has no joint solution inside the limits.

@@ -93,7 +93,9 @@ class MotionSearch:
         tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, end_tcp_and_axis, strict=True))
         clearance = ClearanceModel(config, task.obstacles, tcps[:, :2], discs)
         clearance.relax_end_margins(tcps, axes)
-        payload = PayloadLimit(task.load, task.holding_force, kinematics) if task.load else None
+        payload = None
+        if task.load is not None:
+            payload = PayloadLimit(task.load, task.holding_force, config.tool, kinematics)
         self._departure = departure = self._plan_departure(start, float(tcps[0, 2]), payload)
         free_start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
         self.problem = MotionProblem(free_start, Connector(limits), kinematics, clearance, payload)
@@ -274,8 +276,8 @@ class MotionSearch:
     ) -> CartesianLine | None:
         """Return the straight motion upwards from the start, or None if the free part begins at the start.
 
-        The cell file may require a straight departure. If the seal of a load permits less acceleration than
-        the joints, the load also departs straight, because contact with the support could break the seal.
+        The cell file may require a straight departure. If the grip of a load permits less acceleration than
+        the joints, the load also departs straight, because contact with the support could break the grip.
         """
         length = self._straight_part_length or (LIFT_OFF_DISTANCE if payload else 0.0)
         if not length or height + length > self._travel_height:

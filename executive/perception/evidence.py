@@ -1,4 +1,4 @@
-"""Evidence about a detected class: height of a touch, weight, height in the depth image, size of the box.
+"""Evidence about a detected class: weight, height in the depth image, size of the box.
 
 An object may stand on the table or on one object of any class. In the functions, `label` is the assumed class
 of the object, and `classes` contains the classes of the cell by label.
@@ -12,17 +12,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from executive.cell.frame import Box, Detection, Frame
-from executive.cell.objects import ObjectClass
+from executive.cell.objects import ObjectClass, list_top_heights
 from executive.errors import NoDepth
 from executive.geometry import GRAVITY, Array
 from executive.perception.camera_model import measure_top_height, project
 
-MAX_TOUCH_HEIGHT_ERROR = 0.003
-"""Maximum difference between the height of a touch and the height of a class [m]; 52 touches of the mission
-`sort_overhead` had errors of at most 0.4 mm."""
-OTHER_CLASS_TOLERANCE = 0.0025
-"""Maximum difference between the height of a touch and the height of another class to which the object may
-belong [m]."""
 TOP_TOLERANCE = 0.012
 """Maximum difference between the height of an object's top in the depth image and an expected height [m].
 
@@ -31,7 +25,7 @@ objects had a mean error of 2.1 mm and a maximum error of 10.1 mm. The tops of 2
 contradicted the detected class.
 """
 MAX_WEIGHT_OF_UNDECLARED_CLASS = 10.0
-"""Maximum weight of an object of no declared class [N], of the order of the breakaway force of the cups."""
+"""Maximum weight of an object of no declared class [N], of the order of the holding force of tools."""
 REFERENCE_DISTANCE = 1.2
 """Maximum distance from the camera at which `TOP_TOLERANCE` applies [m].
 
@@ -50,16 +44,6 @@ def describe_unknown_labels(counts: Mapping[str, int]) -> str:
     """Return a text with the number of boxes of each unknown label: `unknown: rubber-duck ×2`; "" if none."""
     labels = ", ".join(f"{label} ×{count}" for label, count in counts.items())  # noqa: RUF001
     return f"unknown: {labels}" if labels else ""
-
-
-def describe_touch_contradiction(label: str, height: float, classes: Mapping[str, ObjectClass]) -> str:
-    """Return a sentence on the contradiction between a touch at `height` [m] and a class; "" if none."""
-    if abs(_compute_height_error(label, height, classes)) <= MAX_TOUCH_HEIGHT_ERROR:
-        return ""
-    return (
-        f"it was touched {height * 1000:.0f} mm above the table, and a {label} is "
-        f"{classes[label].height * 1000:.0f} mm high"
-    )
 
 
 def compute_weight_log_ratios(
@@ -93,28 +77,6 @@ def describe_weight(weight: float, label: str, classes: Mapping[str, ObjectClass
     return f"it weighs {weight:.2f} N; expected: {weights}"
 
 
-def find_classes_distinct_by_touch(classes: Mapping[str, ObjectClass]) -> frozenset[str]:
-    """Return the classes whose height differs by more than `MAX_TOUCH_HEIGHT_ERROR` from all others."""
-    heights = np.array([object_class.height for object_class in classes.values()])
-    counts = (np.abs(heights[:, None] - heights) <= MAX_TOUCH_HEIGHT_ERROR).sum(axis=1)
-    return frozenset(label for label, count in zip(classes, counts, strict=True) if count == 1)
-
-
-def may_have_missed_top(label: str, height: float, classes: Mapping[str, ObjectClass]) -> bool:
-    """Return True if a touch may have missed the top of an object, and hit the object below the top.
-
-    This is possible if the touch at `height` [m] is too low for the assumed class, and no class has this
-    height.
-    """
-    errors = {name: _compute_height_error(name, height, classes) for name in classes}
-    return errors[label] < 0 and all(abs(error) > OTHER_CLASS_TOLERANCE for error in errors.values())
-
-
-def _compute_height_error(label: str, height: float, classes: Mapping[str, ObjectClass]) -> float:
-    """Return `height` [m] minus the nearest possible height of the top of an object of a class."""
-    return min((height - top for top in _list_top_heights(label, classes)), key=abs)
-
-
 def describe_top_contradiction(
     detection: Detection, position: Array, frame: Frame, classes: Mapping[str, ObjectClass]
 ) -> str:
@@ -133,7 +95,7 @@ def describe_top_contradiction(
         top = measure_top_height(detection, frame)
     except NoDepth:
         return ""
-    top_heights = _list_top_heights(detection.label, classes)
+    top_heights = list_top_heights(detection.label, classes)
     tolerance = TOP_TOLERANCE * max(1.0, (frame.compute_depth(position) / REFERENCE_DISTANCE) ** 2)
     if min(abs(top - height) for height in top_heights) <= tolerance:
         return ""
@@ -142,12 +104,6 @@ def describe_top_contradiction(
         f"its top is {top * 1000:.0f} mm above the table, and the top of a {detection.label} is at "
         f"{', '.join(lower)} or {highest} mm"
     )
-
-
-def _list_top_heights(label: str, classes: Mapping[str, ObjectClass]) -> list[float]:
-    """Return all possible heights above the table [m] of the top of an object of a class, ascending."""
-    support_heights = {0.0, *(object_class.height for object_class in classes.values())}
-    return sorted(classes[label].height + support_height for support_height in support_heights)
 
 
 def describe_size_contradiction(

@@ -16,7 +16,7 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.arm_config import TOOL_LINK
-from executive.cell.config import NECK_LENGTH, TOOL_RADIUS, BinConfig, CellConfig
+from executive.cell.config import BinConfig, CellConfig
 from executive.cell.device_config import STEP
 from executive.cell.objects import BIN_THICKNESS
 from executive.geometry import Array, Pose
@@ -30,6 +30,33 @@ CYLINDER_MARGIN = 0.001
 """Collision margin that Bullet adds on all sides to a cylinder of a URDF [m]."""
 TOOL_MASS = 0.1
 """Mass of the tool [kg]."""
+TOOL_URDF = Template("""
+  <link name="tool">
+    <inertial>
+      <origin xyz="0 0 $centre"/>
+      <mass value="$mass"/>
+      <inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-5"/>
+    </inertial>$parts
+  </link>
+  <joint name="tool_joint" type="fixed">
+    <parent link="$flange_link"/>
+    <child link="tool"/>
+    <origin xyz="0 0 $flange_offset"/>
+  </joint>
+</robot>
+""")
+"""End of the URDF of an arm, with the tool."""
+TOOL_PART_URDF = Template("""
+    <visual>
+      <origin xyz="0 0 $centre"/>
+      <geometry><cylinder length="$length" radius="$radius"/></geometry>
+      <material name="Grey"/>
+    </visual>
+    <collision>
+      <origin xyz="0 0 $centre"/>
+      <geometry><cylinder length="$collision_length" radius="$collision_radius"/></geometry>
+    </collision>""")
+"""Cylinder of a tool in `TOOL_URDF`."""
 # Indices of values in a contact point or closest point of PyBullet, for a query with the bodies A and B.
 BODY_B = 2
 LINK_A = 3
@@ -107,7 +134,7 @@ class CellWorld:
         return Pose.of(*state[4:6]) @ Pose.of([0, 0, self.config.arm.flange.offset])
 
     def get_tool_pose(self) -> Pose:
-        """Return `X_WT`, the pose of the tool centre point: the centre of the lip of the cup."""
+        """Return `X_WT`, the pose of the tool centre point."""
         return self.get_flange_pose() @ Pose.of([0, 0, self.config.tool.length])
 
     def close(self) -> None:
@@ -123,18 +150,24 @@ class CellWorld:
         path = find_model(self.config.arm.urdf)
         text = path.read_text().replace('filename="meshes/', f'filename="{path.parent}/meshes/')
         tool = self.config.tool
-        values: dict[str, Any] = {"centre": tool.length / 2, "mass": TOOL_MASS}
-        shaft_length = tool.length - NECK_LENGTH
-        for part, length, radius, centre in (
-            ("shaft", shaft_length, TOOL_RADIUS, shaft_length / 2),
-            ("neck", NECK_LENGTH, tool.cup_radius, tool.length - NECK_LENGTH / 2),
-        ):
-            values |= {f"{part}_length": length, f"{part}_radius": radius, f"{part}_centre": centre}
-            values[f"{part}_collision_length"] = length - 2 * CYLINDER_MARGIN
-            values[f"{part}_collision_radius"] = radius - CYLINDER_MARGIN
-        values |= {"flange_link": self.config.arm.flange.link, "flange_offset": self.config.arm.flange.offset}
-        template = Template(Path(__file__).with_name("tool.urdf").read_text())
-        text = text.replace("</robot>", template.substitute(values))
+        parts = "".join(
+            TOOL_PART_URDF.substitute(
+                centre=tool.length - part.offset - part.length / 2,
+                length=part.length,
+                radius=part.radius,
+                collision_length=part.length - 2 * CYLINDER_MARGIN,
+                collision_radius=part.radius - CYLINDER_MARGIN,
+            )
+            for part in tool.parts
+        )
+        urdf = TOOL_URDF.substitute(
+            centre=tool.length / 2,
+            mass=TOOL_MASS,
+            parts=parts,
+            flange_link=self.config.arm.flange.link,
+            flange_offset=self.config.arm.flange.offset,
+        )
+        text = text.replace("</robot>", urdf)
         with tempfile.TemporaryDirectory() as folder:
             urdf_path = Path(folder) / "arm_with_tool.urdf"
             urdf_path.write_text(text)

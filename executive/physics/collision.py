@@ -203,7 +203,8 @@ class ClearanceChecker:
         client.resetJointStatesMultiDof(world.arm, range(len(q)), [[angle] for angle in q])
         if load is not None:
             flange = client.getLinkState(world.arm, world.flange_index, computeForwardKinematics=True)[4:6]
-            offset = world.config.arm.flange.offset + world.config.tool.length + load.height / 2
+            offset = world.config.arm.flange.offset + world.config.tool.length
+            offset += world.config.tool.get_hold_height(load) - load.height / 2
             load_pose = client.multiplyTransforms(*flange, [0, 0, offset], [0, 0, 0, 1])
             client.resetBasePositionAndOrientation(self._get_load_body(load), *load_pose)
 

@@ -26,7 +26,7 @@ from executive.ledger.certainty import is_balanced
 from executive.ledger.tracker import Tracker
 from executive.manipulation.motions import make_transport_task
 from executive.manipulation.tool_goals import (
-    make_approach,
+    choose_grasp,
     make_bin_goal,
     sort_by_tour,
     sort_pickable_targets,
@@ -397,7 +397,8 @@ class LookaheadPlanner:
             self._change_tick = None
             pickable_targets = sort_pickable_targets(cell, cell.ledger.find_targets())
             if targets := sort_by_tour(cell, pickable_targets):
-                cell.arm.plan_ahead(*make_approach(cell, targets[0]))
+                grasp, task = choose_grasp(cell, targets[0])
+                cell.arm.plan_ahead(grasp.goal, task)
 
     def _is_moving_to_bin(self) -> bool:
         destination = self._cell.arm.destination

@@ -87,7 +87,7 @@ class CellCamera:
         self._size = (self.config.width, self.config.height)
         self._link_radius = config.arm.simulation.link_radius
         self._load_radius = max(section.radius for section in config.objects.values()) + MAX_LOAD_OFFSET
-        self._load_height = config.max_object_height
+        self._load_height = config.max_hold_height
         heights = (0.0, config.max_pile_height)
         self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
         self._frame_count = 0

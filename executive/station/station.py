@@ -126,7 +126,15 @@ class Station:
         classes = {label: section.build_class(label) for label, section in config.objects.items()}
         ignored_labels = set(config.unknown.ignore).difference(classes)
         self.ledger = Tracker(
-            config.ledger, config.table, bins, classes, self.routes, options.quotas, emit, ignored_labels
+            config.ledger,
+            config.table,
+            bins,
+            classes,
+            self.routes,
+            options.quotas,
+            emit,
+            ignored_labels,
+            config.tool.find_distinct_labels(classes),
         )
         # In a replay, the border needs none of these parts, because all values come from the record.
         clock: Any = None
@@ -196,9 +204,8 @@ class Station:
             routes=self.routes,
             localizer=self.border.wrap("localizer", localizer),
             safe_place=np.array(config.safe_place),
-            descent=config.motion.descent,
-            slow_descent=config.motion.slow_descent,
-            descent_speed=config.motion.descent_speed,
+            tool_model=config.tool,
+            motion=config.motion,
             report_selection=lambda target, bin: emit(
                 TargetSelected(target.item, target.label, target.frame, bin)
             ),

@@ -20,6 +20,7 @@ import numpy as np
 from executive.cell.device_config import STEP
 from executive.cell.frame import Detections
 from executive.cell.objects import Item, Target
+from executive.cell.tools import Measurement
 from executive.manipulation.motions import capture_and_detect, complete, localize_and_observe
 from executive.mission.ports import describe_type, find_element_type, is_assignable
 from executive.skill import ANY, EMPTY, HALT, HOLDING, Direction, Param, Port, Skill
@@ -46,8 +47,8 @@ _MEASUREMENTS = ("camera.capture", "operator.ask")
 _QUERY_PREFIXES = ("is_", "find_", "get_", "count_", "describe", "sees_")
 """First letters of the methods of the cell that change nothing, so that a condition may call them."""
 _FAULTS = (
-    ("tool", "while the tool cannot hold", faults.after(0.0, faults.seal_fails())),
-    ("tool", "while the held object falls", faults.after(0.0, faults.seal_breaks(None))),
+    ("tool", "while the tool cannot hold", faults.after(0.0, faults.grip_fails())),
+    ("tool", "while the held object falls", faults.after(0.0, faults.grip_lost(None))),
     ("arm", "while the arm collides", faults.after(0.0, faults.arm_collides())),
     ("arm", "while no path is found", faults.after(0.0, faults.no_path())),
     ("camera", "while no detector answers", faults.after(0.0, faults.detector_dead())),
@@ -175,7 +176,7 @@ def _build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
         fake.arm.set_tool_position(first.position + offset)
     if is_holding:
         fake.tool.close()
-        fake.ledger.record_touch(first.item)
+        fake.ledger.record_measurement(first.item, Measurement())
         fake.ledger.record_grasp(first.item)
         detections, targets = _detect_targets(fake)
     item = first.item if skill.tool_state[0] is HOLDING else targets[0].item

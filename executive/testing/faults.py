@@ -2,7 +2,7 @@
 
 Examples of faults in a script for `run_mission(faults=[...])`:
 
-* The second grasp fails: `during("*/Grasp", seal_fails(), activations=2)`
+* The second grasp fails: `during("*/Grasp", grip_fails(), activations=2)`
 * The detector does not answer from 4 s to 9 s: `between(4.0, 9.0, detector_hangs())`
 * The object nearest to the tool is removed at 12 s: `after(12.0, object_removed("nearest"))`
 
@@ -67,9 +67,9 @@ def after(start: float, effect: Effect) -> ScheduledFault:
     return between(start, math.inf, effect)
 
 
-def seal_fails() -> Effect:
-    """Return an effect: the cup cannot seal, and `Grasp` fails with `missed`; held objects stay held."""
-    return Effect("seal_fails", interceptors={"close": _return_constant}, arguments=(None,))
+def grip_fails() -> Effect:
+    """Return an effect: the tool cannot grip, and `Grasp` fails with `missed`; held objects stay held."""
+    return Effect("grip_fails", interceptors={"close": _return_constant}, arguments=(None,))
 
 
 def workspace_occluded() -> Effect:
@@ -93,12 +93,12 @@ def _return_constant(proceed: Callable[[], object], occurrence: Occurrence, answ
     return answer
 
 
-def object_unsealable(choice: ObjectChoice) -> Effect:
-    """Return an effect: the cup cannot seal on one object, and `Grasp` fails with `missed` on this object."""
-    return Effect("seal_fails", interceptors={"close": _prevent_seal}, arguments=(choice,))
+def object_ungrippable(choice: ObjectChoice) -> Effect:
+    """Return an effect: the tool cannot grip one object, and `Grasp` fails with `missed` on this object."""
+    return Effect("grip_fails", interceptors={"close": _prevent_grip}, arguments=(choice,))
 
 
-def _prevent_seal(proceed: Callable[[], None], occurrence: Occurrence, choice: ObjectChoice) -> None:
+def _prevent_grip(proceed: Callable[[], None], occurrence: Occurrence, choice: ObjectChoice) -> None:
     chosen_object = occurrence.find_object(choice)
     touched_object = occurrence.find_object("nearest")
     if chosen_object and touched_object and chosen_object.body == touched_object.body:
@@ -153,9 +153,9 @@ def _collide_arm(occurrence: Occurrence, obstacle: str) -> bool:
     return True
 
 
-def seal_breaks(fraction: float | None = 0.5) -> Effect:
-    """Return an effect: the seal breaks once, the object falls, and `Transit` fails with `dropped`."""
-    return Effect("seal_breaks", _change_object, arguments=("held", WorldAccess.release), fraction=fraction)
+def grip_lost(fraction: float | None = 0.5) -> Effect:
+    """Return an effect: the tool loses its object once, and `Transit` fails with `dropped`."""
+    return Effect("grip_lost", _change_object, arguments=("held", WorldAccess.release), fraction=fraction)
 
 
 def object_removed(choice: ObjectChoice = "node", fraction: float | None = None) -> Effect:

@@ -22,7 +22,7 @@ _ROLES = ("arm", "tool", "camera", "ledger", "localizer", "operator")
 """Parts of a cell whose accesses tests observe, beside the detectors."""
 _LOGGED_CALLS = frozenset({
     "arm.plan", "arm.plan_ahead", "arm.start", "arm.stop", "tool.close", "tool.open", "detector.request",
-    "camera.capture", "camera.next_pose", "operator.ask", "ledger.observe", "ledger.record_touch",
+    "camera.capture", "camera.next_pose", "operator.ask", "ledger.observe", "ledger.record_measurement",
     "ledger.record_failed_pick", "ledger.record_grasp", "ledger.record_drop", "ledger.record_placement",
     "ledger.record_put_down", "ledger.reject", "ledger.defer", "ledger.invalidate_positions",
 })  # fmt: skip

@@ -152,13 +152,13 @@ def _make_finding(root: YamlNode, model: type[BaseModel], error: ErrorDetails) -
     key = path[-1] if path else ""
     owner = join_keys(parent) or "the file"
     if error_type == "extra_forbidden":
-        allowed_keys = getattr(_find_type(model, parent), "model_fields", ())
+        allowed_keys = getattr(_find_type(model, parent, root), "model_fields", ())
         hint = suggest_choice(str(key), allowed_keys, f"Keys of {owner}")
         span = find_span(root, path, at_key=True)
         return make_error(span, "unknown-key", f'{owner} has no key "{key}"', hint)
     if error_type == "missing" and isinstance(key, int):
         # The declared type is a tuple, whose type arguments are the types of its values.
-        length = len(get_args(_find_type(model, parent)))
+        length = len(get_args(_find_type(model, parent, root)))
         message = f"{owner} needs {length} values, not {len(error['input'])}"
         return make_error(find_span(root, parent), "wrong-length", message)
     if error_type == "missing":
@@ -172,9 +172,13 @@ def _make_finding(root: YamlNode, model: type[BaseModel], error: ErrorDetails) -
     return make_error(find_span(root, path), code, f"{name} {describe_validation_error(error)}")
 
 
-def _find_type(model: object, path: KeyPath) -> object:
-    """Return the declared type of the value at `path`, or None if the type is unknown."""
+def _find_type(model: object, path: KeyPath, root: YamlNode) -> object:
+    """Return the type of the value at `path` below `root`, or None if the type is unknown.
+
+    The function `select_class` of a declared type returns the class of the section that is its argument.
+    """
     declared_type: object = model
+    value = root.python_value
     for key in path:
         if isinstance(declared_type, type) and issubclass(declared_type, BaseModel):
             field = declared_type.model_fields.get(str(key))
@@ -185,6 +189,10 @@ def _find_type(model: object, path: KeyPath) -> object:
             declared_type = get_args(declared_type)[0]
         else:
             return None
+        value = value.get(str(key)) if isinstance(value, dict) else None
+        select_class = getattr(declared_type, "select_class", None)
+        if select_class is not None and isinstance(value, dict):
+            declared_type = select_class(value)
     return declared_type
 
 

@@ -16,7 +16,6 @@ from executive.cell.config import CellConfig
 from executive.drivers.sim.camera import Image, Light, render
 from executive.drivers.sim.rebuild import WorldRebuilder
 from executive.drivers.sim.scene import build_world_of_run
-from executive.drivers.sim.tool import SuctionTool
 from executive.drivers.world_log import RUN_STEP, read_commands
 from executive.errors import InputError, explain_os_errors
 from executive.geometry import Array, Pose
@@ -111,7 +110,7 @@ def _render_pictures(
     viewpoint = _compute_viewpoint(config)
     world, _ = build_world_of_run(config, seed, find_recorded_options(directory.path))
     try:
-        rebuilder = WorldRebuilder(world, SuctionTool(world, config.tool))
+        rebuilder = WorldRebuilder(world, config.tool.build_sim(world))
         for command in read_commands(directory.world_log):
             if command.kind == RUN_STEP and rebuilder.step_count % steps_per_picture == 0:
                 yield rebuilder.step_count, render(world, *viewpoint, (0, 0, *PICTURE_SIZE), Light()).image

@@ -88,7 +88,7 @@ class Parts:
             return False
         number = next(index for index, one in enumerate(context.world.objects) if one.body == held.body)
         if number in self.heavy or (number in self.slippery and self.rng.random() < 0.01):
-            context.world.cell.tool.break_seal()
+            context.world.cell.tool.lose_grip()
         return False
 
 

@@ -16,14 +16,13 @@ from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass, Obstacle
 from executive.drivers.sim.models import build_simulated_class, load_mesh
 from executive.drivers.sim.scene import spawn_objects
-from executive.drivers.sim.tool import TOUCH_DISTANCE, compute_breakaway_force, measure_contact
 from executive.drivers.sim.world import World
 from executive.errors import InputError, Unreachable
 from executive.geometry import make_tool_down_pose
-from executive.manipulation.tool_goals import make_object_goal, make_slot_goal
+from executive.manipulation.tool_goals import make_slot_goal
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.planner import Planner
-from executive.physics.collision import ClearanceChecker
+from executive.tools.suction import compute_breakaway_force, measure_contact
 
 MAX_TRIES = 50
 """Maximum number of scenes drawn to find one whose object can be held and reached."""
@@ -51,7 +50,7 @@ class Scene:
         breakaway_force: Breakaway force of a seal on the object [N].
         target: The object to pick, at its true position.
         others: The other objects on the table, at their true positions.
-        approach: Goal of the motion onto the object, equal to that of `tool_goals.approach`.
+        approach: Goal of the motion onto the object, equal to that of `tool_goals.choose_grasp`.
         drop: Goal of the motion into the bin, equal to that of `tool_goals.into` for an empty bin.
     """
 
@@ -131,12 +130,11 @@ class SceneGenerator:
         kind = self._kind(first)
         target, *others = (self._make_obstacle(body, number) for number, body in enumerate(bodies, start=1))
         centre = np.array([target.x, target.y, target.top - kind.height / 2])
-        approach = make_object_goal(
-            kind, centre, motion.descent, motion.descent_speed, slow_descent=motion.slow_descent
-        )
+        tool = self._cell.tool
+        approach = tool.list_grasps(kind, centre, motion, is_confirmed=True)[0].goal
         surface, force = self._measure_seal(first, approach.position[:2], target.top)
         drop = make_slot_goal(bin, slot, kind.height, self._tallest)
-        return Scene(first, kind, surface + TOUCH_DISTANCE, force, target, tuple(others), approach, drop)
+        return Scene(first, kind, surface + tool.touch_distance, force, target, tuple(others), approach, drop)
 
     def _make_obstacle(self, body: int, number: int) -> Obstacle:
         """Return an object as an obstacle at the centre of the bounding box of its outline from above."""

@@ -15,11 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from executive.cell.config import CellConfig
-from executive.cell.device_config import ToolConfig
 from executive.drivers.sim.models import load_mesh
-from executive.drivers.sim.tool import compute_breakaway_force, measure_contact
 from executive.drivers.sim.world import World
 from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
+from executive.tools.suction import Suction, compute_breakaway_force, measure_contact
 from tests.benchmarks.report import Figures, run_command
 
 SHIPPED_MAP = Path(__file__).with_name("suction_map.csv")
@@ -101,7 +100,7 @@ def _find_places(cell: CellConfig, label: str, offset: float) -> Iterator[Array]
             yield R_WO.T @ (aim_W + reach * np.array([math.cos(angle), math.sin(angle)]))
 
 
-def _measure_places(world: World, body: int, tool: ToolConfig, places: Iterable[Array]) -> Figures:
+def _measure_places(world: World, body: int, tool: Suction, places: Iterable[Array]) -> Figures:
     """Return quantiles of rim gap [m], tilt [rad] and breakaway force [N], and the share of good seals.
 
     The gap is infinite beside the object; a seal is good if it bears the tool's `min_force`.

@@ -90,7 +90,7 @@ def test_every_reason_and_bug_of_every_node_is_listed_and_so_are_faults_of_parts
     assert kinds >= {
         *(("detector", f"{kind} for {time} s") for kind in ("hangs", "dead", "unsure") for time in (0.5, 5)),
         ("object", "object_removed"), ("object", "object_moved"), ("Approach", "target: object_removed"),
-        ("Transit", "seal breaks"), ("tool", "no seal for 5 s"), ("tool", "no seal on an object"),
+        ("Transit", "grip lost"), ("tool", "no grip for 5 s"), ("tool", "no grip on an object"),
     }  # fmt: skip
     middle = {fault.name.split()[0] for fault in campaign.faults if fault.occasion == "middle"}
     assert {"Grasp", "Transit", "Approach", "detector"} <= middle
@@ -103,7 +103,7 @@ def test_a_reason_is_caused_in_the_cell_or_else_by_the_skill(campaign: Campaign)
             assert [getattr(previous, name) for name in same] == [getattr(fault, name) for name in same]
             assert isinstance(previous.injected, ScheduledFault) and isinstance(fault.injected, SkillFault)
     first = {fault.kind: fault for fault in reversed(campaign.faults) if not fault.replaces_previous}
-    assert str(first["missed"]).endswith("Grasp missed, first: seal_fails")
+    assert str(first["missed"]).endswith("Grasp missed, first: grip_fails")
     assert str(first["doubtful"]).endswith("SelectTarget doubtful, first: without a cause")
     conditional = {fault.name.split()[0] for fault in campaign.faults if fault.is_conditional}
     assert "RejectTarget" in conditional and "Grasp" not in conditional
@@ -209,7 +209,7 @@ def test_a_run_ends_as_its_faults_require(run_end: RunEnded, raised_bugs: list[s
         (end("INCOMPLETE"), {}, {"left": 0, "elsewhere": 1}, [], "out of reach"),
         (LOST, {"rejected": 0, "lost": 1}, {"left": 0, "elsewhere": 1}, ["object_removed"], ""),
         # A dropped object that nobody saw again may be anywhere.
-        (LOST, {"rejected": 0, "lost": 1}, {}, ["seal_breaks"], ""),
+        (LOST, {"rejected": 0, "lost": 1}, {}, ["grip_lost"], ""),
         (EARLY, {"rejected": 0, "lost": 1}, {"right": 3}, [], ""),
         (end("FAULT"), {}, {"right": 1, "left": 2}, [], "the ledger says"),
         (end("FAULT"), {}, {"right": 3, "left": 0}, [], "the ledger says"),
@@ -249,11 +249,11 @@ def test_a_campaign_tries_every_fault_and_enters_every_recovery(
     assert min(entries.values()) > 0
     first_faults = [str(next(iter(trial.faults.values()))) for trial in campaign.trials]
     behind = [list(trial.faults.values())[-1].name.startswith("RejectTarget") for trial in campaign.trials]
-    assert "Grasp missed, first: seal_fails" in first_faults[behind.index(True)]
+    assert "Grasp missed, first: grip_fails" in first_faults[behind.index(True)]
     campaign.trials = [
         trial
         for trial, fault in zip(campaign.trials, first_faults, strict=True)
-        if "missed" not in fault and "no seal" not in fault
+        if "missed" not in fault and "no grip" not in fault
     ]
     entries = campaigns.count_branch_entries(campaign)
     assert [branch.split(": ")[1] for branch, count in entries.items() if not count] == names[2:3]

@@ -28,7 +28,7 @@ def test_faults_are_listed_and_one_is_repeated_and_recorded(tmp_path: Path) -> N
     listed = json.loads(invoke(*FAKE, "--list", "--json").stdout)
     lines = invoke(*FAKE, "--list").stdout.splitlines()
     assert [line.split()[0] for line in lines] == [str(entry["fault"]) for entry in listed]
-    number = next(entry["fault"] for entry in listed if "Grasp missed, first: seal" in entry["description"])
+    number = next(entry["fault"] for entry in listed if "Grasp missed, first: grip" in entry["description"])
     shown = invoke(*FAKE, "--fault", str(number), "--runs", str(tmp_path))
     lines = shown.stdout.splitlines()
     assert (shown.exit_code, lines[1]) == (0, "  SUCCESS")

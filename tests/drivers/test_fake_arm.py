@@ -68,7 +68,7 @@ def test_a_named_pose_is_reached_on_a_straight_line_of_the_joints(fake: FakeCell
 
 
 def test_the_tool_turns_as_the_goal_says(fake: FakeCell) -> None:
-    move(fake, Goal((0.5, 0.0, 0.1), yaw=math.pi / 2))
+    move(fake, Goal((0.5, 0.0, 0.1), yaws=(math.pi / 2,)))
     assert fake.arm.tool_pose.rotation[:, 0] == pytest.approx([0, -1, 0], abs=1e-9)
 
 

@@ -120,6 +120,6 @@ def test_what_falls_on_the_wall_of_a_bin_falls_into_the_bin(load: Load, beside: 
         cell.world.put("cube", x, edge + beside)
     cube = cell.world.put("cube", x, edge + 0.01)
     cell.world.held_object = cube
-    cell.tool.break_seal()
+    cell.tool.lose_grip()
     assert bin.contains(cube.position)
     assert beside is not None or np.allclose(cube.position[:2], (x, edge - radius))

@@ -12,8 +12,8 @@ from executive.cell.arm import Goal
 from executive.drivers.world_log import (
     IDLE_STEP,
     JOINT_TARGETS,
+    OPEN,
     RUN_STEP,
-    VACUUM_OFF,
     CommandLog,
     read_commands,
 )
@@ -59,9 +59,9 @@ def test_a_torn_command_is_left_out_and_overwritten(path: Path) -> None:
         path.write_bytes(content[:length] + bytes(4096))
         assert [one.kind for one in read_commands(path)] == [RUN_STEP], length
     again = CommandLog(path, resume=True)
-    again.append(VACUUM_OFF)
+    again.append(OPEN)
     again.close()
-    assert [one.kind for one in read_commands(path)] == [RUN_STEP, VACUUM_OFF]
+    assert [one.kind for one in read_commands(path)] == [RUN_STEP, OPEN]
 
 
 def test_a_damaged_log_says_so(path: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.frame import Detection, Detections, ErrorRates, Frame, Observation
 from executive.cell.objects import Bin, ObjectClass, Target
+from executive.drivers.fake import load_empty_cell
 from executive.events import Event
 from executive.ledger.tracker import Tracker
 from tests.camera_poses import looking_down
@@ -49,7 +50,11 @@ class Bench:
         }
         routes = {"cube": ("red_bin", "pink_bin")}
         emit = self.events.append
-        self.ledger = Tracker(self.config, TableConfig(), bins, classes or {}, routes, {}, emit)
+        classes = classes or {}
+        labels = load_empty_cell().tool.find_distinct_labels(classes)
+        self.ledger = Tracker(
+            self.config, TableConfig(), bins, classes, routes, {}, emit, distinct_labels=labels
+        )
         self.frames = 0
 
     def look(

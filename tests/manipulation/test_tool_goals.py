@@ -9,17 +9,15 @@ import pytest
 from at_hand import look, pick
 
 from executive.cell.arm import Goal
-from executive.cell.objects import BIN_THICKNESS, ObjectClass, Target
-from executive.drivers.fake import FakeArm
+from executive.cell.objects import BIN_THICKNESS, Target
+from executive.drivers.fake import FakeArm, FakeCell
 from executive.manipulation.motions import make_task, make_transport_task
 from executive.manipulation.tool_goals import (
     DROP_HEIGHT,
     MIN_GAP,
-    OVERTRAVEL,
+    choose_grasp,
     list_obstacles,
-    make_approach,
     make_bin_goal,
-    make_object_goal,
     make_put_down_goal,
     make_slot_goal,
     predict_object_count,
@@ -78,28 +76,17 @@ def test_the_descent_is_fast_once_a_touch_confirmed_the_height_until_an_attempt_
     for y in (-0.1, 0.1):
         fake.world.put("cube", 0.5, y)
     first, second = look(fake, "full")
-    assert make_approach(fake.cell, second)[0].fast_length == 0.0
+    assert choose_grasp(fake.cell, second)[0].goal.fast_length == 0.0
     run_skill(Approach(target=first), fake)
-    goal, _ = make_approach(fake.cell, second)
+    goal = choose_grasp(fake.cell, second)[0].goal
+    motion = fake.cell.motion
     assert goal.position == pytest.approx((*second.position[:2], 0.035))
-    assert goal.position[2] + goal.guarded_length == pytest.approx(0.05 + fake.cell.descent)
-    assert goal.guarded_speed == fake.cell.descent_speed
-    assert goal.fast_length == pytest.approx(fake.cell.descent - fake.cell.slow_descent)
-    assert goal.slow_length == pytest.approx(fake.cell.slow_descent + OVERTRAVEL)
+    assert goal.position[2] + goal.guarded_length == pytest.approx(0.05 + motion.descent)
+    assert goal.guarded_speed == motion.descent_speed
+    assert goal.fast_length == pytest.approx(motion.descent - motion.slow_descent)
+    assert goal.slow_length == pytest.approx(motion.slow_descent + 0.015)
     fake.cell.ledger.record_failed_pick(second.item)
-    assert make_approach(fake.cell, second)[0].fast_length == 0.0
-
-
-def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> None:
-    washer = ObjectClass("washer", 0.006, 0.025, contact_radius=0.017)
-    goal = make_object_goal(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05)  # on another one
-    assert goal.position == pytest.approx((0.517, 0.1, 0.013))
-    assert (goal.guarded_length, goal.guarded_speed) == pytest.approx((0.003 + 0.02, 0.05))
-    further = make_object_goal(
-        washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05, failed_attempts=1, overtravel=0.001
-    )
-    assert further.position[2] == pytest.approx(0.015)
-    assert np.hypot(further.position[0] - 0.5, further.position[1] - 0.1) == pytest.approx(0.017)
+    assert choose_grasp(fake.cell, second)[0].goal.fast_length == 0.0
 
 
 def test_what_goes_onto_a_layer_hangs_as_far_above_it_as_the_first_ones_above_the_floor(
@@ -124,7 +111,7 @@ def test_what_stands_on_the_table_is_in_the_way_but_for_what_is_to_be_touched(
     fake: FakeCell, targets: list[Target]
 ) -> None:
     assert names(fake) == ["cube-1", "duck-1"]
-    _, task = make_approach(fake.cell, targets[0])
+    _, task = choose_grasp(fake.cell, targets[0])
     assert task.target is not None
     assert (task.target.name, make_task(fake.cell).target) == ("cube-1", None)
     (duck,) = task.obstacles
@@ -141,7 +128,7 @@ def test_what_is_carried_is_the_load_and_in_nobodys_way(fake: FakeCell, targets:
     assert task.load is not None
     assert (task.load.label, task.holding_force) == ("cube", 7.9)
     assert [obstacle.name for obstacle in task.obstacles] == ["duck-1"]
-    fake.tool.breakaway_force = 3.0
+    fake.tool.force = 3.0
     assert make_task(fake.cell).holding_force == 3.0
 
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from executive.cell.protocols import Cell, Steps
 from executive.events import ItemChanged, NodeEnded
-from executive.testing.fake_cell import FakeCell
-from executive.testing.faults import during, seal_fails
+from executive.testing.faults import during, grip_fails
 from executive.testing.run_mission import MissionResult, run_mission
 from skills.approach import Approach
 
@@ -32,7 +31,7 @@ def put_a_row(cell: FakeCell) -> None:
 
 
 def test_a_missed_object_comes_last_and_is_then_picked() -> None:
-    misses = during("*/Grasp", seal_fails(), activations=[1, 2])
+    misses = during("*/Grasp", grip_fails(), activations=[1, 2])
     result = run_mission("sort_with_second_chance", arrange=put_a_row, faults=[misses])
     assert (result.status, result.items["placed"], result.agrees) == ("SUCCESS", 3, True)
     ends = [timed.event for timed in result.events if isinstance(timed.event, NodeEnded)]
@@ -40,7 +39,7 @@ def test_a_missed_object_comes_last_and_is_then_picked() -> None:
 
 
 def test_an_object_that_is_missed_again_at_the_end_is_rejected() -> None:
-    misses = during("*/Grasp", seal_fails(), activations=[1, 2, 5, 6])
+    misses = during("*/Grasp", grip_fails(), activations=[1, 2, 5, 6])
     result = run_mission("sort_with_second_chance", arrange=put_a_row, faults=[misses])
     assert (result.status, result.items["placed"], result.items["rejected"]) == ("INCOMPLETE", 2, 1)
     assert result.list_failure_reasons("*/Defer") == ["exhausted"]

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from executive.drivers.fake import FakeTool
-from executive.testing.fake_cell import FakeCell
-from executive.testing.faults import during, seal_breaks
+from executive.drivers.fake import FakeCell, FakeTool
+from executive.testing.faults import during, grip_lost
 from executive.testing.run_mission import run_mission
 
 
@@ -19,7 +18,7 @@ def put_objects(fake: FakeCell) -> None:
 
 @pytest.mark.parametrize("skill", ["Weigh", pytest.param("Transit", marks=pytest.mark.slow)])
 def test_a_dropped_object_does_not_end_the_sort_by_weight(skill: str) -> None:
-    faults = [during(f"*/{skill}", seal_breaks(), activations=1)]
+    faults = [during(f"*/{skill}", grip_lost(), activations=1)]
     result = run_mission("weigh_and_sort", faults=faults, arrange=put_objects)
     assert result.list_failure_reasons(f"*/{skill}") == ["dropped"]
     assert (result.status, result.items["placed"], result.agrees) == ("SUCCESS", 3, True)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from executive.cell.config import TOOL_RADIUS, CellConfig
+from executive.cell.config import CellConfig
 from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
@@ -21,6 +21,7 @@ from executive.motion.clearance_model import (
     Discs,
     make_tool_discs,
 )
+from executive.tools.suction import SHAFT_RADIUS
 
 DOWN = np.array([0.0, 0.0, -1.0])
 AWAY = np.array([[-0.6, 0.0]])
@@ -112,7 +113,7 @@ def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) ->
 
 def test_near_an_end_what_is_unavoidable_there_is_allowed_and_elsewhere_it_is_not(config) -> None:
     discs = make_tool_discs(config, None)
-    beside = np.array([POST.x + POST.radius + POSITION_TOLERANCE + TOOL_RADIUS + 0.002, POST.y, 0.1])
+    beside = np.array([POST.x + POST.radius + POSITION_TOLERANCE + SHAFT_RADIUS + 0.002, POST.y, 0.1])
     opposite = np.array([2 * POST.x - beside[0], POST.y, 0.1])
     clearance = ClearanceModel(config, (POST,), beside[None, :2], discs)
     assert slack(clearance, beside) == pytest.approx(0.002 - (config.motion.margin + SAMPLING_MARGIN))

@@ -30,7 +30,7 @@ def arm_within(limit: Array) -> Kinematics:
 @given(places, yaws, st.floats(0.0, 0.15))
 @settings(max_examples=40)
 def test_every_posture_points_down_over_the_goal_inside_the_limits(place, yaw, length: float) -> None:
-    found = find_configuration_pairs(ARM, Goal(place, yaw), length, START)
+    found = find_configuration_pairs(ARM, Goal(place, () if yaw is None else (yaw,)), length, START)
     for qs, height in ((found.lower_qs, 0.0), (found.upper_qs, length)):
         tips, axes = ARM.compute_tcps_and_axes(qs)
         assert np.allclose(tips, np.add(place, (0, 0, height)), atol=1e-7)

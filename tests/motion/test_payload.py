@@ -7,14 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from executive.cell.arm import JointState
-from executive.cell.objects import SAFETY_FACTOR, ObjectClass
+from executive.cell.objects import ObjectClass
+from executive.drivers.fake import load_empty_cell
 from executive.geometry import GRAVITY
 from executive.motion.optimizer import DISTANCE_PER_ACCELERATION, SAMPLE_STRIDE, PayloadLimit
 from executive.motion.trajectory import Trajectory
 from executive.motion.transcription import SAMPLE_FRACTIONS, SAMPLES_PER_STEP, STEP_COUNT
 
 KIND = ObjectClass("cube", 0.05, 0.035, mass=0.1)
+TOOL = load_empty_cell().tool
 LENGTH = 1.0 / STEP_COUNT
 """Of a step of a course that sways [s]."""
 
@@ -57,8 +58,8 @@ def strongest(trajectory: Trajectory, kinematics) -> float:
 
 @pytest.mark.parametrize("share", [0.25, 0.6, 0.9])
 def test_flown_at_the_root_of_the_share_a_motion_is_just_affordable(sway, kinematics, share: float) -> None:
-    bears = SAFETY_FACTOR * KIND.mass * math.hypot(GRAVITY, share * strongest(sway, kinematics))
-    payload = PayloadLimit(KIND, bears, kinematics)
+    bears = TOOL.safety_factor * KIND.mass * math.hypot(GRAVITY, share * strongest(sway, kinematics))
+    payload = PayloadLimit(KIND, bears, TOOL, kinematics)
     gentle = payload.make_safe_motion(sway)
     rate = sway.duration / gentle.duration
     assert rate == pytest.approx(math.sqrt(share), rel=0.01)
@@ -70,7 +71,7 @@ def test_a_demand_is_what_the_seal_bears_beyond_weight_and_hold(sway, kinematics
     """Of places STRIDE apart on a course, in centimetres for each metre per second squared."""
     bears = 3.0
     qs = np.array([sway.state_at(place).q for place in SAMPLE_FRACTIONS])
-    demand = PayloadLimit(KIND, bears, kinematics).linearize(qs, LENGTH / SAMPLES_PER_STEP, math.inf)
+    demand = PayloadLimit(KIND, bears, TOOL, kinematics).linearize(qs, LENGTH / SAMPLES_PER_STEP, math.inf)
     middle = demand.samples[:, 1]
     assert np.array_equal(np.diff(middle), np.full(len(middle) - 1, SAMPLE_STRIDE))
     assert middle[0] < 2 * SAMPLE_STRIDE
@@ -78,9 +79,9 @@ def test_a_demand_is_what_the_seal_bears_beyond_weight_and_hold(sway, kinematics
     radius = math.hypot(*kinematics.compute_tcps_and_axes(qs[:1])[0][0, :2])
     states = [sway.state_at(place) for place in SAMPLE_FRACTIONS[middle]]
     level = radius * np.array([math.hypot(state.qdd[0], state.qd[0] ** 2) for state in states])
-    wanted = DISTANCE_PER_ACCELERATION * (bears / SAFETY_FACTOR / KIND.mass - np.hypot(level, GRAVITY))
+    wanted = DISTANCE_PER_ACCELERATION * (bears / TOOL.safety_factor / KIND.mass - np.hypot(level, GRAVITY))
     assert demand.slack == pytest.approx(wanted, abs=DISTANCE_PER_ACCELERATION * 0.05)
-    near = PayloadLimit(KIND, bears, kinematics).linearize(qs, LENGTH / SAMPLES_PER_STEP, 0.096)
+    near = PayloadLimit(KIND, bears, TOOL, kinematics).linearize(qs, LENGTH / SAMPLES_PER_STEP, 0.096)
     assert 0 < len(near.slack) < len(demand.slack)
     for values, every in zip(near, demand, strict=True):
         assert np.array_equal(values, every[demand.slack < 0.096]), "what is far from its bounds is left out"

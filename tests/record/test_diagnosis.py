@@ -67,7 +67,7 @@ def test_an_undeclared_reason_is_reported_at_the_line_of_its_skill() -> None:
     def seals() -> bool:
         raise load_skills()["MoveToScan"]().failure("tired", "no more")
 
-    run.fake.tool.can_seal = seals
+    run.fake.tool.can_hold = seals
     story = run.tell()
     assert 'it failed with the undeclared reason "tired"' in story.verdict
     assert re.fullmatch(r"record/test_diagnosis\.py:\d+, in seals", story.raised_at)
@@ -89,7 +89,7 @@ def test_a_fault_says_where_it_was_raised_and_what_is_known_of_the_arm(at_rest, 
     def broken() -> bool:
         raise ZeroDivisionError("vacuum gauge")
 
-    run.fake.tool.can_seal = broken
+    run.fake.tool.can_hold = broken
     story = run.tell(at_rest)
     assert (story.arm_state, story.verdict) == (arm, "Grasp: ZeroDivisionError: vacuum gauge")
     assert story.advice[0].startswith(first)

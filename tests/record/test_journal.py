@@ -233,7 +233,7 @@ def test_every_kind_of_event_comes_back_as_it_was(path):
         item_changed("cube-1"), TargetSelected("cube-1", "cube", 1, "red_bin"), ToolCommanded("close"),
         kinds.MotionPlanned(True, 0.0, 1.5), InputRead("sensor", 1, value), kinds.OperatorAsked(["cube"]),
         kinds.RequestGiven(None),
-        kinds.FaultInjected("seal_breaks", "a", "cube-1", "cube", [0.5]), kinds.RunHalted(True),
+        kinds.FaultInjected("grip_lost", "a", "cube-1", "cube", [0.5]), kinds.RunHalted(True),
         RunResumed(3, "close", {"python": "3.11"}), kinds.FaultRaised("Traceback"), END,
     ]  # fmt: skip
     timed = [at(tick, event) for tick, event in enumerate(events)]

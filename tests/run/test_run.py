@@ -37,8 +37,8 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
     run, _ = make(missions)
     fake = fake_of(run)
     stubborn = fake.world.objects[0]
-    fake.tool.can_seal = lambda: fake.world.find_touched_object(fake.arm.tool_pose.position) is not stubborn
-    outcome, items, audit = run.execute(), run.station.ledger.count_states(), run.station.audit()
+    fake.tool.can_hold = lambda: fake.world.find_touched_object(fake.arm.tool_pose.position) is not stubborn
+    outcome, items, audit = run.execute(), run.workcell.accounts.count_states(), run.workcell.audit()
     assert (outcome.status, outcome.reason) == ("INCOMPLETE", "rejected")
     (rejected,) = (row for row in run.station.ledger.list_items() if row.state == "rejected")
     assert rejected.reason == "could not be picked (6 failed attempts)"
@@ -54,7 +54,7 @@ def test_a_bug_in_a_part_is_a_fault_and_the_arm_is_at_rest(missions: Path) -> No
     def broken() -> bool:
         raise ZeroDivisionError("vacuum gauge")
 
-    fake.tool.can_seal = broken
+    fake.tool.can_hold = broken
     outcome = run.execute()
     assert (outcome.status, outcome.node.rpartition("/")[2]) == ("FAULT", "Grasp")
     assert "vacuum gauge" in outcome.message and fake.arm.at_rest

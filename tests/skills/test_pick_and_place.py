@@ -87,7 +87,7 @@ def test_what_fell_before_it_was_let_go_is_not_placed(fake: FakeCell, held: str)
 
 
 def test_a_grasp_without_a_seal_is_missed_and_lets_go(fake: FakeCell, target: Target) -> None:
-    fake.tool.can_seal = lambda: False
+    fake.tool.can_hold = lambda: False
     run_skill(Approach(target=target), fake)
     result = run_skill(Grasp(target=target), fake)
     assert (result.reason, result.message) == ("missed", "no seal on cube-1 0.10 s after contact")

@@ -131,7 +131,7 @@ def test_an_item_that_falls_during_the_measurement_is_dropped_and_not_weighed() 
             fake.advance()
             loads += fake.arm.at_rest
             if loads == 40:
-                fake.tool.break_seal()
+                fake.tool.lose_grip()
     assert failure.value.reason == "dropped"
     assert "broke during the weighing, near (0.50, 0.00" in failure.value.message
     assert fake.ledger.find_held_item() is None

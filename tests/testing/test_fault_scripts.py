@@ -13,6 +13,8 @@ from events import at
 
 from executive.cell.frame import Observation
 from executive.cell.protocols import Request
+from executive.cell.tools import Measurement
+from executive.drivers.fake import FakeCell
 from executive.errors import InputError, NoDepth, Unavailable, Unreachable
 from executive.events import FaultInjected, NodeEnded, NodeStarted, ToolCommanded
 from executive.testing import faults as effects
@@ -70,7 +72,7 @@ class Case:
 @pytest.mark.parametrize(("activations", "missed"), [((1, 3), [1, 3]), ((), [1, 2, 3])])
 def test_a_fault_occurs_in_its_activations(activations: tuple[int, ...], missed: list[int]) -> None:
     result = run_mission(
-        "sort_overhead", faults=[during("*/Grasp", effects.seal_fails(), activations=activations)]
+        "sort_overhead", faults=[during("*/Grasp", effects.grip_fails(), activations=activations)]
     )
     ends = [
         one.event for one in result.events if isinstance(one.event, NodeEnded) and one.event.skill == "Grasp"
@@ -82,7 +84,7 @@ def test_a_fault_occurs_in_its_activations(activations: tuple[int, ...], missed:
 
 
 def test_a_fault_lasts_from_its_start_until_before_its_end() -> None:
-    script = [between(1.0, 3.0, effects.detector_dead()), after(3.0, effects.seal_fails())]
+    script = [between(1.0, 3.0, effects.detector_dead()), after(3.0, effects.grip_fails())]
     result = run_mission("sort_overhead", faults=script)
     injected = [one for one in result.events if isinstance(one.event, FaultInjected)]
     dead = [one.clock for one in injected if one.event == FaultInjected("detector_dead", "", "", "", [])]
@@ -93,12 +95,12 @@ def test_a_fault_lasts_from_its_start_until_before_its_end() -> None:
 
 def test_a_fault_of_a_node_is_recorded_with_node_item_and_object() -> None:
     script = [
-        during("*/Transit", effects.seal_breaks(), activations=1),
+        during("*/Transit", effects.grip_lost(), activations=1),
         between(500.0, 600.0, effects.no_depth()),
     ]
     result = run_mission("sort_overhead", faults=script)
     (fault,) = result.list_injected_faults()
-    assert (fault.name, fault.node.rpartition("/")[2]) == ("seal_breaks", "Transit")
+    assert (fault.name, fault.node.rpartition("/")[2]) == ("grip_lost", "Transit")
     assert fault.item.startswith(f"{fault.object}-") and len(fault.position) == 3
     assert result.list_failure_reasons("*/Transit") == ["dropped"]
     assert (result.status, result.agrees) == ("SUCCESS", True)
@@ -156,7 +158,7 @@ def test_an_unsure_detector_finds_everything_below_its_threshold() -> None:
 
 
 @pytest.mark.parametrize("fraction", [0.2, 0.8])
-@pytest.mark.parametrize("name", ["seal_breaks", "arm_collides", "object_removed"])
+@pytest.mark.parametrize("name", ["grip_lost", "arm_collides", "object_removed"])
 def test_an_effect_waits_for_a_fraction_of_a_motion(name: str, fraction: float) -> None:
     case = Case(getattr(effects, name)(fraction=fraction))
     case.cell.advance()
@@ -165,9 +167,9 @@ def test_an_effect_waits_for_a_fraction_of_a_motion(name: str, fraction: float) 
     duration = case.start_motion()
     start = case.parts.clock.now
     assert case.wait(lambda: bool(case.events)) - start == pytest.approx(fraction * duration, abs=0.01)
-    assert case.fake.tool.holding is (name != "seal_breaks")
+    assert case.fake.tool.holding is (name != "grip_lost")
     assert case.parts.arm.at_rest is (name == "arm_collides")
-    if name == "seal_breaks":
+    if name == "grip_lost":
         assert case.events[0].object == "cube" and case.events[0].position[2] > 0.1, "it hung in the air"
         assert case.fake.world.objects[0].position[2] == pytest.approx(0.025)
     if name == "arm_collides":
@@ -175,7 +177,7 @@ def test_an_effect_waits_for_a_fraction_of_a_motion(name: str, fraction: float) 
 
 
 def test_a_seal_breaks_once_and_only_if_an_object_is_held() -> None:
-    case = Case(effects.seal_breaks(None))
+    case = Case(effects.grip_lost(None))
     case.cell.advance()
     assert case.events == []
     for is_holding in (False, True):
@@ -187,9 +189,9 @@ def test_a_seal_breaks_once_and_only_if_an_object_is_held() -> None:
 @pytest.mark.parametrize(
     ("effect", "is_holding"),
     [
-        (effects.seal_fails(), False),
-        (effects.object_unsealable(2), True),
-        (effects.object_unsealable(1), False),
+        (effects.grip_fails(), False),
+        (effects.object_ungrippable(2), True),
+        (effects.object_ungrippable(1), False),
     ],
 )
 def test_nothing_seals_or_one_object_does_not(effect: Effect, is_holding: bool) -> None:
@@ -267,7 +269,7 @@ def test_the_object_of_a_node_is_that_of_its_item(state: str, offset: float, is_
     case.fake.world.objects[1].position[0] += offset
     if state != "seen":
         case.hold("sphere")
-        ledger.record_touch(item)
+        ledger.record_measurement(item, Measurement())
         ledger.record_grasp(item)
     if state == "placed":
         ledger.record_placement(item, "blue_bin")

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "reasons", "lost"),
     [
-        (during("*/Transit", effects.seal_breaks(), activations=3), ["dropped"], 0),
+        (during("*/Transit", effects.grip_lost(), activations=3), ["dropped"], 0),
         (during("*/Transit", effects.object_removed(), activations=2), ["dropped"], 1),
         (during("*/Approach", effects.object_moved((0.0, -0.06)), activations=2), ["no_contact"], 0),
         (during("*/Approach", effects.arm_collides("a hand"), activations=2), ["blocked"], 0),

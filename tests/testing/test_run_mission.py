@@ -10,8 +10,7 @@ import pytest
 
 from executive.errors import Fault, InputError
 from executive.events import RunEnded, RunStarted, TimedEvent
-from executive.testing.fake_cell import FakeCell
-from executive.testing.faults import after, detector_dead, during, seal_fails
+from executive.testing.faults import after, detector_dead, during, grip_fails
 from executive.testing.faulty_cell import FaultyCell
 from executive.testing.run_mission import make_failing, run_mission
 from skills.wait import Wait
@@ -70,7 +69,7 @@ def test_the_cell_is_arranged_before_the_run_and_closed_after_it(look: Path) -> 
 
 
 def test_entered_and_failed_nodes_are_listed_in_order(look: Path) -> None:
-    result = run_mission("sort_overhead", faults=[during("*/Grasp", seal_fails(), activations=1)])
+    result = run_mission("sort_overhead", faults=[during("*/Grasp", grip_fails(), activations=1)])
     assert len(result.list_activated_nodes("*/Grasp")) == result.items["placed"] + 1
     assert result.list_activated_nodes("tree/look*")[0] == "tree/look/try"
     assert (result.list_failure_reasons()[0], result.list_failure_reasons("*/Grasp")) == (
@@ -101,8 +100,8 @@ def test_a_cell_whose_time_is_over_says_so_once_so_that_the_arm_can_be_braked() 
 
 def test_patterns_that_fit_no_node_are_refused(look: Path) -> None:
     failing = make_failing(type("Fail", (Wait,), {"reasons": ("bad",)}), "bad")
-    with pytest.raises(InputError, match=r'"\*/Grasp" of seal_fails matches no path.*: tree/Wait, tree/Det'):
-        run_mission(look, faults=[during("*/Grasp", seal_fails())])
+    with pytest.raises(InputError, match=r'"\*/Grasp" of grip_fails matches no path.*: tree/Wait, tree/Det'):
+        run_mission(look, faults=[during("*/Grasp", grip_fails())])
     with pytest.raises(InputError, match=r'no skill node matches "Wait"; .*: tree/Wait, tree/Detect'):
         run_mission(look, substitutes={"Wait": failing})
     with pytest.raises(InputError, match="tree/Detect runs Detect, but FailingFail is not a subclass"):

@@ -96,7 +96,7 @@ def test_the_commands_of_a_look_and_a_pick_are_listed_as_texts(fake: FakeCell, t
     assert run_skill(SelectTarget, fake, inputs=located.outputs).commands == ["decided cube-1 red_bin"]
     approach = run_skill(Approach, fake, inputs={"target": target})
     moved = ["arm.plan (0.5, 0.0, 0.035)", "arm.start", "arm.stop"]
-    assert approach.commands == [*moved, "ledger.record_touch cube-1"]
+    assert approach.commands == [*moved, "ledger.record_measurement cube-1"]
     grasp = run_skill(Grasp, fake, inputs={"target": target})
     assert grasp.commands == ["tool.close", "ledger.record_grasp cube-1"]
     assert run_skill(AwaitRequest, fake).commands == ["operator.ask"]

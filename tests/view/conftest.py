@@ -45,7 +45,7 @@ class Leaky(FakeCell):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        self.tool.can_seal = lambda: False
+        self.tool.can_hold = lambda: False
 
 
 class Doomed(FakeCell):

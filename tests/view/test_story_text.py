@@ -17,7 +17,7 @@ CUBE = [("cube", 0.5, 0.1)]
 
 def slip(run: FailedRun) -> None:
     seals = iter([False])
-    run.fake.tool.can_seal = lambda: next(seals, True)
+    run.fake.tool.can_hold = lambda: next(seals, True)
     run.slip()
 
 
@@ -25,7 +25,7 @@ def break_down(run: FailedRun) -> None:
     def raise_error() -> bool:
         raise ZeroDivisionError("vacuum gauge")
 
-    run.fake.tool.can_seal = raise_error
+    run.fake.tool.can_hold = raise_error
 
 
 def halt_with_load(run: FailedRun) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from executive.cell.arm import Guard, Motion
 from executive.cell.device_config import STEP
 from executive.drivers import world_log
-from executive.drivers.sim.tool import LIP_LENGTH, SuctionTool
+from executive.drivers.sim.tool import SimTool
 from executive.drivers.sim.world import World
 from executive.errors import Fault
 from executive.geometry import Array, format_point
@@ -32,7 +32,7 @@ class ContactMonitor:
         tool: The tool, which may hold a body.
     """
 
-    def __init__(self, world: World, tool: SuctionTool) -> None:
+    def __init__(self, world: World, tool: SimTool) -> None:
         self._world = world
         self._tool = tool
         self._last_contact_steps: dict[tuple[str, int], int] = {}
@@ -43,7 +43,7 @@ class ContactMonitor:
         step = self._world.step_count
         self._last_contact_steps = {(part, body): step for part, body, _, _ in self._iterate_contacts()}
 
-    def find_new_contact(self, lip_may_touch: bool) -> tuple[str, Sequence[float] | None]:
+    def find_new_contact(self, tip_may_touch: bool) -> tuple[str, Sequence[float] | None]:
         """Return description and point [m] of a new forbidden contact; without one, "" and None."""
         now = self._world.step_count
         oldest = now - SEPARATION_STEP_COUNT
@@ -51,17 +51,17 @@ class ContactMonitor:
         for part, body, position, force in self._iterate_contacts():
             if (part, body) in self._last_contact_steps:
                 self._last_contact_steps[part, body] = now
-            elif force > MIN_CONTACT_FORCE and not (lip_may_touch and self._is_lip(part, position)):
+            elif force > MIN_CONTACT_FORCE and not (tip_may_touch and self._is_tip(part, position)):
                 name = self._world.name_body(body)
                 place = format_point(self._world.get_tool_pose().position)
                 return f"{part} ran into {name}, with the tool at {place}", position
         return "", None
 
-    def _is_lip(self, part: str, position: Sequence[float]) -> bool:
-        """Return True if a point in the world [m] on a part of the robot is on the lip of the cup."""
+    def _is_tip(self, part: str, position: Sequence[float]) -> bool:
+        """Return True if a point in the world [m] on a part of the robot is on the tip of the tool."""
         X_TW = self._world.get_tool_pose().inverse()
         is_tool = part == self._world.name_link(self._world.tool_index)
-        return is_tool and bool(X_TW.apply(position)[2] > -LIP_LENGTH)
+        return is_tool and bool(X_TW.apply(position)[2] > -self._world.config.tool.tip_length)
 
     def _iterate_contacts(self) -> Iterator[tuple[str, int, Sequence[float], float]]:
         """Yield part of the robot, touched body, contact point [m] and normal force [N] of each contact."""
@@ -102,7 +102,7 @@ class SimArm:
         contact_point: Point of the collision in the world `(x, y, z)` [m]; None: unknown, or no collision.
     """
 
-    def __init__(self, world: World, tool: SuctionTool, limits: JointLimits) -> None:
+    def __init__(self, world: World, tool: SimTool, limits: JointLimits) -> None:
         self.at_rest = True
         self.collision: str | None = None
         self.contact_point: Sequence[float] | None = None
@@ -185,8 +185,8 @@ class SimArm:
         if self._braking_times is None:
             self._check_guard()
         if self._braking_times is None:
-            may_touch = self._motion_time >= self._motion.guarded_start_time
-            message, self.contact_point = self._contact_monitor.find_new_contact(may_touch)
+            tip_may_touch = self._motion_time >= self._motion.guarded_start_time
+            message, self.contact_point = self._contact_monitor.find_new_contact(tip_may_touch)
             if message := message or self._describe_disturbance(TRACKING_TOLERANCE):
                 self.stop_after_collision(message)
         if self._braking_times is None:

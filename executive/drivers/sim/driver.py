@@ -18,7 +18,7 @@ from executive.drivers.sim.camera import SimCamera, find_missing_depth_sensors
 from executive.drivers.sim.models import compute_mass, find_model_errors
 from executive.drivers.sim.rebuild import WorldRebuilder
 from executive.drivers.sim.scene import build_world_of_run, find_object_count_errors
-from executive.drivers.sim.tool import SuctionTool
+from executive.drivers.sim.tool import SimTool
 from executive.drivers.sim.world import SimVisuals
 from executive.drivers.world_log import CommandLog, read_commands
 from executive.errors import InputError
@@ -63,7 +63,7 @@ class SimDriver:
         self._steps_per_tick = round(config.clock.step / STEP)
         self.clock = StepClock(self._steps_per_tick * STEP)
         self.clock.on_tick = self._advance
-        self.tool = SuctionTool(self.world, config.tool, load_seed)
+        self.tool: SimTool = config.tool.build_sim(self.world, load_seed)
         self.arm = SimArm(self.world, self.tool, JointLimits.from_config(config.arm.limits))
         self.camera = make_camera(self.world, config, self.clock, camera_seed, scene.light)
         self.arms = {DEFAULT_ROLE: self.arm}
@@ -154,7 +154,7 @@ class SimDriver:
         self.world.place_object(true_object.body, Pose(X_WO.rotation, position))
 
     def drop_held_object(self) -> None:
-        self.tool.break_seal()
+        self.tool.lose_grip()
 
     def collide(self, message: str) -> None:
         self.arm.stop_after_collision(message)

@@ -10,7 +10,7 @@ import numpy as np
 from executive.cell.arm import JointState
 from executive.cell.device_config import STEP
 from executive.drivers import world_log
-from executive.drivers.sim.tool import SuctionTool
+from executive.drivers.sim.tool import SimTool
 from executive.drivers.sim.world import World
 from executive.drivers.world_log import Command
 from executive.errors import InputError
@@ -32,12 +32,11 @@ class WorldRebuilder:
         braking_start: Joint targets of the last physics step `(n,)` [rad], empty before the first step, and
             their time since the start of the motion [s]; the arm brakes from there.
         step_count: Number of physics steps of the run.
-        last_command_step: Number of physics steps of the run before the last motion or vacuum command; 0: no
-            command.
+        last_command_step: Number of physics steps of the run before the last command to arm or tool; 0: none.
         image_count: Number of captured images.
     """
 
-    def __init__(self, world: World, tool: SuctionTool) -> None:
+    def __init__(self, world: World, tool: SimTool) -> None:
         self.motion: Trajectory | None = None
         self.braking_start: tuple[Array, float] = (np.zeros(0), 0.0)
         self.step_count = 0
@@ -47,7 +46,7 @@ class WorldRebuilder:
         self._tool = tool
         self._next_targets = self.braking_start
         """Joint targets and time that the next physics step uses. Targets that no step has used are ignored:
-        if the arm braked from them, it would move by two steps at once, which may tear a load off the cup."""
+        if the arm braked from them, it would move by two steps at once, which may tear off a load."""
 
     def execute(self, command: Command) -> None:
         """Execute the next command.
@@ -56,7 +55,7 @@ class WorldRebuilder:
             InputError: The command is invalid.
         """
         kind, arguments = command
-        if kind in (world_log.MOTION, world_log.VACUUM_ON, world_log.VACUUM_OFF):
+        if kind in (world_log.MOTION, world_log.CLOSE, world_log.OPEN):
             self.last_command_step = self.step_count
         try:
             if kind == world_log.MOTION:
@@ -100,9 +99,9 @@ class WorldRebuilder:
             world.remove_object(int(numbers[0]))
         else:
             actions = {
-                world_log.VACUUM_ON: tool.close,
-                world_log.VACUUM_OFF: tool.open,
-                world_log.SEAL_BREAK: tool.break_seal,
+                world_log.CLOSE: tool.close,
+                world_log.OPEN: tool.open,
+                world_log.GRIP_LOST: tool.lose_grip,
             }
             actions[kind]()
 

@@ -9,7 +9,7 @@ from executive.cell.config import CellConfig
 from executive.cell.device_config import STEP
 from executive.cell.devices import StepClock
 from executive.drivers.sim.arm import SimArm
-from executive.drivers.sim.tool import SuctionTool
+from executive.drivers.sim.collision import ClearanceChecker
 from executive.drivers.sim.world import World
 from executive.events import Event
 from executive.geometry import Array, Pose
@@ -35,7 +35,7 @@ class Rig:
         self.planner = Planner(config, self.clearance.check)
         self.clock = StepClock(lambda: self.world.step_count * STEP)
         self.events: list[Event] = []
-        self.tool = SuctionTool(self.world, config.tool)
+        self.tool = config.tool.build_sim(self.world)
         self.arm = SimArm(
             self.world, self.planner, config, self.clock, lambda: self.tool.held_body, self.events.append
         )

@@ -6,7 +6,6 @@ import numpy as np
 import pybullet
 import pytest
 
-from executive.drivers.sim.tool import SuctionTool
 from executive.drivers.sim.world import World
 from executive.geometry import GRAVITY, Array, Pose
 from executive.motion.arms import build_kinematics
@@ -26,7 +25,7 @@ class Bench:
         config = shipped_cell("overhead")
         self.world = World(config)
         self.config = config.tool
-        self.tool = SuctionTool(self.world, config.tool)
+        self.tool = config.tool.build_sim(self.world)
         self.kinematics = build_kinematics(config)
         self.q: Array = np.radians(config.arm.poses_deg["home"])
         self.body = self.world.add_object(label, Pose.of([X - GOOD_PLACE[label], Y, CUBE / 2]), (1, 1, 1))
@@ -150,7 +149,7 @@ def test_the_load_of_a_hanging_object_is_its_weight_and_noise_of_the_declared_si
     bench = Bench("cube")
     first = bench.tool.load
     assert first == pytest.approx(0.0, abs=5 * bench.tool.load_std)
-    assert bench.tool.load == first != SuctionTool(bench.world, bench.config, noise_seed=1).load
+    assert bench.tool.load == first != bench.config.build_sim(bench.world, noise_seed=1).load
     bench.hang()
     loads = []
     for _ in range(300):

@@ -3,18 +3,23 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
 import pybullet
 import pytest
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.cell.device_config import ToolConfig
-from executive.drivers.sim.tool import CupContact, compute_breakaway_force, measure_contact
+from executive.cell.device_config import MotionConfig
+from executive.cell.objects import ObjectClass
+from executive.cell.tools import Measurement
 from executive.geometry import make_tool_down_pose
+from executive.tools.suction import CupContact, Suction, compute_breakaway_force, measure_contact
 
 REACH = 0.002
-TOOL = ToolConfig(
-    cup_radius=0.006, reach=REACH, force=8.0, gap=0.004, tilt_deg=60, min_force=1.0, source="test"
-)
+TOOL = Suction(cup_radius=0.006, reach=REACH, force=8.0, gap=0.004, tilt_deg=60, min_force=1.0, source="test")
+CLASSES = {
+    "cube": ObjectClass("cube", 0.05, 0.0354), "sphere": ObjectClass("sphere", 0.06, 0.03),
+    "duck": ObjectClass("duck", 0.056, 0.0295),
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -79,3 +84,48 @@ def test_half_the_gap_and_half_the_tilt_leave_a_quarter_of_the_force() -> None:
     assert compute_breakaway_force(seal, TOOL) == pytest.approx(TOOL.force / 4)
     for bad in (CupContact(1, 0.0, 2 * TOOL.gap, 0.0), CupContact(1, 0.0, 2 * TOOL.gap, 1.5), None):
         assert compute_breakaway_force(bad, TOOL) == 0.0
+
+
+def measure(label: str, height: float) -> Measurement:
+    """Return the evidence of a touch of an object on the table, if the whole upper half counts as the top."""
+    centre = np.array([0.5, 0.0, CLASSES[label].height / 2])
+    return TOOL.measure_contact(CLASSES[label], centre, height, CLASSES, overtravel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("label", "height", "contradiction"),
+    [
+        ("cube", 0.0504, ""),
+        ("cube", 0.1004, ""),  # on another cube
+        ("cube", 0.06, "it was touched 60 mm above the table, and a cube is 50 mm high"),
+        ("sphere", 0.056, "it was touched 56 mm above the table, and a sphere is 60 mm high"),
+    ],
+)
+def test_the_height_of_a_touch_has_to_be_that_of_the_class(label, height, contradiction):
+    assert measure(label, height).contradiction == contradiction
+
+
+@pytest.mark.parametrize(
+    ("label", "height", "is_possible"),
+    [("sphere", 0.04, True), ("sphere", 0.05, False), ("sphere", 0.065, False), ("cube", 0.035, True)],
+)
+def test_a_touch_that_is_too_low_for_all_classes_may_have_missed_the_top(label, height, is_possible):
+    assert measure(label, height).may_be_wrong is is_possible
+
+
+def test_a_touch_far_below_the_top_is_a_miss():
+    centre = np.array([0.5, 0.0, CLASSES["sphere"].height / 2])
+    touches = [TOOL.measure_contact(CLASSES["sphere"], centre, height, CLASSES) for height in (0.04, 0.05)]
+    assert [touch.is_miss for touch in touches] == [True, False]
+
+
+def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> None:
+    washer = ObjectClass("washer", 0.006, 0.025, contact_radius=0.017)
+    centre = np.array([0.5, 0.1, 0.013])  # on another one
+    motion = MotionConfig(descent=0.02, descent_speed=0.05)
+    (grasp,) = TOOL.list_grasps(washer, centre, motion)
+    assert grasp.goal.position == pytest.approx((0.517, 0.1, 0.013))
+    assert (grasp.goal.guarded_length, grasp.goal.guarded_speed) == pytest.approx((0.003 + 0.02, 0.05))
+    (further,) = TOOL.list_grasps(washer, centre, motion, attempt=1, overtravel=0.001)
+    assert further.goal.position[2] == pytest.approx(0.015)
+    assert math.dist(further.goal.position[:2], (0.5, 0.1)) == pytest.approx(0.017)

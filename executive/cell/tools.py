@@ -1,0 +1,227 @@
+"""Kinds of tools: what depends on the tool of a cell, from collision parts over grasps to wording."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from executive.cell.arm import Goal
+from executive.cell.device_config import Length, MotionConfig, Section
+from executive.cell.objects import ObjectClass
+from executive.errors import InputError
+from executive.geometry import Array
+from executive.plugins import list_entries
+
+TOOL_GROUP = "executive.tools"
+"""Entry-point group of kinds of tools."""
+DEFAULT_KIND = "suction"
+"""Kind of a tool section without the key `kind`, as in all cell files before there were several kinds."""
+
+OVERTRAVEL = 0.015
+"""Default distance by which a guarded motion continues below the expected surface of an object [m]."""
+CONTACT_SPACING = 0.0025
+"""Default distance between the contact points of repeated attempts [m]."""
+
+
+@dataclass(frozen=True)
+class ToolPart:
+    """An upright cylinder about the axis of the tool, for collision checks and displays.
+
+    Attributes:
+        offset: Distance from the tool centre point back to the lower end of the part [m].
+        length: Length along the axis [m].
+        radius: Radius [m].
+    """
+
+    offset: float
+    length: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """An approach after which the tool can grip an object.
+
+    Attributes:
+        goal: End of the approach: its position, its permitted yaws, and its guarded part.
+        contact_height: Height at which the tool should touch the object [m].
+        proves_absence: True if no object is at the target when the tool touches nothing on the way.
+        guard: `touch`: the tool stops at a contact, without which the approach fails; `clear`: a contact is
+            a failure.
+    """
+
+    goal: Goal
+    contact_height: float
+    proves_absence: bool = False
+    guard: Literal["touch", "clear"] = "touch"
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Evidence about the class of an object that the tool measured at its contact with the object.
+
+    Attributes:
+        contradiction: Sentence that states how the measured value contradicts the class, or "".
+        may_be_wrong: True if the tool may have measured at another place of the object than intended.
+        is_miss: True if the tool cannot grip the object there.
+    """
+
+    contradiction: str = ""
+    may_be_wrong: bool = False
+    is_miss: bool = False
+
+
+class ToolModel(Section):
+    """Section of a cell file about its tool, and everything that depends on the kind of tool.
+
+    Each entry point of the group `executive.tools` is a subclass; its fields are keys of the section `tool`.
+    Distances are along the axis of the tool, which points down at a grasp.
+
+    Attributes:
+        noun: Noun for the hold of the tool on an object in messages, for instance `grip`.
+        tip_length: Length of the end of the tool that may touch an object in a guarded motion [m].
+        touch_distance: Maximum distance from a surface at which the tool senses the surface [m].
+        safety_factor: Ratio of the holding force to the largest force on the grip during a motion.
+        min_lift_acceleration: Lower limit of the maximum acceleration of a lift, even if the tool holds with
+            less force [m/s²].
+    """
+
+    noun: ClassVar[str] = "grip"
+    tip_length: ClassVar[float] = 0.002
+    touch_distance: ClassVar[float] = 0.001
+    safety_factor: ClassVar[float] = 2.0
+    min_lift_acceleration: ClassVar[float] = 0.5
+
+    kind: str = DEFAULT_KIND
+    """Kind of tool: the name of an entry point of the group `executive.tools`."""
+    length: Length = 0.12
+    """Distance from the flange to the tool centre point [m]."""
+    load_std: float = Field(0.05, gt=0, le=100)
+    """Standard deviation of a reading of the load [N]. The default is assumed: 0.5 % of 10 N, the range of a
+    small load cell."""
+    source: str
+    """Source of the constants."""
+
+    @classmethod
+    def select_class(cls, section: Mapping[str, object]) -> type[ToolModel]:
+        """Return the class of the kind that a section names.
+
+        Raises:
+            ValueError: The kind is not installed, or its class cannot be loaded.
+        """
+        kind = section.get("kind", DEFAULT_KIND)
+        entries = list_entries(TOOL_GROUP, "kind of tool")
+        if kind not in entries:
+            raise ValueError(f'has no installed kind "{kind}"; installed: {", ".join(entries) or "none"}')
+        try:
+            model: type[ToolModel] = entries[str(kind)].load()
+        except InputError as error:
+            raise ValueError(str(error)) from error
+        return model
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _parse_as_kind(cls, section: Any, parse: Callable[[Any], ToolModel]) -> ToolModel:
+        """Parse a section whose declared type is this base class as an instance of the class of its kind."""
+        if cls is ToolModel and isinstance(section, dict):
+            # Strict mode converts lists to tuples only from JSON.
+            return cls.select_class(section).model_validate_json(json.dumps(section), strict=True)
+        return parse(section)
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Return the schema of a kind of tool; for this base class, of all installed kinds."""
+        if cls is not ToolModel:
+            return handler(schema)
+        kinds = [handler(model.__pydantic_core_schema__) for model in load_tool_models().values()]
+        return kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
+
+    @property
+    def parts(self) -> Sequence[ToolPart]:
+        """Parts of the tool, from the flange to the tip."""
+        raise NotImplementedError
+
+    @property
+    def max_holding_force(self) -> float:
+        """Largest force with which the tool can hold an object [N]."""
+        raise NotImplementedError
+
+    def explain_unsuitable(self, object_class: ObjectClass) -> str:  # noqa: ARG002
+        """Return a clause that states why the tool cannot hold objects of a class, or ""."""
+        return ""
+
+    def get_hold_height(self, object_class: ObjectClass) -> float:
+        """Return the distance from the tool centre point down to the underside of a held object [m]."""
+        return object_class.height
+
+    def list_grasps(
+        self,
+        object_class: ObjectClass,
+        position: Array,
+        motion: MotionConfig,
+        *,
+        attempt: int = 0,
+        is_confirmed: bool = False,
+        overtravel: float = OVERTRAVEL,
+        spacing: float = CONTACT_SPACING,
+    ) -> Sequence[Grasp]:
+        """Return the possible grasps of an object, at least one, the best first.
+
+        Args:
+            object_class: Class of the object.
+            position: Centre of the object `(3,)` [m].
+            motion: Heights and speed of guarded motions.
+            attempt: Number of failed attempts before this one.
+            is_confirmed: True if a measurement of the tool has confirmed the properties of the class.
+            overtravel: Distance by which a guarded motion continues below the expected surface [m].
+            spacing: Distance between the contact points of repeated attempts [m].
+        """
+        raise NotImplementedError
+
+    def measure_contact(
+        self,
+        object_class: ObjectClass,  # noqa: ARG002
+        position: Array,  # noqa: ARG002
+        height: float,  # noqa: ARG002
+        classes: Mapping[str, ObjectClass],  # noqa: ARG002
+        overtravel: float = OVERTRAVEL,  # noqa: ARG002
+    ) -> Measurement:
+        """Return the evidence of a contact with an object; the default is no evidence.
+
+        Args:
+            object_class: Assumed class of the object.
+            position: Assumed centre of the object `(3,)` [m].
+            height: Height of the tool centre point at the contact [m].
+            classes: Classes of the cell by label.
+            overtravel: As in `list_grasps`.
+        """
+        return Measurement()
+
+    def find_distinct_labels(self, classes: Mapping[str, ObjectClass]) -> Collection[str]:  # noqa: ARG002
+        """Return the classes that a measurement of the tool distinguishes from all other `classes`."""
+        return ()
+
+    def build_sim(self, world: Any, noise_seed: int = 0) -> Any:
+        """Return the simulated tool of an `executive.drivers.sim.world.World`.
+
+        The result is an `executive.drivers.sim.tool.SimTool`, or has its public attributes and methods.
+        `noise_seed` is the random seed of the noise of the load.
+        """
+        raise NotImplementedError
+
+
+def load_tool_models() -> dict[str, type[ToolModel]]:
+    """Return the class of each installed kind of tool, by its name.
+
+    Raises:
+        InputError: A class cannot be loaded.
+    """
+    return {name: entry.load() for name, entry in list_entries(TOOL_GROUP, "kind of tool").items()}
