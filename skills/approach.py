@@ -83,5 +83,3 @@ class Approach(Skill):
             message = f"the top of {item} {expectation}; {measurement.contradiction}"
             raise self.failure("no_contact", message)
         yield  # The control step of the contact already has a high computational load.
-
-

@@ -10,8 +10,9 @@ from py_trees.common import Status
 from executive.skill import Seconds
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.keys import key
-from executive.tree.node import Advice, ControlNode, Counterpart, NodeBehaviour, PropagatedFailure
+from executive.tree.node import Advice, ControlNode, Counterpart, PropagatedFailure
 from executive.tree.specification import Child, Node
+from executive.tree.tree_node import NodeBehaviour
 
 
 class Invert(ControlNode):

@@ -13,15 +13,9 @@ from executive.skill import ANY, EMPTY, HOLDING
 from executive.tree.blackboard import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.keys import Elements, KeySection, key
-from executive.tree.node import (
-    ControlNode,
-    Counterpart,
-    NodeAnalysis,
-    NodeBehaviour,
-    NodeFinding,
-    PropagatedFailure,
-)
+from executive.tree.node import ControlNode, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.specification import Child, Node, Reason, VariableName, format_reasons
+from executive.tree.tree_node import NodeBehaviour
 
 NodeRun: TypeAlias = Generator[Node | None, None, Failure | None]
 """Generator that returns a failure, or None for success. A `yield` ends the tick."""

@@ -12,7 +12,8 @@ from executive.skill import ToolState
 from executive.tree.blackboard import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState, ToolStates, join_states
 from executive.tree.keys import Children, key
-from executive.tree.node import ControlNode, Counterpart, NodeBehaviour, PropagatedFailure
+from executive.tree.node import ControlNode, Counterpart, PropagatedFailure
+from executive.tree.tree_node import NodeBehaviour
 
 MAX_CHILDREN = 200
 """Maximum number of children; the checker compares all pairs of children."""

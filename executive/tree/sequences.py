@@ -14,15 +14,9 @@ from executive.errors import Fault
 from executive.skill import HOLDING
 from executive.tree.flow import UNKNOWN_STATE, Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.keys import Children, KeyOwner, key
-from executive.tree.node import (
-    ControlNode,
-    Counterpart,
-    NodeAnalysis,
-    NodeBehaviour,
-    NodeFinding,
-    PropagatedFailure,
-)
+from executive.tree.node import ControlNode, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.specification import Child, Node
+from executive.tree.tree_node import NodeBehaviour
 
 _COMPARED_ATTRIBUTES = ("node", "status", "reason", "choice", "item", "outputs")
 """Attributes of events by which two runs of a child are compared; the numbers in messages may differ."""

@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 import yaml
 from click.testing import CliRunner
+from executive.cell.workcell import load_cell_kind
 
 from executive.behaviours import load_skills
-from executive.cell.workcell import load_cell_kind
 from executive.cli.main import main
-from executive.drivers.fake import FakeCell
-from executive.drivers.sim.model_files import find_model
 from executive.mission.cell_file import load_cell
 from executive.mission.load import load_mission
+from executive.physics.model_files import find_model
 from executive.record.run_directory import read_cell
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import run_mission
 from executive.text.findings import MissionError
 from executive.text.yaml_files import get_shipped_folder

@@ -10,9 +10,9 @@ import numpy as np
 from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.frame import Detection, Detections, ErrorRates, Frame, Observation
 from executive.cell.objects import Bin, ObjectClass, Target
-from executive.drivers.fake import load_empty_cell
 from executive.events import Event
 from executive.ledger.tracker import Tracker
+from executive.testing.fake_cell import load_empty_cell
 from tests.camera_poses import looking_down
 
 EYE = ErrorRates(threshold=0.5, miss_rate=0.03, confusion_rate=0.004, false_detections=0.02, jitter=1.0)

@@ -10,7 +10,7 @@ from at_hand import look, pick
 
 from executive.cell.arm import Goal
 from executive.cell.objects import BIN_THICKNESS, Target
-from executive.drivers.fake import FakeArm, FakeCell
+from executive.drivers.fake import FakeArm
 from executive.manipulation.motions import make_task, make_transport_task
 from executive.manipulation.tool_goals import (
     DROP_HEIGHT,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from executive.drivers.fake import FakeCell, FakeTool
+from executive.drivers.fake import FakeTool
+from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import during, grip_lost
 from executive.testing.run_mission import run_mission
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from executive.cell.objects import ObjectClass
-from executive.drivers.fake import load_empty_cell
 from executive.geometry import GRAVITY
 from executive.motion.optimizer import DISTANCE_PER_ACCELERATION, SAMPLE_STRIDE, PayloadLimit
 from executive.motion.trajectory import Trajectory
 from executive.motion.transcription import SAMPLE_FRACTIONS, SAMPLES_PER_STEP, STEP_COUNT
+from executive.testing.fake_cell import load_empty_cell
 
 KIND = ObjectClass("cube", 0.05, 0.035, mass=0.1)
 TOOL = load_empty_cell().tool

@@ -14,7 +14,6 @@ from events import at
 from executive.cell.frame import Observation
 from executive.cell.protocols import Request
 from executive.cell.tools import Measurement
-from executive.drivers.fake import FakeCell
 from executive.errors import InputError, NoDepth, Unavailable, Unreachable
 from executive.events import FaultInjected, NodeEnded, NodeStarted, ToolCommanded
 from executive.testing import faults as effects

@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from executive.drivers.sim.kind import SIM_CELL_KIND
 
 from executive.behaviours import load_skills
 from executive.cli.main import main
-from executive.drivers.fake import FakeCell
-from executive.drivers.sim.kind import SIM_CELL_KIND
 from executive.drivers.sim.world import SimVisuals, World
 from executive.mission.cell_file import load_cell
 from executive.mission.load import load_mission
@@ -21,6 +20,7 @@ from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replayed_run import replay_run
 from executive.run.assembly import RunOptions
+from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import during, grip_fails, grip_lost
 from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_mission import run_mission

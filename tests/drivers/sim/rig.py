@@ -9,7 +9,6 @@ from executive.cell.config import CellConfig
 from executive.cell.device_config import STEP
 from executive.cell.devices import StepClock
 from executive.drivers.sim.arm import SimArm
-from executive.drivers.sim.collision import ClearanceChecker
 from executive.drivers.sim.world import World
 from executive.events import Event
 from executive.geometry import Array, Pose
