@@ -1,4 +1,4 @@
-"""The simulated cell as a whole: what a seed decides, what the audit counts, what the camera can see."""
+"""The simulated devices as a whole: what the camera can see, and the truth about the objects."""
 
 from __future__ import annotations
 
@@ -8,25 +8,27 @@ from typing import Any
 
 import numpy as np
 import pytest
-from executive.drivers.sim.cell import SimCell
 
 from executive.cell.arm import Goal
+from executive.cell.config import CellConfig
+from executive.cell.devices import DriverOptions
 from executive.cell.frame import TrueFrame
+from executive.drivers.sim.driver import SimDriver
 from executive.events import discard_event
 from executive.geometry import Pose
 from executive.mission.cell_file import load_cell
-from executive.station.station import CellOptions, SilentOperator
+from executive.station.station import CellOptions, SilentOperator, Station
 from executive.testing.fake_cell import SHIPPED_ROUTES
 from executive.testing.oracle import make_oracle_kind
 
-Build = Callable[..., SimCell]
+Build = Callable[..., Station]
 
 
 @pytest.fixture
 def build_cell(missions: Path, request: pytest.FixtureRequest) -> Build:
-    """Build simulated cells whose detectors are oracles; they are closed after the test."""
+    """Build simulated stations whose detectors are oracles; they are closed after the test."""
 
-    def build_cell(name: str = "overhead", seed: int = 4, **changes: Any) -> SimCell:
+    def build_cell(name: str = "overhead", seed: int = 4, **changes: Any) -> Station:
         path = missions / "cells" / f"{name}.yaml"
         config = load_cell(path).model_copy(update=changes)
         options = CellOptions(SilentOperator(), cell_folder=path.parent)
@@ -63,8 +65,8 @@ def test_only_depth_and_ray_find_what_does_not_stand_on_the_table(
     build_cell: Build, way: str, raised: float
 ) -> None:
     made = build_cell("depth", localization=way)
-    body = next(body for body, label in made._world.labels.items() if label == "cube")
-    made._world.place_object(body, Pose.of((0.6, 0.15, 0.075)))
+    body = next(body for body, label in made.driver.world.labels.items() if label == "cube")
+    made.driver.world.place_object(body, Pose.of((0.6, 0.15, 0.075)))
     frame = made.cell.camera.capture()
     assert isinstance(frame, TrueFrame)
     found = [
@@ -74,3 +76,25 @@ def test_only_depth_and_ray_find_what_does_not_stand_on_the_table(
     assert (error < 0.003) == (way != "plane")
     height = min(found, key=lambda place: float(np.linalg.norm(place[:2] - (0.6, 0.15))))[2]
     assert height - 0.025 == pytest.approx(raised, abs=0.006)
+
+
+def test_the_final_objects_are_in_their_bins_dropped_held_or_removed(overhead: CellConfig) -> None:
+    table = overhead.table.model_copy(update={"objects": (0, 0)})
+    driver = SimDriver(overhead.model_copy(update={"table": table}), DriverOptions())
+    add, tip = driver.world.add_object, driver.world.get_tool_pose().position
+    in_bin = add("cube", Pose.of(overhead.bins["red_bin"].position), (1, 1, 1))
+    places = [(0.5, 0.0, 0.025), (1.4, 0.0, -0.6), tip - (0.0, 0.0, 0.0255)]
+    bodies = [in_bin, *(add("cube", Pose.of(place), (1, 1, 1)) for place in places)]
+    for body in bodies:
+        driver.world.rest_positions[body] = [np.zeros(3)]
+    driver.tool.dropped_bodies.add(in_bin)
+    driver.tool.close()
+    driver.remove_object(driver.list_objects()[1])
+    ends = [(each.bin, each.is_dropped, each.is_held, each.is_removed) for each in driver.list_final_objects()]
+    assert ends == [
+        ("red_bin", True, False, False),
+        ("", False, False, True),
+        (None, False, False, False),
+        ("yellow_bin", False, True, False),
+    ]
+    driver.close()
