@@ -100,7 +100,7 @@ class WallClock:
             time.sleep(delay)
         elif -delay >= self.step:
             self.late_tick_count += 1
-            self._next_tick -= self.step * (delay // self.step)
+            self._next_tick += self.step * (-delay // self.step)
         self._next_tick += self.step
         self.tick_count += 1
         self.on_tick()

@@ -43,9 +43,9 @@ def test_all_that_is_wrong_is_said_at_once(overhead: CellConfig, tmp_path: Path)
     found = dict(load_checker("sim").check(config.model_copy(update=changes), tmp_path))
     assert list(found) == [
         ("localization",),
-        ("detectors", "yolo", "kind"),
         ("arm", "poses_deg", "turned"),
         ("bins", "red_bin", "position"),
+        ("detectors", "yolo", "kind"),
         ("arm", "poses_deg", "down"),
     ]
     said = found["localization",]

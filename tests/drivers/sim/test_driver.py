@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from executive.cell.arm import Goal
+from executive.cell.arm import Goal, Guard
 from executive.cell.config import CellConfig
 from executive.cell.devices import DriverOptions
 from executive.cell.frame import TrueFrame
@@ -17,6 +17,7 @@ from executive.drivers.sim.driver import SimDriver
 from executive.events import discard_event
 from executive.geometry import Pose
 from executive.mission.cell_file import load_cell
+from executive.motion.planner import Planner
 from executive.station.station import CellOptions, SilentOperator, Station
 from executive.testing.fake_cell import SHIPPED_ROUTES
 from executive.testing.oracle import make_oracle_kind
@@ -78,9 +79,35 @@ def test_only_depth_and_ray_find_what_does_not_stand_on_the_table(
     assert height - 0.025 == pytest.approx(raised, abs=0.006)
 
 
+def follow_down(config: CellConfig, step: float) -> list[list[float]]:
+    """Descend on a cube with a guard, on a driver with this time between two ticks; return all positions."""
+    clock = config.clock.model_copy(update={"step": step})
+    driver = SimDriver(empty(config).model_copy(update={"clock": clock}), DriverOptions())
+    driver.world.add_object("cube", Pose.of([0.5, 0.1, 0.025]), (1, 1, 1))
+    goal = Goal((0.5, 0.1, 0.04), guarded_length=0.02, guarded_speed=0.05)
+    motion = Planner(config).plan(driver.arm.q, goal)
+    driver.arm.execute(motion, Guard(touch=True))
+    qs = []
+    while not driver.arm.at_rest or len(qs) % round(1 / 60 / step):
+        driver.clock.wait_for_tick()
+        qs.append(driver.arm.q.tolist())
+    assert driver.tool.touching and driver.clock.now < motion.duration, "the guard stopped the arm"
+    driver.close()
+    return qs
+
+
+def test_arm_and_guard_do_the_same_at_a_lower_control_rate(overhead: CellConfig) -> None:
+    assert follow_down(overhead, 1 / 60) == follow_down(overhead, 1 / 240)[3::4]
+
+
+def empty(config: CellConfig) -> CellConfig:
+    """Return the cell without objects."""
+    table = config.table.model_copy(update={"objects": (0, 0)})
+    return config.model_copy(update={"table": table})
+
+
 def test_the_final_objects_are_in_their_bins_dropped_held_or_removed(overhead: CellConfig) -> None:
-    table = overhead.table.model_copy(update={"objects": (0, 0)})
-    driver = SimDriver(overhead.model_copy(update={"table": table}), DriverOptions())
+    driver = SimDriver(empty(overhead), DriverOptions())
     add, tip = driver.world.add_object, driver.world.get_tool_pose().position
     in_bin = add("cube", Pose.of(overhead.bins["red_bin"].position), (1, 1, 1))
     places = [(0.5, 0.0, 0.025), (1.4, 0.0, -0.6), tip - (0.0, 0.0, 0.0255)]
