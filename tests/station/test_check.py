@@ -78,9 +78,7 @@ def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wri
 
 
 @pytest.mark.parametrize("kind", ["sim", "fake"])
-def test_an_unknown_solver_is_a_finding_with_the_installed_solvers(
-    overhead: CellConfig, kind: str
-) -> None:
+def test_an_unknown_solver_is_a_finding_with_the_installed_solvers(overhead: CellConfig, kind: str) -> None:
     config = overhead.model_copy(update={"arm": overhead.arm.model_copy(update={"solver": "r2d2"})})
     ((keys, message),) = load_checker(kind).check(config, Path())
     assert keys == ("arm", "solver")

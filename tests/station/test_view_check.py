@@ -52,4 +52,6 @@ def test_a_view_without_the_workspace_is_named_with_what_it_lacks(
 @pytest.mark.parametrize("kind", ["sim", "fake"])
 def test_the_views_of_every_kind_of_cell_are_checked(kind: str) -> None:
     config = changed("overhead", table_view=[0, 0, 64, 64])
-    assert [key for key, _ in load_checker(kind).check(config, CELLS)] == [("cameras", "overhead", "table_view")]
+    assert [key for key, _ in load_checker(kind).check(config, CELLS)] == [
+        ("cameras", "overhead", "table_view")
+    ]

@@ -117,7 +117,9 @@ def test_the_final_objects_are_in_their_bins_dropped_held_or_removed(overhead: C
     driver.tool.dropped_bodies.add(in_bin)
     driver.tool.close()
     driver.remove_object(driver.list_objects()[1])
-    ends = [(each.bin, each.is_dropped, each.is_held, each.is_removed) for each in driver.list_final_objects()]
+    ends = [
+        (each.bin, each.is_dropped, each.is_held, each.is_removed) for each in driver.list_final_objects()
+    ]
     assert ends == [
         ("red_bin", True, False, False),
         ("", False, False, True),
