@@ -21,7 +21,7 @@ from executive.cell.frame import Detections
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import STEP
 from executive.cell.proxy import Access, intercept
-from executive.cell.tools import Measurement
+from executive.cell.tools import ToolMeasurement
 from executive.cell.workcell import CellOptions
 from executive.drivers.fake import SHIPPED_ROUTES, FakeCell
 from executive.manipulation.motions import capture_and_detect, complete, localize_and_observe
@@ -179,7 +179,7 @@ def _build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
         fake.arm.set_tool_position(first.position + offset)
     if is_holding:
         fake.tool.close()
-        fake.ledger.record_measurement(first.item, Measurement())
+        fake.ledger.record_measurement(first.item, ToolMeasurement())
         fake.ledger.record_grasp(first.item)
         detections, targets = _detect_targets(fake)
     item = first.item if skill.tool_state[0] is HOLDING else targets[0].item
