@@ -115,12 +115,12 @@ class ToolModel(Section):
         Raises:
             ValueError: The kind is not installed, or its class cannot be loaded.
         """
-        kind = section.get("kind", DEFAULT_KIND)
+        kind = str(section.get("kind", DEFAULT_KIND))
         entries = list_entries(TOOL_GROUP, "kind of tool")
         if kind not in entries:
             raise ValueError(f'has no installed kind "{kind}"; installed: {", ".join(entries) or "none"}')
         try:
-            model: type[ToolModel] = entries[str(kind)].load()
+            model: type[ToolModel] = entries[kind].load()
         except InputError as error:
             raise ValueError(str(error)) from error
         return model
