@@ -78,8 +78,8 @@ FILE_HEADER = b"executive world 4\n"
 """First line of every log of commands, with the version of the format."""
 
 RUN_STEP = "step"
-"""Kind of a physics step that belongs to the run. The arguments are none, or the time in the motion [s] and the
-joint positions [rad] to which the step moves the arm."""
+"""Kind of a physics step that belongs to the run. The arguments are none, or the time in the motion [s] and
+the joint positions [rad] to which the step moves the arm."""
 IDLE_STEP = "idle"
 """Kind of a physics step that does not belong to the run."""
 MOTION = "motion"

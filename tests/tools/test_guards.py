@@ -8,7 +8,7 @@ import pytest
 
 from executive.cell.objects import Target
 from executive.cell.tools import GraspPose
-from executive.drivers.fake import FakeCell
+from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from executive.tools.suction import Suction
 from skills.approach import Approach

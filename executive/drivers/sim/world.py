@@ -69,7 +69,7 @@ class World(CellWorld):
         self.log = CommandLog()
         self.is_idle = False
         self._unlogged_targets: tuple[float, ...] = ()
-        """Time in the motion [s] and joint positions [rad] of the last command, until a step has used them."""
+        """Time in the motion [s] and joint positions [rad] of the last command; empty after the next step."""
         self.rest_positions: dict[int, list[Array]] = {}
         self.removed_objects: dict[int, TrueObject] = {}
 
