@@ -216,7 +216,7 @@ class _RunWithHalts:
 
     def _keep_command(self) -> None:
         if isinstance(self._arm, SimArm):
-            self._commands.append(self._arm._commanded_q)
+            self._commands.append(self._arm.commanded_q)
 
     def _fork_and_halt_if_due(self) -> None:
         """Fork if a halt is due: the child requests a stop and goes on; the parent keeps the result."""
@@ -232,7 +232,7 @@ class _RunWithHalts:
         self._journal = Journal(self._journal_path, resume=True)
         self._commands = deque(self._commands)
         self._halt["commands_before_stop"] = len(self._commands)
-        self._motion = self._arm._motion if isinstance(self._arm, SimArm) else None
+        self._motion = self._arm.motion if isinstance(self._arm, SimArm) else None
         self._run.control.stop()
 
     def _check(self, outcome: RunEnded) -> None:
