@@ -15,6 +15,7 @@ from executive.geometry import Array
 from executive.motion.arms import build_kinematics
 from executive.physics.cell_world import CellWorld
 from executive.physics.collision import ClearanceChecker
+from executive.physics.model_files import find_arm_model_errors
 from executive.station.camera import CellCamera, Robot
 from executive.station.view_check import find_view_errors
 from executive.text.validate import KeyPath
@@ -32,8 +33,12 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
     In each named pose, arm and tool must keep the margin to table, bins and the arm itself, because otherwise
     no motion can end in the pose. From each scan pose, the camera must see the whole workspace; a camera with
-    partial views must see it from all its scan poses together.
+    partial views must see it from all its scan poses together. If the model of the arm is invalid, only its
+    errors are reported.
     """
+    if model_errors := tuple(find_arm_model_errors(config.arm)):
+        yield from model_errors
+        return
     with contextlib.closing(ClearanceChecker(config)) as checker:
         if error := _describe_wrong_solver(config, checker.world):
             yield ("arm", "solver"), error
