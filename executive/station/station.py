@@ -30,11 +30,8 @@ from executive.events import Emit, TargetSelected
 from executive.ledger.tracker import Tracker
 from executive.motion.arms import build_planning_kinematics
 from executive.motion.joints import Kinematics
-from executive.motion.planner import Planner
-from executive.motion.straight_paths import plan_straight_motion
-from executive.perception.detectors.cell_detector import CellDetector, build_cell_detectors
+from executive.perception.detectors.cell_detector import CellDetector, TruthDetector, build_cell_detectors
 from executive.perception.detectors.detector_registry import KindMaker, make_installed_kind
-from executive.perception.detectors.simulated import TruthDetector
 from executive.perception.localization import CellLocalizer
 from executive.station.audit import count_outcomes
 from executive.station.border import Border
@@ -257,10 +254,13 @@ def _build_planner(
 ) -> PlannerService:
     """Return the planner service of a cell; without physics, motions have straight joint paths."""
     planning_time = config.motion.planning_time
+    # Each cell needs only one planner; PyBullet and the libraries of the second one take 0.3 s to load.
     if is_without_physics:
+        from executive.motion.straight_paths import plan_straight_motion
+
         plan_straight = partial(plan_straight_motion, config, kinematics)
         return PlannerService(plan_straight, clock, planning_time, emit)
-    # The import loads PyBullet, which takes 0.2 s; a cell without physics and a replay do not need it.
+    from executive.motion.planner import Planner
     from executive.physics.collision import ClearanceChecker
 
     checker = ClearanceChecker(config)
