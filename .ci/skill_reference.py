@@ -89,7 +89,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("fake.arm", "drivers/fake.py", "FakeArm"),
         ("fake.tool", "drivers/fake.py", "FakeTool"),
         ("fake.camera", "drivers/fake.py", "FakeCamera"),
-        ("fake.detector", "perception/detectors/simulated.py", "TruthDetector"),
+        ("fake.detector", "perception/detectors/cell_detector.py", "TruthDetector"),
     ],
     "Test kit: run a skill or a mission": [
         ("executive.testing.run_skill", "testing/run_skill.py", ""),

@@ -32,7 +32,7 @@ from executive.manipulation.tool_goals import (
     sort_pickable_targets,
 )
 from executive.processes import shorten_collections
-from executive.run.run_control import RunControl, halt_on_signals
+from executive.run.operator import RunControl, halt_on_signals
 from executive.station.station import Station
 from executive.tree.tree_node import TreeNode, halt
 

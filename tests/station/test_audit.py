@@ -11,7 +11,7 @@ import pytest
 from executive.cell.devices import TrueObject
 from executive.cell.objects import UNKNOWN_LABEL, Bin
 from executive.geometry import Pose
-from executive.station.audit import AUDIT_KEYS, count_outcomes
+from executive.station.station import AUDIT_KEYS, count_outcomes
 
 ON_TABLE = (0.5, 0.0, 0.025)
 NONE = dict.fromkeys(AUDIT_KEYS, 0)

@@ -12,8 +12,7 @@ import pytest
 
 from executive.cell.config import CellConfig
 from executive.motion.arms import build_kinematics
-from executive.station.check import CellChecker, load_checker
-from executive.station.pose_check import find_pose_errors
+from executive.station.check import CellChecker, find_pose_errors, load_checker
 from tests.motion.joint_states import reach
 
 

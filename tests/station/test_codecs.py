@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 from executive.cell.devices import CameraImage
 from executive.cell.frame import Answer, Detection, ErrorRates, Observation
 from executive.cell.protocols import BehaviourStep
-from executive.station.codecs import (
+from executive.station.border import (
     ANSWER,
     ARRAY,
     BEHAVIOUR_STEP,
