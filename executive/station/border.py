@@ -115,9 +115,11 @@ def encode_observation(seen: Observation) -> list[Any]:
 
 def decode_observation(value: Any) -> Observation:
     """Return the observation that `encode_observation` encoded."""
-    detection, position, *attributes, yaw = value
-    angle = Yaw(*yaw) if yaw is not None else None
-    return Observation(decode_detection(detection), decode_array(position), *attributes, angle)
+    detection, position, std, stamp, is_confident, contradiction, yaw = value
+    return Observation(
+        decode_detection(detection), decode_array(position), std, stamp, is_confident, contradiction,
+        yaw=yaw and Yaw(*yaw),
+    )  # fmt: skip
 
 
 def encode_behaviour_step(step: BehaviourStep) -> dict[str, Any]:
