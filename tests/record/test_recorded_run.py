@@ -10,7 +10,6 @@ from unittest.mock import Mock
 import py_trees
 import pytest
 from click.testing import CliRunner, Result
-from executive.station.without_hardware import CellWithoutHardware
 
 from executive.behaviours import load_skills
 from executive.cell.json_values import to_json
@@ -22,6 +21,7 @@ from executive.record.journal import Journal, read_journal
 from executive.record.picture_recorder import PictureRecorder
 from executive.record.recorded_run import GuardedView, RecordOptions, record_run
 from executive.run.assembly import RunOptions
+from executive.station.station import Station
 from executive.testing.fake_cell import FakeCell
 
 
@@ -90,7 +90,7 @@ def test_whatever_ends_a_run_early_view_journal_and_cell_are_closed(run, tmp_pat
     def fails(self):
         raise error
 
-    monkeypatch.setattr(CellWithoutHardware, "audit", fails)
+    monkeypatch.setattr(Station, "audit", fails)
     view, other = Watcher(), Watcher()
     with pytest.raises(type(error)):
         run(view, other)
