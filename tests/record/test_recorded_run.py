@@ -138,7 +138,7 @@ class Disk:
 
 
 @pytest.fixture
-def run_command(bring_one, tmp_path, monkeypatch, cells):
+def run_command(bring_one, tmp_path, monkeypatch, drivers):
     """Run the command once, without pictures; the result, and the directory that it left, if any."""
     monkeypatch.setattr(PictureRecorder, "__call__", lambda self, timed: None)
 
@@ -154,10 +154,10 @@ def run_command(bring_one, tmp_path, monkeypatch, cells):
 
 
 @pytest.mark.parametrize("room", [0, 300])
-def test_a_run_whose_world_cannot_be_kept_ends_at_rest_and_says_so(run_command, monkeypatch, cells, room):
+def test_a_run_whose_world_cannot_be_kept_ends_at_rest_and_says_so(run_command, monkeypatch, drivers, room):
     Disk(monkeypatch, room)
     shown, left = run_command()
-    assert cells[-1].arm.at_rest
+    assert drivers[-1].arm.at_rest
     assert "no space left on device" in shown.stderr
     assert "Traceback" not in shown.output
     assert shown.exit_code == (3 if room else 2)

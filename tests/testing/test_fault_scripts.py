@@ -109,7 +109,7 @@ def test_a_fault_of_a_node_is_recorded_with_node_item_and_object() -> None:
 def test_the_world_of_an_unknown_cell_cannot_be_changed() -> None:
     case = Case(after(0.0, effects.object_removed(1)))
     case.fake.driver = SimpleNamespace(clock=case.fake.driver.clock)
-    with pytest.raises(InputError, match="not a SimpleNamespace"):
+    with pytest.raises(InputError, match="not the world of a SimpleNamespace"):
         case.fake.advance()
 
 

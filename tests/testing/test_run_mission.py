@@ -10,8 +10,8 @@ import pytest
 
 from executive.errors import Fault, InputError
 from executive.events import RunEnded, RunStarted, TimedEvent
-from executive.testing.faults import after, detector_dead, during, grip_fails
 from executive.testing.fake_cell import FakeCell
+from executive.testing.faults import after, detector_dead, during, grip_fails
 from executive.testing.faulty_cell import FaultInjector
 from executive.testing.run_mission import make_failing, run_mission
 from skills.wait import Wait
