@@ -16,7 +16,7 @@ from executive.text.validate import KeyPath
 
 @dataclass(frozen=True)
 class CellChecker:
-    """Checks cell files of one kind; implements `executive.mission.load.CellChecker`.
+    """Checks cell files of one kind; implements `executive.mission.load.CellFileChecker`.
 
     Attributes:
         kind: Kind of the driver of the cells.
