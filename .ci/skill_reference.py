@@ -43,8 +43,8 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
     "Tool": [
         ("cell.tool", "cell/protocols.py", "Tool"),
         ("cell.tool_model", "cell/tools.py", "ToolModel"),
-        ("grasp = cell.tool_model.list_grasps(...)[0]", "cell/tools.py", "Grasp"),
-        ("measurement = cell.tool_model.measure_contact(...)", "cell/tools.py", "Measurement"),
+        ("grasp = cell.tool_model.list_grasps(...)[0]", "cell/tools.py", "GraspPose"),
+        ("measurement = cell.tool_model.measure_contact(...)", "cell/tools.py", "ToolMeasurement"),
     ],
     "Camera": [
         ("cell.camera", "cell/protocols.py", "Camera"),

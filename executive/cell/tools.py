@@ -45,7 +45,7 @@ class ToolPart:
 
 
 @dataclass(frozen=True)
-class Grasp:
+class GraspPose:
     """An approach after which the tool can grip an object.
 
     Attributes:
@@ -63,7 +63,7 @@ class Grasp:
 
 
 @dataclass(frozen=True)
-class Measurement:
+class ToolMeasurement:
     """Evidence about the class of an object that the tool measured at its contact with the object.
 
     Attributes:
@@ -115,12 +115,12 @@ class ToolModel(Section):
         Raises:
             ValueError: The kind is not installed, or its class cannot be loaded.
         """
-        kind = section.get("kind", DEFAULT_KIND)
+        kind = str(section.get("kind", DEFAULT_KIND))
         entries = list_entries(TOOL_GROUP, "kind of tool")
         if kind not in entries:
             raise ValueError(f'has no installed kind "{kind}"; installed: {", ".join(entries) or "none"}')
         try:
-            model: type[ToolModel] = entries[str(kind)].load()
+            model: type[ToolModel] = entries[kind].load()
         except InputError as error:
             raise ValueError(str(error)) from error
         return model
@@ -172,7 +172,7 @@ class ToolModel(Section):
         is_confirmed: bool = False,
         overtravel: float = OVERTRAVEL,
         spacing: float = CONTACT_SPACING,
-    ) -> Sequence[Grasp]:
+    ) -> Sequence[GraspPose]:
         """Return the possible grasps of an object, at least one, the best first.
 
         Args:
@@ -193,7 +193,7 @@ class ToolModel(Section):
         height: float,  # noqa: ARG002
         classes: Mapping[str, ObjectClass],  # noqa: ARG002
         overtravel: float = OVERTRAVEL,  # noqa: ARG002
-    ) -> Measurement:
+    ) -> ToolMeasurement:
         """Return the evidence of a contact with an object; the default is no evidence.
 
         Args:
@@ -203,7 +203,7 @@ class ToolModel(Section):
             classes: Classes of the cell by label.
             overtravel: As in `list_grasps`.
         """
-        return Measurement()
+        return ToolMeasurement()
 
     def find_distinct_labels(self, classes: Mapping[str, ObjectClass]) -> Collection[str]:  # noqa: ARG002
         """Return the classes that a measurement of the tool distinguishes from all other `classes`."""

@@ -13,7 +13,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.frame import Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, Item, ObjectClass, Obstacle, Target, is_quota_reached
 from executive.cell.protocols import Cell
-from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, Grasp
+from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose
 from executive.errors import NoDepth
 
 MAX_ROLL_DISTANCE = 0.002
@@ -107,7 +107,7 @@ def _list_bin_obstacles(cell: Cell, excluded_item: Item | None) -> Iterator[Obst
 
 def choose_grasp(
     cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = CONTACT_SPACING
-) -> tuple[Grasp, Task]:
+) -> tuple[GraspPose, Task]:
     """Return the best grasp of a target, and the task of the approach; each attempt has another grasp.
 
     Args:

@@ -237,7 +237,7 @@ def check_loads(
         section = config.objects[label]
         if problem := config.tool.explain_unsuitable(section.build_class(label)):
             hint = "Delete the route, or use another tool."
-            yield make_error(cell.find_span(("objects", label), at_key=True), "unsuitable", problem, hint)
+            yield make_error(cell.find_span(("objects", label), at_key=True), "robot", problem, hint)
             continue
         key = "mass" if section.mass is not None else "urdf" if section.urdf else "mesh"
         span = cell.find_span(("objects", label, key))

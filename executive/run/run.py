@@ -258,7 +258,8 @@ class Run:
                 is_tree_ticked = False
                 if self._is_realtime:
                     time.sleep(max(0.0, self._wall_start + self.now - time.monotonic()))
-                control.wait_while_paused()
+                if not control.is_idle:
+                    control.wait_while_paused()
             loop_end = _HALTED
         except Stopped:
             loop_end = _HALTED

@@ -24,10 +24,12 @@ class RunControl:
 
     Attributes:
         is_stopped: True after the first call of `stop`.
+        is_idle: True while `wait_while_paused` has nothing to do.
     """
 
     def __init__(self) -> None:
         self.is_stopped = False
+        self.is_idle = True
         self._is_paused = False
         self._remaining_ticks = 0
         """Number of ticks that `step` requested and that have not begun."""
@@ -48,6 +50,7 @@ class RunControl:
     def pause(self) -> None:
         """Pause the run before its next tick."""
         self._is_paused = True
+        self.is_idle = False
 
     def resume(self) -> None:
         """End the pause."""
@@ -60,6 +63,7 @@ class RunControl:
         # If the run is not paused, no ticks remain, because `resume` sets their number to 0.
         self._remaining_ticks += tick_count
         self._is_paused = True
+        self.is_idle = False
         self._wake_up.set()
 
     def add_request(self, text: str) -> None:
@@ -76,6 +80,7 @@ class RunControl:
         The callback runs in the thread of the tick loop, may read the cell, and must return at once.
         """
         self._callbacks.append(callback)
+        self.is_idle = False
 
     def wait_while_paused(self) -> None:
         """Call the callbacks; in a pause, wait for `resume` or `stop`, or begin a tick of `step`."""

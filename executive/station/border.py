@@ -217,7 +217,7 @@ class Border:
         except (Exception, Stopped) as error:
             self._emit(InputRead(name, read_count, str(error), type(error).__name__))
             raise
-        encoded = codec.encode(value)
+        encoded: Any = value if codec is IDENTITY else codec.encode(value)
         if name not in self._last_values or encoded != self._last_values[name]:
             self._last_values[name] = encoded
             self._emit(InputRead(name, read_count, encoded))
