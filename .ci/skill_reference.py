@@ -84,7 +84,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("executive.perception.evidence", "perception/evidence.py", ""),
     ],
     "Test kit: fake cell": [
-        ("fake = FakeCell()", "drivers/fake.py", "FakeCell"),
+        ("fake = FakeCell()", "testing/fake_cell.py", "FakeCell"),
         ("fake.world", "drivers/fake.py", "FakeWorld"),
         ("fake.arm", "drivers/fake.py", "FakeArm"),
         ("fake.tool", "drivers/fake.py", "FakeTool"),

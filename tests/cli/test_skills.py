@@ -47,7 +47,7 @@ class Rest(Skill):
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.plugins.load_skills", lambda: {"PlaceNeatly": PlaceNeatly, "Rest": Rest})
+    monkeypatch.setattr("executive.behaviours.load_skills", lambda: {"PlaceNeatly": PlaceNeatly, "Rest": Rest})
 
 
 def shown(*words: str) -> Result:
