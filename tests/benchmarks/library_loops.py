@@ -88,7 +88,7 @@ class Parts:
             return False
         number = next(index for index, one in enumerate(context.world.objects) if one.body == held.body)
         if number in self.heavy or (number in self.slippery and self.rng.random() < 0.01):
-            context.world.driver.drop_held_object()
+            context.world.release(held)
         return False
 
 
