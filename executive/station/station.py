@@ -50,6 +50,7 @@ class SilentOperator:
         self._requests = list(requests)
 
     def ask(self, choices: Sequence[str]) -> str | None:
+        """Return the next request, or None after the last request."""
         del choices
         return self._requests.pop(0) if self._requests else None
 
