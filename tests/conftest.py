@@ -8,7 +8,9 @@ import pytest
 from at_hand import look
 from hypothesis import settings
 
+from executive.cell.config import CellConfig
 from executive.cell.objects import Target
+from executive.mission.cell_file import load_cell
 from executive.testing.fake_cell import FakeCell
 
 # Every run of the tests draws the same examples, so that a red test is red again when it is repeated.
@@ -41,3 +43,15 @@ def targets(fake: FakeCell) -> list[Target]:
 def missions() -> Path:
     """The folder of shipped missions."""
     return Path(__file__).parent.parent / "missions"
+
+
+@pytest.fixture(scope="session")
+def overhead(missions: Path) -> CellConfig:
+    """The shipped cell with a fixed camera."""
+    return load_cell(missions / "cells" / "overhead.yaml")
+
+
+@pytest.fixture(scope="session")
+def wrist(missions: Path) -> CellConfig:
+    """The shipped cell with a camera on the wrist."""
+    return load_cell(missions / "cells" / "wrist.yaml")

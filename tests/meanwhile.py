@@ -6,11 +6,11 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
-from executive.cell.devices import ResumePoint, Workcell
+from executive.drivers.fake import FakeDriver
+from executive.drivers.sim.driver import SimDriver
 from executive.events import discard_event
 from executive.mission.load import LoadedMission
-from executive.station.station import CellOptions, SilentOperator
-from executive.testing.fake_cell import FakeCell
+from executive.station.station import CellOptions, SilentOperator, Station
 from executive.testing.oracle import WorldAccess
 
 SETTLING_STEPS = 240
@@ -22,7 +22,7 @@ def meanwhile(
     loaded: LoadedMission,
     seed: int,
     act: Callable[[WorldAccess], None],
-    kind: Callable[..., Workcell],
+    kind: Callable[..., Station],
 ) -> None:
     """Rebuild the world of a cut-off run, let `act` change it, and leave it so for whoever takes the run up.
 
@@ -31,23 +31,24 @@ def meanwhile(
         loaded: The run's mission.
         seed: The run's.
         act: Changes the world; the arm is at rest before, and what was moved comes to rest after.
-        kind: Makes the work cell, a fake or a simulated one.
+        kind: Makes the station, with a fake or a simulated world.
     """
-    options = CellOptions(SilentOperator(), cell_folder=loaded.cell_path.parent, resume=ResumePoint(log))
+    options = CellOptions(SilentOperator(), cell_folder=loaded.cell_path.parent, world_log=log)
     cell = kind(loaded.cell_config, seed=seed, routes=loaded.routes, emit=discard_event, options=options)
     with closing(cell):
         world = WorldAccess(cell)
-        settle(cell, world)
+        settle(cell)
         act(world)
-        settle(cell, world)
+        settle(cell)
 
 
-def settle(cell: Workcell, access: WorldAccess) -> None:
+def settle(cell: Station) -> None:
     """Let the arm and the objects come to rest, in steps that belong to no run."""
-    if isinstance(cell, FakeCell):
-        cell.log_state()
+    if isinstance(cell.driver, FakeDriver):
+        cell.driver.log_state()
         return
-    access.world.is_idle = True
+    assert isinstance(cell.driver, SimDriver)
+    cell.driver.world.is_idle = True
     for _ in range(SETTLING_STEPS):
         cell.advance()
-    access.world.is_idle = False
+    cell.driver.world.is_idle = False

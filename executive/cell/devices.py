@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.arm import Guard, Motion
+from executive.cell.arm import Motion, MotionGuard
 from executive.cell.config import ObjectConfig
 from executive.cell.device_config import STEP
 from executive.cell.frame import Detection
@@ -33,8 +33,18 @@ DEFAULT_ROLE = "main"
 """Role of an arm or a tool that is the only one of its cell."""
 
 
+class DeviceClock(Clock, Protocol):
+    """Clock of the devices, which determines the ticks of a run: a `StepClock` or a `WallClock`."""
+
+    def begin(self, now: float) -> None:
+        """Set the time [s], at the start of a run to 0, at its resumption to the time of the interruption."""
+
+    def wait_for_tick(self) -> None:
+        """Wait until the next tick; a simulation advances its devices to this tick."""
+
+
 class StepClock:
-    """Clock of a simulation, which stands still between two ticks; implements `Clock`.
+    """Clock of a simulation, which stands still between two ticks; implements `DeviceClock`.
 
     Attributes:
         step: Time between two ticks [s].
@@ -58,6 +68,10 @@ class StepClock:
         """Yield until the time has advanced by `duration` [s]."""
         return sleep_on(self, duration)
 
+    def begin(self, now: float) -> None:
+        """Set the time to a multiple of `step`."""
+        self.tick_count = round(now / self.step)
+
     def wait_for_tick(self) -> None:
         """Advance the time by `step`, and the devices with it."""
         self.tick_count += 1
@@ -65,7 +79,7 @@ class StepClock:
 
 
 class WallClock:
-    """Clock of real devices; implements `Clock`.
+    """Clock of real devices; implements `DeviceClock`.
 
     Attributes:
         step: Time between two ticks [s].
@@ -81,17 +95,21 @@ class WallClock:
         self.tick_count = 0
         self.late_tick_count = 0
         self.on_tick: Callable[[], None] = lambda: None
-        self._start = time.monotonic()
-        self._next_tick = step
+        self.begin(0.0)
 
     @property
     def now(self) -> float:
-        """Time since the creation of the clock [s]."""
+        """Time since the start of the run [s]."""
         return time.monotonic() - self._start
 
     def sleep(self, duration: float) -> Steps:
         """Yield until the time has advanced by `duration` [s]."""
         return sleep_on(self, duration)
+
+    def begin(self, now: float) -> None:
+        """Set the time; the next tick is one `step` later."""
+        self._start = time.monotonic() - now
+        self._next_tick = now + self.step
 
     def wait_for_tick(self) -> None:
         """Sleep until the next multiple of `step`; a late tick leaves out the multiples before it."""
@@ -100,7 +118,7 @@ class WallClock:
             time.sleep(delay)
         elif -delay >= self.step:
             self.late_tick_count += 1
-            self._next_tick -= self.step * (delay // self.step)
+            self._next_tick += self.step * (-delay // self.step)
         self._next_tick += self.step
         self.tick_count += 1
         self.on_tick()
@@ -140,7 +158,7 @@ class ArmDevice(Protocol):
     def contact_point(self) -> Sequence[float] | None:
         """Point `(x, y, z)` [m] at which the last motion collided; None: unknown, or no collision."""
 
-    def execute(self, motion: Motion, guard: Guard) -> None:
+    def execute(self, motion: Motion, guard: MotionGuard) -> None:
         """Begin to follow `motion` from rest at its start; stop along its path as `guard` says.
 
         The arm also stops, and sets `collision`, if it touches something before `motion.guarded_start_time`,
@@ -184,8 +202,8 @@ class Driver(Protocol):
     """The devices of one cell."""
 
     @property
-    def clock(self) -> Clock:
-        """Clock of the devices; its time is 0 at the start of the run."""
+    def clock(self) -> DeviceClock:
+        """Clock of the devices, a `StepClock` or a `WallClock`."""
 
     @property
     def arms(self) -> Mapping[str, ArmDevice]:

@@ -231,9 +231,6 @@ class Clock(Protocol):
     def sleep(self, duration: float) -> Steps:
         """Yield until the time of the clock has advanced by `duration` [s]."""
 
-    def wait_for_tick(self) -> None:
-        """Wait until the next tick; a simulation advances its devices to this tick. Only a run calls this."""
-
 
 class Tool(Protocol):
     """A tool with a contact sensor, a sensor of the grip, and a load cell."""

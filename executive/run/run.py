@@ -89,10 +89,6 @@ class RunClock:
         """Yield until the time has advanced by `duration` [s]."""
         return sleep_on(self, duration)
 
-    def wait_for_tick(self) -> None:
-        """Not allowed: the run waits for the next tick."""
-        raise Fault("a skill must not wait for the next tick; write `yield`")
-
 
 class Run:
     """One execution of a mission on a work cell: its events, its tick loop and its end.
@@ -239,6 +235,7 @@ class Run:
         tick_tree = tree.tick if has_callbacks else self.root.tick_once
         try:
             if self.start_event is not None:
+                self.station.driver.clock.begin(0.0)
                 self.emit(self.start_event)
             self.begin_step(self.clock.tick)
             self._wall_start = time.monotonic() - self.now

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CellChecker:
-    """Checks cell files of one kind; implements `executive.mission.load.CellChecker`.
+    """Checks cell files of one kind; implements `executive.mission.load.CellFileChecker`.
 
     Attributes:
         kind: Kind of the driver of the cells.
@@ -51,6 +51,9 @@ class CellChecker:
             yield from find_view_errors(config)
             return
         yield from find_detector_errors(config.detectors, cell_folder)
+        if any(keys[0] == "arm" for keys, _ in driver_errors):
+            return  # Without a valid model of the arm, its poses cannot be checked.
+
         yield from find_pose_errors(config)
 
     def labels(self, config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
@@ -95,7 +98,6 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     no motion can end in the pose. From each scan pose, the camera must see the whole workspace; a camera with
     partial views must see it from all its scan poses together.
     """
-    # The import loads PyBullet, which takes 0.2 s; a cell without physics does not need it.
     from executive.physics.collision import ClearanceChecker
 
     with contextlib.closing(ClearanceChecker(config)) as checker:

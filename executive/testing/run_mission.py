@@ -81,6 +81,7 @@ def run_mission(
     mission: str | Path,
     make_cell: Callable[..., Station] = FakeCell,
     *,
+    cell: str = "",
     seed: int = 0,
     set: Mapping[str, str] | None = None,
     requests: Sequence[str] = (),
@@ -96,6 +97,7 @@ def run_mission(
     Args:
         mission: Mission file, or name of a shipped mission.
         make_cell: Function that makes the station, instead of the kind in the cell file.
+        cell: Cell file or name of the shipped cell that replaces the mission's cell, or "".
         seed: Random seed.
         set: Values of params by name, and of keys of the cell file by `cell.<key>.<key>`.
         requests: Requests of the operator, in order.
@@ -111,7 +113,7 @@ def run_mission(
         InputError: The mission does not exist, a pattern matches no node, or a substitute is no subclass of
             the skill that it replaces.
     """
-    loaded = load_mission(mission, load_skills(), set)
+    loaded = load_mission(mission, load_skills(), set, replacing_cell=cell)
     events: list[TimedEvent] = []
     injector = FaultInjector(faults, timeout)
     options = RunOptions(seed, requests, make_cell=injector.wrap(make_cell), substitutes=substitutes or {})

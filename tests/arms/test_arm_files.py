@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 import yaml
 from click.testing import CliRunner
-from executive.cell.workcell import load_cell_kind
 
 from executive.behaviours import load_skills
 from executive.cli.main import main
@@ -16,6 +15,8 @@ from executive.mission.cell_file import load_cell
 from executive.mission.load import load_mission
 from executive.physics.model_files import find_model
 from executive.record.run_directory import read_cell
+from executive.station.check import load_checker
+from executive.station.station import Station
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import run_mission
 from executive.text.findings import MissionError
@@ -52,7 +53,7 @@ def change(file: str, old: str, new: str) -> None:
 
 
 def test_an_arm_file_beside_the_cell_is_checked_and_run() -> None:
-    loaded = load_mission(MISSION, load_skills(), find_cell_kind=load_cell_kind)
+    loaded = load_mission(MISSION, load_skills(), find_checker=load_checker)
     assert (loaded.warnings, loaded.cell_config.arm.arm) == ((), "cobot")
     result = run_mission(MISSION, FakeCell, seed=5)
     assert (result.status, result.agrees, result.items["placed"]) == ("SUCCESS", True, result.items["seen"])
@@ -60,7 +61,7 @@ def test_an_arm_file_beside_the_cell_is_checked_and_run() -> None:
 
 @pytest.mark.slow
 def test_the_same_arm_under_another_name_moves_in_the_same_way() -> None:
-    results = [run_mission(name, load_cell_kind("sim"), seed=5) for name in (MISSION, "sort_overhead")]
+    results = [run_mission(name, Station, seed=5) for name in (MISSION, "sort_overhead")]
     assert results[0].status == "SUCCESS" and results[0].agrees
     assert results[0].items == results[1].items
     assert results[0].events[-1].clock == results[1].events[-1].clock
@@ -111,7 +112,7 @@ def test_keys_of_the_cell_replace_keys_of_the_arm_file() -> None:
 def test_a_wrong_arm_has_one_finding_at_its_place(file: str, old: str, new: str, expected: str) -> None:
     change(f"cells/{file}", old, new)
     with pytest.raises(MissionError) as caught:
-        load_mission(MISSION, load_skills(), find_cell_kind=load_cell_kind)
+        load_mission(MISSION, load_skills(), find_checker=load_checker)
     (finding,) = caught.value.findings
     assert str(finding).startswith(expected, str(finding).index(Path(file).name))
 
@@ -122,7 +123,7 @@ def test_a_solver_for_another_arm_is_a_finding() -> None:
     Path("cells/arms/longer.urdf").write_text(text.replace('xyz="0 0.2045 0"', 'xyz="0 0.3045 0"'))
     change("cells/arms/cobot.yaml", "kuka_iiwa/model.urdf", "longer.urdf")
     config = load_cell(Path("cells/bench.yaml"))
-    ((keys, message),) = load_cell_kind("sim").check(config, Path("cells"))
+    ((keys, message),) = load_checker("sim").check(config, Path("cells"))
     assert (keys, message.partition(" does not describe")[0]) == (("arm", "solver"), 'the solver "iiwa14"')
     assert "its tool is 0.100 m away from the tool of the model" in message
 

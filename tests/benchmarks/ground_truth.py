@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from executive.drivers.sim.cell import SimCell, list_final_objects
 
 from executive.behaviours import load_skills
 from executive.cell.devices import TrueObject
 from executive.cell.objects import UNKNOWN_LABEL
+from executive.drivers.sim.driver import SimDriver
 from executive.events import ItemChanged
 from executive.ledger.item import State
 from executive.mission.load import load_mission
@@ -21,6 +22,7 @@ from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
 from executive.station.check import load_checker
 from executive.station.station import count_outcomes
+from executive.station.station import Station
 from tests.benchmarks.forks import ForkRunner
 
 HUNG = "HUNG"
@@ -125,35 +127,36 @@ class AuditedRun:
         ]
 
 
-class AuditedCell(SimCell):
-    """A simulated cell that tells the true end of every object after `audit`.
+class AuditedCell(Station):
+    """A station of a simulated cell that tells the true end of every object after `audit`.
 
     Attributes:
         objects: The objects; empty before `audit`.
     """
 
+    driver: SimDriver
+
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
+        self.tick_callbacks.append(self._note_carried_item)
         self.objects: tuple[FoundObject, ...] = ()
         self._carried: dict[int, str] = {}
 
-    def advance(self) -> None:
-        """Let one physics step pass, and note the item with which a body is carried."""
-        super().advance()
-        body = self._tool.held_body
+    def _note_carried_item(self) -> None:
+        """Note the item with which a body is carried."""
+        body = self.driver.tool.held_body
         if body is not None:
             for record in self.ledger.records:
                 if record.state is State.HELD:
                     self._carried[body] = record.item
 
-    def audit(self) -> dict[str, int]:
+    def audit(self) -> Mapping[str, int] | None:
         """Return what really became of the objects, and keep it object by object."""
-        final_objects = list_final_objects(self._world, self._tool, self.cell.bins)
-        self.objects = tuple(map(self._find, self._world.rest_positions, final_objects))
+        self.objects = tuple(map(self._find, self.driver.list_final_objects()))
         return super().audit()
 
-    def _find(self, body: int, final_object: TrueObject) -> FoundObject:
-        """Return the true end of a body."""
+    def _find(self, final_object: TrueObject) -> FoundObject:
+        """Return the true end of an object."""
         gate = self.config.ledger.gate
         records = self.ledger.records
         counts = count_outcomes([final_object], records, self.cell.bins, self.routes, gate)
@@ -163,8 +166,8 @@ class AuditedCell(SimCell):
             for position in final_object.rest_positions
             if np.linalg.norm(record.first_position[:2] - position[:2]) <= gate
         ]
-        if body in self._carried:
-            items = [self._carried[body]]
+        if final_object.body in self._carried:
+            items = [self._carried[final_object.body]]
         return FoundObject(
             label=final_object.label,
             place=next((place for place in END_PLACES if counts[place]), ""),

@@ -12,16 +12,14 @@ import shutil
 import tempfile
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from py_trees.common import Status
 
 from executive.campaign.jobs import MissionUnderTest
 from executive.cell.device_config import STEP
-from executive.cell.devices import CellWrapper, Workcell
 from executive.drivers.sim.arm import SimArm
 from executive.errors import ExecutiveError
 from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent
@@ -31,6 +29,7 @@ from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.record.journal import Journal, Trace, read_journal
 from executive.run.assembly import RunOptions, assemble
+from executive.station.station import Station
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_subject, run_command
 
@@ -67,14 +66,14 @@ def measure(subject: MissionUnderTest, every: int | None = None) -> Figures:
     }
 
 
-def check_arm_at_rest(workcell: Workcell) -> Iterator[str]:
+def check_arm_at_rest(station: Station) -> Iterator[str]:
     """Yield a problem if the arm is not at rest now, or moves during `REST_CHECK_STEPS` control steps."""
-    arm = workcell.cell.arm
+    arm = next(iter(station.driver.arms.values()))
     if not arm.at_rest:
         yield "the arm is not at rest"
     positions = [arm.q]
     for _ in range(REST_CHECK_STEPS):
-        workcell.advance()
+        station.advance()
         positions.append(arm.q)
     movement = float(np.ptp(positions, axis=0).max())
     if movement > MAX_MOVEMENT_AT_REST:
@@ -168,19 +167,6 @@ def measure_distance(q: Array, trajectory: Trajectory) -> float:
     return float(np.abs(trajectory.state_at((low + high) / 2).q - q).max())
 
 
-class WatchedCell(CellWrapper):
-    """A work cell with a call before and after every control step."""
-
-    def __init__(self, inner: Workcell, before: Callable[[], None], after: Callable[[], None]) -> None:
-        super().__init__(inner)
-        self._before, self._after = before, after
-
-    def advance(self) -> None:
-        self._before()
-        super().advance()
-        self._after()
-
-
 class _RunWithHalts:
     """The run, and the results of its children so far."""
 
@@ -195,14 +181,10 @@ class _RunWithHalts:
         self._halts: list[Figures] = []
         self._halt: Figures = {}
         self._limits = JointLimits.from_config(subject.loaded.cell_config.arm.limits)
-
-        def make_cell(*args: Any, **options: Any) -> CellWrapper:
-            inner = subject.make_cell(*args, **options)
-            return WatchedCell(inner, before=self._fork_and_halt_if_due, after=self._keep_command)
-
-        options = RunOptions(subject.seed, subject.requests, make_cell=make_cell)
+        options = RunOptions(subject.seed, subject.requests, make_cell=subject.make_cell)
         self._run = assemble(subject.loaded, options, [lambda event: self._journal(event), self._trace])
-        self._arm = self._run.workcell.cell.arm
+        self._arm = next(iter(self._run.station.driver.arms.values()))
+        self._run.station.tick_callbacks += [self._keep_command, self._fork_and_halt_if_due]
 
     def run(self, undisturbed: Figures) -> list[Figures]:
         """Run the mission and return what its children sent.
@@ -234,7 +216,7 @@ class _RunWithHalts:
 
     def _keep_command(self) -> None:
         if isinstance(self._arm, SimArm):
-            self._commands.append(self._arm._commanded_q)
+            self._commands.append(self._arm.commanded_q)
 
     def _fork_and_halt_if_due(self) -> None:
         """Fork if a halt is due: the child requests a stop and goes on; the parent keeps the result."""
@@ -250,7 +232,7 @@ class _RunWithHalts:
         self._journal = Journal(self._journal_path, resume=True)
         self._commands = deque(self._commands)
         self._halt["commands_before_stop"] = len(self._commands)
-        self._motion = self._arm._motion if isinstance(self._arm, SimArm) else None
+        self._motion = self._arm.motion if isinstance(self._arm, SimArm) else None
         self._run.control.stop()
 
     def _check(self, outcome: RunEnded) -> None:

@@ -149,7 +149,7 @@ def change_world(subject: MissionUnderTest, seed: int, path: Path, past: InputLo
         others = [thing for thing in world.objects if held is None or thing.body != held.body]
         on_table = [thing for thing in others if is_within(thing.position[:2], bounds)]
         if change == "dropped" and held is not None:
-            world.cell.tool.lose_grip()
+            world.release(held)
             done.append(f"dropped {held.label}")
         elif on_table:
             thing = on_table[int(random.integers(len(on_table)))]

@@ -17,7 +17,7 @@ import numpy as np
 
 from executive.cell.frame import Answer
 from executive.errors import Fault
-from executive.station.check import load_checker
+from executive.station.station import Station
 from executive.testing.faults import (
     after,
     during,
@@ -70,7 +70,7 @@ class Parts:
 
     def close(self, proceed: Callable[[], None], occurrence: Occurrence) -> None:
         """Close the tool and count the pick, unless the touched object cannot be sealed."""
-        tool = occurrence.context.cell.arm.tool_pose.position
+        tool = occurrence.context.station.unrecorded_cell.arm.tool_pose.position
         objects = occurrence.context.world.objects
         # The objects of a stack lie one above the other.
         distances = [math.dist(one.position, tool) for one in objects]
@@ -88,7 +88,7 @@ class Parts:
             return False
         number = next(index for index, one in enumerate(context.world.objects) if one.body == held.body)
         if number in self.heavy or (number in self.slippery and self.rng.random() < 0.01):
-            context.world.cell.tool.lose_grip()
+            context.world.release(held)
         return False
 
 
@@ -129,7 +129,7 @@ def run_with_faults(seed: int, kind: str) -> tuple[str, int, MissionResult, Part
         detector = "fasteners" if "fasteners" in mission else "embedded"
         rates = ASSUMED_RATES if kind == "fake" else {"threshold": UNMEASURED_THRESHOLD}
         values |= {f"cell.detectors.{detector}.{key}": str(value) for key, value in rates.items()}
-    result = run_mission(mission, load_checker(kind), seed=seed, set=values, faults=faults, timeout=TIMEOUT)
+    result = run_mission(mission, Station, seed=seed, set=values, faults=faults, timeout=TIMEOUT)
     return mission, ATTEMPTS[mission], result, parts
 
 

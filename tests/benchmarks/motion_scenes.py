@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass, Obstacle
-from executive.drivers.sim.models import build_simulated_class, load_mesh
+from executive.drivers.sim.models import compute_mass, load_mesh
 from executive.drivers.sim.scene import spawn_objects
 from executive.drivers.sim.world import World
 from executive.errors import InputError, Unreachable
@@ -22,6 +22,7 @@ from executive.geometry import make_tool_down_pose
 from executive.manipulation.tool_goals import make_slot_goal
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.planner import Planner
+from executive.physics.collision import ClearanceChecker
 from executive.tools.suction import compute_breakaway_force, measure_contact
 
 MAX_TRIES = 50
@@ -149,7 +150,8 @@ class SceneGenerator:
 
     def _kind(self, body: int) -> ObjectClass:
         label = self._world.labels[body]
-        return build_simulated_class(label, self._cell.objects[label])
+        section = self._cell.objects[label]
+        return replace(section.build_class(label), mass=compute_mass(section))
 
     def _measure_seal(self, body: int, place: tuple[float, float], top: float) -> tuple[float, float]:
         """Return the surface height under a cup at `place` [m], and the breakaway force of a seal there [N].

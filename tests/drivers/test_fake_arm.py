@@ -1,4 +1,4 @@
-"""The fake arm goes up, across and down on straight joint paths, and takes its time to plan."""
+"""The fake arm goes up, across and down on straight joint paths."""
 
 from __future__ import annotations
 
@@ -10,18 +10,17 @@ import pytest
 from executive.cell.arm import Goal, Motion, Task
 from executive.cell.device_config import STEP
 from executive.cell.objects import BIN_THICKNESS, Obstacle
-from executive.errors import Blocked, Fault, Unreachable
-from executive.events import Event, MotionPlanned
+from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.straight_paths import JOINT_SPEED
 from executive.testing.fake_cell import FakeCell, load_empty_cell
 
-LATENCY = load_empty_cell().motion.planning_time
+ASIDE = np.radians(load_empty_cell().arm.poses_deg["aside"])
 BESIDE = Goal((0.5, 0.2, 0.03), guarded_length=0.02, guarded_speed=0.05)
 
 
 def plan_motion(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> Motion:
-    planning = fake.arm.plan(goal, task)
+    planning = fake.cell.arm.plan(goal, task)
     while not planning.ready:
         fake.advance()
     return planning.result()
@@ -29,7 +28,7 @@ def plan_motion(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> Motion
 
 def move(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> tuple[Array, Array]:
     """Go to a goal; return joint positions `(N, n)` [rad] and tool positions `(N, 3)` [m] of all steps."""
-    fake.arm.start(plan_motion(fake, goal, task))
+    fake.cell.arm.start(plan_motion(fake, goal, task))
     states = []
     while not fake.arm.at_rest:
         fake.advance()
@@ -62,7 +61,7 @@ def test_it_goes_up_across_and_down_and_the_last_part_slowly(fake: FakeCell) -> 
 def test_a_named_pose_is_reached_on_a_straight_line_of_the_joints(fake: FakeCell) -> None:
     start = fake.arm.q
     qs, _ = move(fake, "aside")
-    assert qs[-1] == pytest.approx(fake.arm.poses["aside"])
+    assert qs[-1] == pytest.approx(ASIDE)
     shares = (qs - start)[:, 0] / (qs[-1] - start)[0]
     assert qs == pytest.approx(start + shares[:, None] * (qs[-1] - start))
 
@@ -70,30 +69,6 @@ def test_a_named_pose_is_reached_on_a_straight_line_of_the_joints(fake: FakeCell
 def test_the_tool_turns_as_the_goal_says(fake: FakeCell) -> None:
     move(fake, Goal((0.5, 0.0, 0.1), yaws=(math.pi / 2,)))
     assert fake.arm.tool_pose.rotation[:, 0] == pytest.approx([0, -1, 0], abs=1e-9)
-
-
-def test_a_plan_takes_its_time_unless_it_was_asked_for_before() -> None:
-    events = list[Event]()
-    fake = FakeCell(emit=events.append)
-    motion = plan_motion(fake, "aside")
-    fake.arm.start(motion)
-    fake.arm.plan_ahead("home")  # replaced by the next plan
-    fake.arm.plan_ahead(BESIDE)
-    destination = fake.arm.destination
-    while not fake.arm.at_rest:
-        fake.advance()
-    assert destination == pytest.approx(fake.arm.tool_pose.position)
-    planning = fake.arm.plan(BESIDE)
-    assert planning.ready and planning.ready
-    duration = round(planning.result().duration, 4)
-    assert events == [
-        MotionPlanned(False, LATENCY, round(motion.duration, 4)),
-        MotionPlanned(True, 0.0, duration),
-    ]
-    planning = fake.arm.plan(BESIDE)
-    assert not planning.ready, "a plan is used once"
-    with pytest.raises(Fault, match='no arm pose "scan"; it has aside, home'):
-        fake.arm.plan("scan")
 
 
 @pytest.mark.parametrize(
@@ -140,34 +115,17 @@ def test_a_goal_out_of_reach_is_unreachable(fake: FakeCell) -> None:
     far = Goal((0.8, 0.4, 0.1))
     with pytest.raises(Unreachable, match="beyond the reach"):
         plan_motion(fake, far)
-    assert "beyond the reach" in fake.arm.describe_unreachable(far)
-    assert fake.arm.describe_unreachable(BESIDE) == ""
+    assert "beyond the reach" in fake.cell.arm.describe_unreachable(far)
+    assert fake.cell.arm.describe_unreachable(BESIDE) == ""
 
 
 def test_a_motion_that_runs_into_something_ends_half_way_and_the_next_does_not(fake: FakeCell) -> None:
     start = fake.arm.q
     fake.arm.next_obstacle = "a hand"
     qs, places = move(fake, "aside")
-    assert qs[-1] == pytest.approx((start + fake.arm.poses["aside"]) / 2, abs=0.02)
+    assert qs[-1] == pytest.approx((start + ASIDE) / 2, abs=0.02)
     assert (fake.arm.collision, fake.arm.contact_point) == ("a hand", places[-1].tolist())
-    assert fake.arm.destination == pytest.approx(places[-1])
+    assert fake.cell.arm.destination == pytest.approx(places[-1])
     qs, _ = move(fake, "aside")
-    assert qs[-1] == pytest.approx(fake.arm.poses["aside"])
+    assert qs[-1] == pytest.approx(ASIDE)
     assert fake.arm.collision is None
-
-
-def test_it_follows_one_motion_at_a_time_and_none_of_another_arm(fake: FakeCell) -> None:
-    class Hop:
-        duration = 1.0
-
-    with pytest.raises(Fault, match="follows its own planned motions, not a Hop"):
-        fake.arm.start(Hop())
-    motion = plan_motion(fake, "aside")
-    fake.arm.start(motion)
-    with pytest.raises(Fault, match="start a motion while moving"):
-        fake.arm.start(motion)
-    with pytest.raises(Fault, match="plan a motion while moving"):
-        fake.arm.plan("home")
-    fake.arm.stop()
-    fake.arm.stop_after_collision("not while it rests")
-    assert (fake.arm.commands, fake.arm.collision) == (["start", "stop"], None)

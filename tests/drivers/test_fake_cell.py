@@ -14,6 +14,8 @@ from executive.cell.frame import Detections
 from executive.errors import InputError
 from executive.mission.cell_file import load_cell
 from executive.station.station import AUDIT_KEYS
+from executive.station.station import AUDIT_KEYS
+from executive.station.check import load_checker
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
@@ -91,13 +93,13 @@ def test_a_camera_on_the_wrist_sees_the_table_from_its_scan_poses_and_locates_tr
 
 
 def test_places_out_of_reach_and_too_many_objects_are_reported(load: Load) -> None:
-    assert not list(FakeCell.check(load(), Path()))
+    assert not list(load_checker("fake").check(load(), Path()))
     wrong = {"bins__blue_bin__position": "[0.2, 0.9, 0.0]", "safe_place": "[0.9, 0.0, 0.0]"}
-    errors = list(FakeCell.check(load(**wrong, table__objects="[0, 19]"), Path()))
+    errors = list(load_checker("fake").check(load(**wrong, table__objects="[0, 19]"), Path()))
     assert [(".".join(map(str, key)), text.split(":")[0][:35]) for key, text in errors] == [
+        ("table.objects", "the table has room for 18 objects, "),
         ("bins.blue_bin.position", 'the bin "blue_bin" is out of reach'),
         ("safe_place", "the safe place is out of reach"),
-        ("table.objects", "the table has room for 18 objects, "),
     ]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from executive.cell.arm import Goal
-from executive.drivers.world_log import IDLE_STEP, JOINT_TARGETS, OPEN, RUN_STEP, CommandLog, read_commands
+from executive.drivers.world_log import IDLE_STEP, OPEN, RUN_STEP, CommandLog, read_commands
 from executive.errors import InputError
 from executive.motion.planner import Planner
 from executive.testing.fake_cell import load_empty_cell
@@ -25,7 +25,7 @@ def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
     written = CommandLog(path)
     joints = [1 / 3, *np.random.default_rng(1).normal(size=7)]
     motion = Planner(cell).plan(np.radians(cell.arm.poses_deg["home"]), Goal((0.5, 0.0, 0.1)))
-    written.append(JOINT_TARGETS, *joints)
+    written.append(RUN_STEP, *joints)
     written.append_motion(motion)
     written.close()
     written.close()
@@ -34,7 +34,7 @@ def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
     again.close()
     CommandLog().append(RUN_STEP)  # nothing is kept without a path
     targets, started, idle = read_commands(path)
-    assert targets == (JOINT_TARGETS, joints)
+    assert targets == (RUN_STEP, joints)
     assert idle == (IDLE_STEP, [])
     assert started.arguments[0] == motion.duration
     samples = np.frombuffer(base64.b64decode(started.arguments[1])).reshape(3, -1, 7)
@@ -45,7 +45,7 @@ def test_a_torn_command_is_left_out_and_overwritten(path: Path) -> None:
     written = CommandLog(path)
     written.append(RUN_STEP)
     whole = path.stat().st_size
-    written.append(JOINT_TARGETS, *range(8))
+    written.append(RUN_STEP, *range(8))
     written.close()
     content = path.read_bytes()
     for length in (whole, whole + 1, len(content) - 1):

@@ -12,6 +12,7 @@ from executive.geometry import GRAVITY
 from executive.manipulation.drops import MAX_PREDICTABLE_SPEED, detect_and_record_drop, predict_landing
 from executive.manipulation.motions import plan
 from executive.manipulation.tool_goals import list_obstacles
+from executive.station.planner_service import PlannedArm
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.move_to_scan import MoveToScan
@@ -89,7 +90,7 @@ def test_what_slips_away_over_its_bin_is_believed_there_unless_it_was_thrown(
 ) -> None:
     held = pick(fake, target)
     run_skill(Transit(held=held, bin="red_bin"), fake)
-    monkeypatch.setattr(fake.arm, "tool_velocity", np.array((0.0, speed, 0.0)))
+    monkeypatch.setattr(PlannedArm, "tool_velocity", np.array((0.0, speed, 0.0)))
     fake.tool.lose_grip()
     assert detect_and_record_drop(fake.cell, held)
     fake.ledger.set_final_states(completed=True)

@@ -10,7 +10,6 @@ from at_hand import look, pick
 
 from executive.cell.arm import Goal
 from executive.cell.objects import BIN_THICKNESS, Target
-from executive.drivers.fake import FakeArm
 from executive.manipulation.motions import make_task, make_transport_task
 from executive.manipulation.tool_goals import (
     DROP_HEIGHT,
@@ -24,6 +23,7 @@ from executive.manipulation.tool_goals import (
     sort_by_tour,
     sort_pickable_targets,
 )
+from executive.station.planner_service import PlannedArm
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
@@ -66,7 +66,7 @@ def test_a_place_out_of_reach_is_not_chosen(
     fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        FakeArm, "describe_unreachable", lambda arm, goal: "too far" if goal.position[0] <= SAFE[0] else ""
+        PlannedArm, "describe_unreachable", lambda arm, goal: "too far" if goal.position[0] <= SAFE[0] else ""
     )
     goal = make_put_down_goal(fake.cell, fake.cell.classes["cube"], 0.01, held)
     assert goal.position[0] > SAFE[0]
@@ -174,6 +174,6 @@ def test_the_shortest_tour_may_begin_with_a_farther_target(fake: FakeCell, y: fl
     fake.world.put("cube", 0.5, 0.2)
     fake.world.put("duck", 0.5, -0.15)
     targets = look(fake, "full")
-    fake.arm.start(fake.arm.plan(Goal((0.5, y, 0.3))).result())
+    fake.cell.arm.start(fake.cell.arm.plan(Goal((0.5, y, 0.3))).result())
     assert [target.item for target in sort_pickable_targets(fake.cell, targets)] == ["cube-1", "duck-1"]
     assert sort_by_tour(fake.cell, targets)[0].item == first

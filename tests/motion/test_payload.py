@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from executive.cell.arm import JointState
 from executive.cell.objects import ObjectClass
 from executive.geometry import GRAVITY
 from executive.motion.optimizer import DISTANCE_PER_ACCELERATION, SAMPLE_STRIDE, PayloadLimit

@@ -10,13 +10,14 @@ import at_hand
 import pytest
 
 from executive.cell.arm import Goal
+from executive.cell.device_config import STEP
 from executive.cell.objects import Target
 from executive.errors import Unreachable
 from executive.events import FrameSearched, MotionPlanned, TargetSelected, TimedEvent
 from executive.manipulation.tool_goals import sort_pickable_targets
 from executive.motion.configurations import ConfigurationPairs, find_configuration_pairs
 from executive.motion.joints import Kinematics
-from executive.run.run import LookaheadPlanner, Run
+from executive.run.run import Run
 from executive.skill import Skill, SkillFailed
 from executive.testing.fake_cell import FakeCell
 from skills.approach import Approach
@@ -43,7 +44,7 @@ class Bench:
         self.decisions: list[str] = []
         self.mission_run = Run("bench", [self.note])
         self.fake = FakeCell(emit=self.mission_run.emit)
-        self.mission_run.connect(self.fake, LookaheadPlanner(self.fake.cell))
+        self.mission_run.connect(self.fake, STEP)
         self.mission_run.begin_step(0)
         self.look = partial(at_hand.look, self.fake)
         self.fake.world.put("cube", 0.5, 0.0)
@@ -137,7 +138,7 @@ def test_a_carry_to_another_bin_is_waited_for_and_the_approach_after_it_is_not(b
 def planned(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> list[Goal]:
     """The goals that the arm was asked to plan ahead."""
     planned: list[Goal] = []
-    monkeypatch.setattr(bench.fake.arm, "plan_ahead", lambda goal, task: planned.append(goal))
+    monkeypatch.setattr(bench.fake.unrecorded_cell.arm, "plan_ahead", lambda goal, task: planned.append(goal))
     return planned
 
 

@@ -38,7 +38,7 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
     fake = fake_of(run)
     stubborn = fake.world.objects[0]
     fake.tool.can_hold = lambda: fake.world.find_touched_object(fake.arm.tool_pose.position) is not stubborn
-    outcome, items, audit = run.execute(), run.workcell.accounts.count_states(), run.workcell.audit()
+    outcome, items, audit = run.execute(), run.station.ledger.count_states(), run.station.audit()
     assert (outcome.status, outcome.reason) == ("INCOMPLETE", "rejected")
     (rejected,) = (row for row in run.station.ledger.list_items() if row.state == "rejected")
     assert rejected.reason == "could not be picked (6 failed attempts)"

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from executive.drivers.sim.kind import SIM_CELL_KIND
 
 from executive.cell.config import CellConfig
-from executive.cell.devices import CellKind
 from executive.mission.cell_file import load_cell, read_cell
 from executive.station.check import find_view_errors
 from executive.testing.fake_cell import FakeCell
+from executive.station.check import load_checker
+from executive.station.check import find_view_errors
 from executive.text.yaml_files import get_shipped_folder
 
 CELLS = get_shipped_folder() / "cells"
@@ -51,7 +51,9 @@ def test_a_view_without_the_workspace_is_named_with_what_it_lacks(
     assert fragment in message
 
 
-@pytest.mark.parametrize("kind", [SIM_CELL_KIND, FakeCell])
-def test_every_kind_of_cell_checks_the_views(kind: CellKind) -> None:
+@pytest.mark.parametrize("kind", ["sim", "fake"])
+def test_the_views_of_every_kind_of_cell_are_checked(kind: str) -> None:
     config = changed("overhead", table_view=[0, 0, 64, 64])
-    assert [key for key, _ in kind.check(config, CELLS)] == [("cameras", "overhead", "table_view")]
+    assert [key for key, _ in load_checker(kind).check(config, CELLS)] == [
+        ("cameras", "overhead", "table_view")
+    ]

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from executive.drivers.sim.kind import SIM_CELL_KIND
 
 from executive.behaviours import load_skills
 from executive.cli.main import main
@@ -20,6 +19,7 @@ from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replayed_run import replay_run
 from executive.run.assembly import RunOptions
+from executive.station.check import load_checker
 from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import during, grip_fails, grip_lost
 from executive.testing.oracle import make_oracle_kind
@@ -128,7 +128,7 @@ def test_a_run_with_it_is_recorded_and_replayed(mission: Path, tmp_path: Path) -
 
 def test_its_parts_are_shown_and_checked(mission: Path) -> None:
     config = load_cell(mission.with_name("yard.yaml"))
-    assert list(SIM_CELL_KIND.check(config, mission.parent)) == []
+    assert list(load_checker("sim").check(config, mission.parent)) == []
     world = World(config)
     rod, head = [shape for shape in SimVisuals(world).shapes if shape.kind == "cylinder"]
     world.close()

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from executive.cell.arm import Guard, Motion
+from executive.cell.arm import Motion, MotionGuard
 from executive.cell.device_config import STEP
 from executive.drivers import world_log
 from executive.drivers.sim.tool import SimTool
@@ -98,6 +98,9 @@ class SimArm:
 
     Attributes:
         at_rest: True while the arm neither follows a motion nor brakes.
+        commanded_q: Commanded joint positions `(n,)` [rad] for the end of the next physics step.
+        motion: The motion that the arm follows or brakes on, or None.
+        motion_time: Time in the motion [s].
         collision: Description of the collision that ended the last motion, or None.
         contact_point: Point of the collision in the world `(x, y, z)` [m]; None: unknown, or no collision.
     """
@@ -110,13 +113,13 @@ class SimArm:
         self._tool = tool
         self._limits = limits
         self._contact_monitor = ContactMonitor(world, tool)
-        self._motion: Trajectory | None = None
-        self._motion_time = 0.0
-        self._guard = Guard()
+        self.motion: Trajectory | None = None
+        self.motion_time = 0.0
+        self._guard = MotionGuard()
         self._has_been_free = False
         """True if the tool has touched nothing at some time since the start of the motion."""
         self._braking_times: list[float] | None = None
-        self._commanded_q = self.q
+        self.commanded_q = self.q
         self.send_command()
 
     @property
@@ -130,24 +133,24 @@ class SimArm:
 
     @property
     def end_q(self) -> Array:
-        return self._commanded_q if self._motion is None else self._motion.end
+        return self.commanded_q if self.motion is None else self.motion.end
 
-    def execute(self, motion: Motion, guard: Guard) -> None:
+    def execute(self, motion: Motion, guard: MotionGuard) -> None:
         """Begin to follow a motion; if something has pushed the arm off its start, report a collision."""
         if not self.at_rest:
             raise Fault("the arm cannot start a motion while moving; wait for `at_rest`")
         if not isinstance(motion, Trajectory):
             raise Fault(f"the simulated arm follows trajectories, not a {type(motion).__name__}")
-        if error := _describe_difference(self._commanded_q, motion.start, START_TOLERANCE):
+        if error := _describe_difference(self.commanded_q, motion.start, START_TOLERANCE):
             raise Fault(f"the start of the motion is not at the end of the last motion: {error}")
         self.collision = self._describe_disturbance(START_TOLERANCE) or None
         self.contact_point = None
         if self.collision is not None:
-            self._commanded_q = self.q
+            self.commanded_q = self.q
             self.send_command()
             return
-        self._motion = motion
-        self._motion_time = 0.0
+        self.motion = motion
+        self.motion_time = 0.0
         self._guard = guard
         self._has_been_free = not (guard.touch and self._tool.touching)
         self.at_rest = False
@@ -155,53 +158,53 @@ class SimArm:
         self._world.log.append_motion(motion)
 
     def stop(self) -> None:
-        if self._motion is not None and self._braking_times is None:
-            self._braking_times = list(plan_braking(self._motion, self._motion_time, self._limits))
+        if self.motion is not None and self._braking_times is None:
+            self._braking_times = list(plan_braking(self.motion, self.motion_time, self._limits))
 
     def stop_after_collision(self, message: str) -> None:
         """Set `collision` to a message, brake, and move back; do nothing at rest or while the arm brakes."""
-        if self._motion is not None and self._braking_times is None:
+        if self.motion is not None and self._braking_times is None:
             self.collision = message
-            braking_times = plan_braking(self._motion, self._motion_time, self._limits)
-            retreat_times = plan_retreat(self._motion_time, float(braking_times[-1]))
+            braking_times = plan_braking(self.motion, self.motion_time, self._limits)
+            retreat_times = plan_retreat(self.motion_time, float(braking_times[-1]))
             self._braking_times = [*braking_times.tolist(), *retreat_times.tolist()]
 
     def resume_braking(self, motion: Trajectory | None, commanded_q: Array, motion_time: float) -> None:
         """Brake on the interrupted motion of a rebuilt world, from its last command `(n,)` [rad]."""
-        self._commanded_q = commanded_q
-        self._motion_time = motion_time
-        self._motion = motion
+        self.commanded_q = commanded_q
+        self.motion_time = motion_time
+        self.motion = motion
         self.at_rest = motion is None
         self.stop()
 
     def send_command(self) -> None:
         """Send the current command to the motors."""
-        self._world.command_arm(self._commanded_q, self._motion_time)
+        self._world.command_arm(self.commanded_q, self.motion_time)
 
     def advance(self) -> None:
         """Check guards, collisions and disturbances, and send the command for the next physics step."""
-        motion = self._motion
+        motion = self.motion
         if motion is None:
             return
         if self._braking_times is None:
             self._check_guard()
         if self._braking_times is None:
-            tip_may_touch = self._motion_time >= motion.guarded_start_time
+            tip_may_touch = self.motion_time >= motion.guarded_start_time
             message, self.contact_point = self._contact_monitor.find_new_contact(tip_may_touch)
-            if not message and np.abs(self.q - self._commanded_q).max() > TRACKING_TOLERANCE:
+            if not message and np.abs(self.q - self.commanded_q).max() > TRACKING_TOLERANCE:
                 message = self._describe_disturbance(TRACKING_TOLERANCE)
             if message:
                 self.stop_after_collision(message)
         if self._braking_times is None:
-            self._motion_time += STEP
-            has_ended = self._motion_time >= motion.duration
+            self.motion_time += STEP
+            has_ended = self.motion_time >= motion.duration
         else:
-            self._motion_time = self._braking_times.pop(0)
+            self.motion_time = self._braking_times.pop(0)
             has_ended = not self._braking_times
-        self._commanded_q = motion.state_at(self._motion_time).q
+        self.commanded_q = motion.state_at(self.motion_time).q
         self.send_command()
         if has_ended:
-            self._motion = None
+            self.motion = None
             self._braking_times = None
             self.at_rest = True
             self._world.log.append(world_log.MOTION_END)
@@ -217,7 +220,7 @@ class SimArm:
             self._has_been_free |= not is_touching
 
     def _describe_disturbance(self, tolerance: float) -> str:
-        error = _describe_difference(self.q, self._commanded_q, tolerance)
+        error = _describe_difference(self.q, self.commanded_q, tolerance)
         return f"something holds or pushes the arm off its path: {error}" if error else ""
 
 

@@ -4,41 +4,47 @@ from __future__ import annotations
 
 from collections import deque
 
-from executive.cell.arm import Goal, Task
+import numpy as np
+
+from executive.cell.arm import Goal, MotionGuard, Task
 from executive.cell.config import CellConfig
-from executive.cell.device_config import STEP
 from executive.cell.devices import StepClock
 from executive.drivers.sim.arm import SimArm
 from executive.drivers.sim.world import World
-from executive.events import Event
+from executive.events import discard_event
 from executive.geometry import Array, Pose
 from executive.motion.planner import Planner
 from executive.motion.trajectory import Trajectory
 from executive.physics.collision import ClearanceChecker
+from executive.station.planner_service import PlannedArm, PlannerService
 
 WHITE = (1.0, 1.0, 1.0)
 
 
 class Rig:
-    """An arm, its tool and nothing on the table, each part as a simulated cell makes it.
+    """An arm, its tool and nothing on the table, each part as driver and station make it.
 
     Attributes:
-        events: What arm and tool told the run.
+        arm: The arm as skills see it.
+        device: The arm of the driver.
         commands: Joint positions `(7,)` [rad] that the arm was sent to last, newest at the end.
     """
 
     def __init__(self, config: CellConfig) -> None:
         self.config = config
-        self.world = World(config, visuals=False)
+        self.world = World(config)
         self.clearance = ClearanceChecker(config)
         self.planner = Planner(config, self.clearance.check)
-        self.clock = StepClock(lambda: self.world.step_count * STEP)
-        self.events: list[Event] = []
+        self.clock = StepClock()
+        self.clock.on_tick = self._advance
         self.tool = config.tool.build_sim(self.world)
-        self.arm = SimArm(
-            self.world, self.planner, config, self.clock, lambda: self.tool.held_body, self.events.append
+        self.device = SimArm(self.world, self.tool, self.planner.limits)
+        self.service = PlannerService(
+            self.planner.plan, self.clock, config.motion.planning_time, discard_event, self.clearance.close
         )
-        self.commands = deque([self.arm.q], maxlen=400)
+        poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
+        self.arm = PlannedArm(self.device, self.service, self.planner.kinematics, poses)
+        self.commands = deque([self.device.q], maxlen=400)
 
     def add(self, label: str, x: float, y: float, z: float | None = None) -> int:
         """Put an object into the world, standing at (x, y) or with its middle at height z [m]."""
@@ -48,10 +54,13 @@ class Rig:
     def step(self, count: int = 1) -> None:
         """Make control steps."""
         for _ in range(count):
-            self.arm.advance()
-            self.commands.append(self.arm._commanded_q)
-            self.world.step()
-            self.tool.advance()
+            self.clock.wait_for_tick()
+
+    def _advance(self) -> None:
+        self.device.advance()
+        self.commands.append(self.device.commanded_q)
+        self.world.step()
+        self.tool.advance()
 
     def planned(self, goal: Goal | str, task: Task = Task()) -> Trajectory:
         """Return a motion, once it is known."""
@@ -76,16 +85,15 @@ class Rig:
         return motion
 
     def touch_down(self, goal: Goal) -> tuple[Array, float]:
-        """Follow a guarded motion and brake as soon as the tool feels something.
+        """Follow a motion with a guard that lets the arm brake as soon as the tool feels something.
 
         Returns:
             Where the tool felt it `(3,)` [m], and the largest force of its lip until it was at rest [N].
         """
-        self.arm.start(self.planned(goal))
+        self.arm.start(self.planned(goal), MotionGuard(touch=True))
         while not (self.tool.touching or self.arm.at_rest):
             self.step()
         felt, force = self.arm.tool_pose.position, self.pressing()
-        self.arm.stop()
         while not self.arm.at_rest:
             self.step()
             force = max(force, self.pressing())
@@ -98,6 +106,5 @@ class Rig:
 
     def close(self) -> None:
         """End the planner and give both worlds back."""
-        self.arm.close()
-        self.clearance.close()
+        self.service.close()
         self.world.close()

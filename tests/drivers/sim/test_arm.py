@@ -22,7 +22,7 @@ def test_it_follows_a_motion_to_a_hundredth_of_a_degree(rig: Rig) -> None:
     rig.arm.start(motion)
     for step in range(1, math.ceil(motion.duration * 240) + 1):
         rig.step()
-        assert np.max(np.abs(rig.arm.q - motion.state_at(step / 240).q)) < math.radians(0.01)
+        assert np.max(np.abs(rig.device.q - motion.state_at(step / 240).q)) < math.radians(0.01)
     assert rig.arm.at_rest
     assert rig.arm.collision is None
     assert np.allclose(rig.arm.tool_pose.position, OVER.position, atol=1e-4)
@@ -38,7 +38,7 @@ def test_what_was_planned_ahead_is_of_no_use_once_the_arm_was_stopped_on_its_way
     planning = rig.arm.plan(BESIDE)
     assert not planning.ready
     rig.step(12)
-    assert np.allclose(planning.result().start, rig.arm.q, atol=1e-4)
+    assert np.allclose(planning.result().start, rig.device.q, atol=1e-4)
 
 
 def test_a_motion_that_starts_elsewhere_is_a_fault_with_numbers(rig: Rig) -> None:
@@ -52,15 +52,15 @@ def test_an_arm_pushed_off_its_path_reports_a_collision_and_moves_back(rig: Rig)
     motion = rig.planned(OVER)
     rig.arm.start(motion)
     rig.step(100)
-    rig.world.set_joint_positions(rig.arm.q + np.radians([0, 3, 0, 0, 0, 0, 0]))
+    rig.world.set_joint_positions(rig.device.q + np.radians([0, 3, 0, 0, 0, 0, 0]))
     assert rig.run() <= 400
     assert rig.arm.collision is not None and re.search(r"joint 2 is \d\.\d\d° away; 0\.5°", rig.arm.collision)
-    assert rig.arm.q == pytest.approx(motion.state_at(100 / 240 - RETREAT_TIME).q, abs=1e-4)
+    assert rig.device.q == pytest.approx(motion.state_at(100 / 240 - RETREAT_TIME).q, abs=1e-4)
 
 
 def test_an_arm_pushed_away_at_rest_does_not_start_but_plans_from_its_new_position(rig: Rig) -> None:
     motion = rig.planned(OVER)
-    rig.world.set_joint_positions(rig.arm.q + np.radians([0, 3, 0, 0, 0, 0, 0]))
+    rig.world.set_joint_positions(rig.device.q + np.radians([0, 3, 0, 0, 0, 0, 0]))
     rig.arm.start(motion)
     assert rig.arm.at_rest and rig.arm.collision is not None
     rig.go(OVER)

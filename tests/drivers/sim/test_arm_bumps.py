@@ -39,12 +39,12 @@ def bump(rig: Rig, motion: Trajectory, earliest: float = 0.0) -> str:
     rig.arm.start(motion)
     while rig.arm.collision is None:
         assert not rig.arm.at_rest, "it ran into nothing"
-        s = rig.arm._motion_time
+        s = rig.device.motion_time
         rig.step()
     assert s >= earliest, rig.arm.collision
     assert rig.run() <= 400
-    assert rig.arm._commanded_q == pytest.approx(motion.state_at(max(0.0, s - RETREAT_TIME)).q)
-    assert measure_distance(rig.arm._commanded_q, motion) < 1e-9
+    assert rig.device.commanded_q == pytest.approx(motion.state_at(max(0.0, s - RETREAT_TIME)).q)
+    assert measure_distance(rig.device.commanded_q, motion) < 1e-9
     assert rig.arm.collision is not None
     return rig.arm.collision
 

@@ -50,8 +50,8 @@ def test_a_stop_is_short_stays_on_the_path_and_keeps_the_stop_limits(
         motion = rig.planned(IN_A_BIN, Task(overhead.objects["cube"].build_class("cube"), 7.0))
     steps = stopped(rig, motion, share)
     assert steps <= 120
-    assert measure_distance(rig.arm._commanded_q, motion) < 1e-9
-    assert np.max(np.abs(rig.arm.q - rig.arm._commanded_q)) < 1e-4
+    assert measure_distance(rig.device.commanded_q, motion) < 1e-9
+    assert np.max(np.abs(rig.device.q - rig.device.commanded_q)) < 1e-4
     rig.step(4)
     braking = np.array(rig.commands)[-(steps + 9) :]
     accelerations = np.diff(braking, 2, axis=0) / STEP**2

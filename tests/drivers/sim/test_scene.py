@@ -12,7 +12,6 @@ import cv2
 import numpy as np
 import pytest
 import yaml
-from executive.drivers.sim.cell import SimCell
 
 from executive.cell.config import CellConfig
 from executive.cell.frame import Frame, TrueFrame
@@ -31,7 +30,7 @@ from executive.errors import InputError
 from executive.events import discard_event
 from executive.geometry import Pose
 from executive.perception.camera_model import compute_calibration
-from executive.station.station import CellOptions, SilentOperator
+from executive.station.station import CellOptions, SilentOperator, Station
 from executive.testing.fake_cell import SHIPPED_ROUTES
 from executive.testing.oracle import make_oracle_kind
 from executive.text.findings import MissionError
@@ -49,10 +48,10 @@ def scene(**sections: Any) -> SceneConfig:
 
 
 @pytest.fixture
-def cell(overhead: CellConfig, tmp_path: Path, request: pytest.FixtureRequest) -> Callable[..., SimCell]:
+def cell(overhead: CellConfig, tmp_path: Path, request: pytest.FixtureRequest) -> Callable[..., Station]:
     """Build cells in the world of a scene with these sections; without noise unless the scene has some."""
 
-    def build(config: CellConfig = overhead, **sections: Any) -> SimCell:
+    def build(config: CellConfig = overhead, **sections: Any) -> Station:
         path = tmp_path / "scene.yaml"
         quiet = {"noise": {"gain": 0, "read": 0}}
         sections["camera"] = {**quiet, **sections.get("camera", {})}
@@ -80,7 +79,7 @@ def world(overhead: CellConfig) -> Iterator[Callable[..., World]]:
         made.close()
 
 
-def capture(made: SimCell) -> Frame:
+def capture(made: Station) -> Frame:
     return made.cell.camera.capture()
 
 
@@ -109,7 +108,7 @@ def test_number_gap_and_stacks_are_those_of_the_scene(world: Build, overhead: Ce
 
 
 def test_appearance_changes_no_position_and_the_ledger_does_not_know_the_true_size(
-    world: Build, cell: Callable[..., SimCell], overhead: CellConfig
+    world: Build, cell: Callable[..., Station], overhead: CellConfig
 ) -> None:
     looks = {"objects": {"any": {"colours": [BLACK]}, "duck": {}}, "light": {"brightness": 0.3}}
     table = {"colour": [0.2, 0.2, 0.4], "texture": "pattern 1"}
@@ -134,11 +133,11 @@ def test_appearance_changes_no_position_and_the_ledger_does_not_know_the_true_si
 
 
 def test_unknown_objects_lie_beside_the_others_and_no_detector_knows_them(
-    cell: Callable[..., SimCell], overhead: CellConfig
+    cell: Callable[..., Station], overhead: CellConfig
 ) -> None:
     unknown = {"count": [2, 2], "models": [168, 169], "scale": 0.5, "colours": [[0.0, 0.9, 0.0]]}
     made = cell(unknown=unknown, table={"objects": [3, 3], "stacked": 1.0})
-    world = made._world
+    world = made.driver.world
     strange = [body for body, label in world.labels.items() if label == UNKNOWN_LABEL]
     assert (len(world.labels), len(strange)) == (5, 2)
     others = [body for body in world.labels if body not in strange]
@@ -188,7 +187,7 @@ def test_the_true_camera_differs_from_the_declared_one_by_the_errors_of_the_scen
 
 
 def test_the_image_is_from_the_true_camera_and_the_frame_says_the_declared_one(
-    cell: Callable[..., SimCell], overhead: CellConfig
+    cell: Callable[..., Station], overhead: CellConfig
 ) -> None:
     frame = capture(cell(camera={"shift": [0.0, 0.05, 0.0]}))
     assert isinstance(frame, TrueFrame)
@@ -201,7 +200,7 @@ def test_the_image_is_from_the_true_camera_and_the_frame_says_the_declared_one(
     assert min(np.linalg.norm(np.subtract(one.centre, other.centre)) for one, other in pairs) > 15
 
 
-def test_the_noise_is_that_of_the_scene(cell: Callable[..., SimCell]) -> None:
+def test_the_noise_is_that_of_the_scene(cell: Callable[..., Station]) -> None:
     clean, noisy = (capture(cell(camera={"noise": {"gain": 0, "read": read}})).image for read in (0, 16))
     assert (noisy[TABLE].astype(float) - clean[TABLE]).std() == pytest.approx(16, abs=0.5)
 

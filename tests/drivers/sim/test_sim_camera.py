@@ -1,13 +1,13 @@
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
 from executive.cell.device_config import DepthConfig
+from executive.cell.devices import StepClock
 from executive.drivers.sim.camera import (
     CELL_LIGHT,
     SimCamera,
@@ -21,15 +21,6 @@ from executive.geometry import Pose, rotate_about_z
 from executive.perception.camera_model import compute_calibration, project
 
 Build = Callable[[CellConfig], World]
-
-
-@dataclass
-class StoppedClock:
-    now: float = 1.5
-    step: float = 1 / 240
-
-    def sleep(self, duration: float) -> Iterator[None]:
-        yield from ()
 
 
 def at_scan_pose(build: Build, config: CellConfig) -> tuple[World, str]:
@@ -70,22 +61,25 @@ def test_a_seed_repeats_the_noise_of_images_and_depth_and_a_depth_sensor_changes
     cube = world.add_object("cube", Pose.of([0.5, 0.0, 0.025]), (1, 0, 0))
     camera = overhead.cameras[name].model_copy(update={"depth": DepthConfig()})
     deep = overhead.model_copy(update={"cameras": {name: camera}})
+    clock = StepClock(step=1.5)
+    clock.wait_for_tick()
     without, one, same, other = (
-        SimCamera(world, config, StoppedClock(), seed)
+        SimCamera(world, config, clock, seed, CELL_LIGHT)
         for config, seed in ((overhead, 7), (deep, 7), (deep, 7), (deep, 8))
     )
-    frame = one.capture()
-    assert frame.depth is not None
-    assert (frame.image == without.capture().image).all()
-    shot = render(world, frame.matrix, frame.X_WC, (0, 0, 640, 480), CELL_LIGHT)
+    first = one.capture()
+    assert first.depth is not None
+    assert (first.stamp, first.visible, first.true_detections) == (1.5, None, None)
+    assert (first.colour == without.capture().colour).all()
+    shot = render(world, *one.get_true_view(), (0, 0, 640, 480), CELL_LIGHT)
     for body, distance in ((cube, 1.15), (world.table, 1.2)):
         assert shot.depth[shot.segmentation == body] == pytest.approx(distance, abs=1e-4)
-        assert np.nanmedian(frame.depth[shot.segmentation == body]) == pytest.approx(distance, abs=0.003)
+        assert np.nanmedian(first.depth[shot.segmentation == body]) == pytest.approx(distance, abs=0.003)
     again, second, others = same.capture(), one.capture(), other.capture()
-    assert (frame.id, second.id) == (1, 2)
-    assert np.abs(frame.image.astype(int) - second.image).mean() > 0.5
-    assert [(one.image == frame.image).all() for one in (again, second, others)] == [True, False, False]
-    same_depth = [np.array_equal(frame.depth, one.depth, equal_nan=True) for one in (again, second, others)]
+    assert one.image_count == 2
+    assert np.abs(first.colour.astype(int) - second.colour).mean() > 0.5
+    assert [(one.colour == first.colour).all() for one in (again, second, others)] == [True, False, False]
+    same_depth = [np.array_equal(first.depth, one.depth, equal_nan=True) for one in (again, second, others)]
     assert same_depth == [True, False, False]
 
 

@@ -9,8 +9,7 @@ import pytest
 from executive.drivers.sim.world import World
 from executive.geometry import GRAVITY, Array, Pose
 from executive.motion.arms import build_kinematics
-from tests.drivers.sim.conftest import shipped_cell
-from tests.motion.joint_states import reach
+from tests.motion.joint_states import CONFIG, reach
 
 X, Y = 0.5, 0.05
 CUBE = 0.05
@@ -22,12 +21,11 @@ class Bench:
     """A tool over one object on the table, and an arm that is simply put where it should be."""
 
     def __init__(self, label: str) -> None:
-        config = shipped_cell("overhead")
-        self.world = World(config)
-        self.config = config.tool
-        self.tool = config.tool.build_sim(self.world)
-        self.kinematics = build_kinematics(config)
-        self.q: Array = np.radians(config.arm.poses_deg["home"])
+        self.world = World(CONFIG)
+        self.config = CONFIG.tool
+        self.tool = CONFIG.tool.build_sim(self.world)
+        self.kinematics = build_kinematics(CONFIG)
+        self.q: Array = np.radians(CONFIG.arm.poses_deg["home"])
         self.body = self.world.add_object(label, Pose.of([X - GOOD_PLACE[label], Y, CUBE / 2]), (1, 1, 1))
         self.steps(120)
         self.top = float(self.world.client.rayTest([X, Y, 0.3], [X, Y, 0.0])[0][3][2])

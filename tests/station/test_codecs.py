@@ -6,15 +6,26 @@ import json
 from typing import Any
 
 import numpy as np
-from executive.replay.recording_cell import BOX, FRAME, MOTION, POSE
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from executive.cell.frame import Answer, Detection, ErrorRates, Frame, Observation
+from executive.cell.devices import CameraImage
+from executive.cell.frame import Answer, Detection, ErrorRates, Observation
 from executive.cell.protocols import BehaviourStep
 from executive.geometry import Pose, rotate_about_z
 from executive.station.border import ANSWER, ARRAY, BEHAVIOUR_STEP, OBSERVATIONS, Codec, RecordedMotion
+from executive.station.border import (
+    ANSWER,
+    ARRAY,
+    BEHAVIOUR_STEP,
+    IMAGE,
+    MOTION,
+    OBSERVATIONS,
+    Codec,
+    RecordedMotion,
+)
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 few = settings(max_examples=25)
@@ -26,29 +37,30 @@ def back(codec: Codec, answer: Any) -> Any:
 
 
 @few
-@given(arrays(np.float64, (3, 2), elements=finite), st.floats(-4, 4))
-def test_numbers_come_back_bit_by_bit(array: np.ndarray, angle: float) -> None:
+@given(arrays(np.float64, (3, 2), elements=finite), finite)
+def test_numbers_come_back_bit_by_bit(array: np.ndarray, duration: float) -> None:
     assert np.array_equal(back(ARRAY, array), array)
-    pose = Pose(rotate_about_z(angle), array[:, 0])
-    assert np.array_equal(back(POSE, pose).rotation, pose.rotation)
-    assert np.array_equal(back(POSE, pose).position, pose.position)
-    assert back(MOTION, RecordedMotion(angle)) == RecordedMotion(angle)
-    assert back(BOX, (1, 2, 3.5, angle)) == (1, 2, 3.5, angle)
+    assert back(MOTION, RecordedMotion(duration)) == RecordedMotion(duration)
+
+
+masks = arrays(np.bool_, st.tuples(st.integers(1, 40), st.integers(1, 40)))
 
 
 @few
-@given(arrays(np.bool_, st.tuples(st.integers(1, 40), st.integers(1, 40))), st.integers(0, 9))
-def test_a_frame_comes_back_without_its_image(visible: np.ndarray, change_count: int) -> None:
-    size = visible.shape
-    frame = Frame(
-        7, "overhead", np.full((*size, 3), 9, np.uint8), np.ones(size), np.eye(3) / 3, Pose.identity(), 1 / 3,
-        visible, change_count,
-    )  # fmt: skip
-    read = back(FRAME, frame)
-    assert (read.id, read.camera, read.stamp, read.change_count) == (7, "overhead", 1 / 3, change_count)
-    assert np.array_equal(read.visible, visible)
-    assert np.array_equal(read.matrix, frame.matrix)
-    assert (read.image.shape, read.image.any(), read.depth) == ((*size, 3), False, None)
+@given(masks, st.booleans(), finite)
+def test_an_image_comes_back_black_and_without_depth(mask: np.ndarray, hides: bool, stamp: float) -> None:
+    size = mask.shape
+    visible = mask if hides else None
+    read = back(IMAGE, CameraImage(np.full((*size, 3), 9, np.uint8), np.ones(size), stamp, visible))
+    assert (read.colour.shape, read.colour.dtype, read.colour.any()) == ((*size, 3), np.uint8, False)
+    assert (read.depth, read.stamp, read.true_detections) == (None, stamp, None)
+    assert read.visible is None if visible is None else np.array_equal(read.visible, visible)
+
+
+@pytest.mark.parametrize("size", [[0, 4], [-3, 4], [10**5, 10**5]])
+def test_an_image_of_an_impossible_size_is_refused(size: list[int]) -> None:
+    with pytest.raises(ValueError, match="an image of"):
+        IMAGE.decode({"size": size, "stamp": 0.0, "visible": None})
 
 
 detections = st.builds(

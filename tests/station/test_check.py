@@ -1,4 +1,4 @@
-"""Findings of a simulated cell about its cell file, and the labels of its detectors."""
+"""Findings of the station about a cell file."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from executive.drivers.sim.kind import SIM_CELL_KIND
 
 from executive.cell.config import CellConfig
 from executive.motion.arms import build_kinematics
 from executive.station.check import find_pose_errors
 from executive.testing.fake_cell import FakeCell
+from executive.station.check import load_checker
+from executive.station.check import find_pose_errors
 from tests.motion.joint_states import reach
 
 
@@ -41,12 +42,12 @@ def test_all_that_is_wrong_is_said_at_once(overhead: CellConfig, tmp_path: Path)
     config = posed(overhead, down=(0, 118, 0, 0, 0, 0, 0), turned=(0, 0, 0, 0, 0, 0, 180))
     far = moved(config, "red_bin", 1.5, 0.0, 0.0).bins["red_bin"]
     changes = {"bins": {"red_bin": far}, "detectors": {"yolo": yolo}, "localization": "depth"}
-    found = dict(SIM_CELL_KIND.check(config.model_copy(update=changes), tmp_path))
+    found = dict(load_checker("sim").check(config.model_copy(update=changes), tmp_path))
     assert list(found) == [
         ("localization",),
-        ("detectors", "yolo", "kind"),
         ("arm", "poses_deg", "turned"),
         ("bins", "red_bin", "position"),
+        ("detectors", "yolo", "kind"),
         ("arm", "poses_deg", "down"),
     ]
     said = found["localization",]
@@ -78,9 +79,9 @@ def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wri
     ]
 
 
-@pytest.mark.parametrize("kind", [SIM_CELL_KIND, FakeCell])
-def test_an_unknown_solver_is_a_finding_with_the_installed_solvers(overhead: CellConfig, kind) -> None:
+@pytest.mark.parametrize("kind", ["sim", "fake"])
+def test_an_unknown_solver_is_a_finding_with_the_installed_solvers(overhead: CellConfig, kind: str) -> None:
     config = overhead.model_copy(update={"arm": overhead.arm.model_copy(update={"solver": "r2d2"})})
-    ((keys, message),) = kind.check(config, Path())
+    ((keys, message),) = load_checker(kind).check(config, Path())
     assert keys == ("arm", "solver")
     assert message.endswith("Installed solvers: iiwa14.")

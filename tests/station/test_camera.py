@@ -1,0 +1,37 @@
+"""The camera as skills see it: what a frame says beside the image of the device."""
+
+from __future__ import annotations
+
+import numpy as np
+from at_hand import look, pick
+
+from executive.cell.config import CellConfig
+from executive.geometry import Pose
+from executive.testing.fake_cell import FakeCell
+
+
+def test_frames_are_numbered_from_1_and_have_time_and_changes_of_the_ledger(fake: FakeCell) -> None:
+    fake.world.put("cube", 0.5, 0.0)
+    first = fake.cell.camera.capture()
+    pick(fake, look(fake)[0])
+    later = fake.cell.camera.capture()
+    assert (first.id, first.stamp, first.change_count, later.id) == (1, 0.0, 0, 3)
+    assert later.stamp == fake.cell.clock.now > 0.0
+    assert later.change_count == fake.ledger.change_count > 0
+
+
+def test_a_frame_of_a_camera_at_the_wrist_says_where_it_was(wrist: CellConfig) -> None:
+    fake = FakeCell(wrist)
+    poses_in_tool = []
+    for x in (0.5, 0.6):
+        fake.arm.set_tool_position(np.array((x, 0.0, 0.3)))
+        X_WC = fake.cell.camera.capture().X_WC
+        poses_in_tool.append((fake.arm.tool_pose.inverse() @ X_WC).to_rounded_list(6))
+    assert poses_in_tool[0] == poses_in_tool[1] != Pose.identity().to_rounded_list(6)
+
+
+def test_pixels_that_the_device_says_are_hidden_are_not_visible(fake: FakeCell) -> None:
+    fake.camera.occluded_regions.append((10.0, 20.0, 30.0, 40.0))
+    frame = fake.cell.camera.capture()
+    assert not frame.visible[20:40, 10:30].any()
+    assert frame.visible.sum() == frame.visible.size - 400
