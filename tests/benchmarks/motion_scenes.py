@@ -32,7 +32,7 @@ MAX_TRIES = 50
 @contextmanager
 def open_world(cell: CellConfig) -> Iterator[tuple[World, Planner]]:
     """Yield a world without objects, and a planner that makes all checks of the planner of a run."""
-    world, clearance = World(cell, visuals=False), ClearanceChecker(cell)
+    world, clearance = World(cell), ClearanceChecker(cell)
     try:
         yield world, Planner(cell, clearance.check)
     finally:
