@@ -9,6 +9,7 @@ import re
 import tempfile
 import warnings
 import zipfile
+from collections.abc import Iterator
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -21,8 +22,11 @@ import pybullet
 import pybullet_data
 from numpy.typing import ArrayLike, NDArray
 
+from executive.cell.arm_config import TOOL_LINK, ArmFile
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
+from executive.text.findings import suggest_choice
+from executive.text.validate import KeyPath
 from executive.text.yaml_files import has_outside_link, is_outside_path
 
 MAX_MODEL_SIZE = 20_000_000
@@ -312,3 +316,39 @@ def parse_numbers(
         limit = f" above {minimum:g}" if minimum > -math.inf else ""
         raise InputError(f"{problem}; write {len(default)} finite number(s){limit}")
     return numbers
+
+
+def find_arm_model_errors(arm: ArmFile) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for each error in the model of the arm: missing links, wrong joints."""
+    try:
+        robot = read_robot(find_model(arm.urdf))
+    except InputError as error:
+        yield ("arm", "urdf"), str(error)
+        return
+    links = [link.get("name", "") for link in robot.findall("link")]
+    simulation = arm.simulation
+    named_links: list[tuple[KeyPath, str]] = [
+        (("flange", "link"), arm.flange.link),
+        (("simulation", "first_collision_link"), simulation.first_collision_link),
+        (("simulation", "wrist_link"), simulation.wrist_link),
+    ]
+    for index, pair in enumerate(simulation.self_collision_pairs):
+        key_path = ("simulation", "self_collision_pairs", index)
+        named_links += [(key_path, link) for link in pair if link != TOOL_LINK]
+    for keys, link in named_links:
+        if link not in links:
+            hint = suggest_choice(link, links, "Links of the model")
+            yield ("arm", *keys), f'the model {arm.urdf} of the arm {arm.arm} has no link "{link}". {hint}'
+    joints = {joint.findall("child")[0].get("link"): joint for joint in robot.findall("joint[parent][child]")}
+    joint_kinds = []
+    link_name: str | None = arm.flange.link
+    while (joint := joints.pop(link_name, None)) is not None:
+        joint_kinds.append(joint.get("type", ""))
+        link_name = joint.findall("parent")[0].get("link")
+    if arm.flange.link in links and joint_kinds != ["revolute"] * arm.joint_count:
+        kinds = ", ".join(reversed(joint_kinds)) or "none"
+        yield (
+            ("arm", "limits"),
+            f"the model {arm.urdf} must have {arm.joint_count} revolute joints up to the flange; "
+            f"it has: {kinds}",
+        )

@@ -365,6 +365,7 @@ class ResumedRun(Run):
     def _begin_on_devices(self, interruption: Interruption) -> None:
         """Brake the arm, then emit `RunResumed`. A kill before this event leaves the journal unchanged."""
         station = self.station
+        station.driver.clock.begin(station.tick_count * self.clock.step + self.clock.offset)
         brake_arm(station.unrecorded_cell, station.advance)
         for recorder in self._recorders:
             super().add_recorder(recorder)

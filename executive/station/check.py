@@ -44,16 +44,12 @@ class CellChecker:
         if arm_errors := tuple(find_arm_errors(config)):
             yield from arm_errors
             return
-        driver_errors = tuple(self.kind.check(config, cell_folder))
-        yield from driver_errors
+        yield from self.kind.check(config, cell_folder)
         yield from find_places_out_of_reach(config)
         if is_rehearsal(self.kind):
             yield from find_view_errors(config)
             return
         yield from find_detector_errors(config.detectors, cell_folder)
-        if any(keys[0] == "arm" for keys, _ in driver_errors):
-            return  # Without a valid model of the arm, its poses cannot be checked.
-
         yield from find_pose_errors(config)
 
     def labels(self, config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
@@ -96,10 +92,15 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
     In each named pose, arm and tool must keep the margin to table, bins and the arm itself, because otherwise
     no motion can end in the pose. From each scan pose, the camera must see the whole workspace; a camera with
-    partial views must see it from all its scan poses together.
+    partial views must see it from all its scan poses together. If the model of the arm is invalid, only its
+    errors are reported.
     """
     from executive.physics.collision import ClearanceChecker
+    from executive.physics.model_files import find_arm_model_errors
 
+    if model_errors := tuple(find_arm_model_errors(config.arm)):
+        yield from model_errors
+        return
     with contextlib.closing(ClearanceChecker(config)) as checker:
         if error := _describe_wrong_solver(config, checker.world):
             yield ("arm", "solver"), error

@@ -43,6 +43,7 @@ from executive.drivers.sim.scene import DECLARED_SCENE, SceneConfig, build_world
 from executive.drivers.sim.world import WOOD_TEXTURE
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, intersect_plane, project
+from executive.physics.model_files import find_arm_model_errors
 from executive.processes import WorkerPool
 from executive.training.dataset import (
     DatasetEntry,
@@ -90,15 +91,15 @@ def generate_dataset(
         progress: Called after each block of `BLOCK_SIZE` images.
 
     Raises:
-        InputError: The cells differ in their classes, a model of an object is missing
-            or has another size than in the cell file, or a file cannot be written.
+        InputError: The cells differ in their classes, a model of an object or arm is missing
+            or invalid, an object has another size than in the cell file, or a file cannot be written.
     """
     classes = list(cells[0].objects)
     if any(list(cell.objects) != classes for cell in cells):
         found = "; ".join(f"{cell.cell} has {', '.join(cell.objects)}" for cell in cells)
         raise InputError(f"the cells of one dataset must have the same classes in the same order; {found}")
     for cell in cells:
-        for key, message in find_model_errors(cell):
+        for key, message in (*find_model_errors(cell), *find_arm_model_errors(cell.arm)):
             raise InputError(f"{cell.cell}: {'.'.join(map(str, key))}: {message}")
     train_count = image_count - round(image_count * valid_fraction)
     render_block = partial(_render_dataset_images, cells, out, layout, seed, train_count)

@@ -21,8 +21,7 @@ from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
 from executive.station.check import load_checker
-from executive.station.station import count_outcomes
-from executive.station.station import Station
+from executive.station.station import Station, count_outcomes
 from tests.benchmarks.forks import ForkRunner
 
 HUNG = "HUNG"

@@ -13,9 +13,8 @@ from executive.cell.devices import check_driver_options
 from executive.cell.frame import Detections
 from executive.errors import InputError
 from executive.mission.cell_file import load_cell
-from executive.station.station import AUDIT_KEYS
-from executive.station.station import AUDIT_KEYS
 from executive.station.check import load_checker
+from executive.station.station import AUDIT_KEYS
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,7 @@ import pytest
 
 from executive.cell.config import CellConfig
 from executive.motion.arms import build_kinematics
-from executive.station.check import find_pose_errors
-from executive.testing.fake_cell import FakeCell
-from executive.station.check import load_checker
-from executive.station.check import find_pose_errors
+from executive.station.check import CellChecker, find_pose_errors, load_checker
 from tests.motion.joint_states import reach
 
 
@@ -85,3 +83,10 @@ def test_an_unknown_solver_is_a_finding_with_the_installed_solvers(overhead: Cel
     ((keys, message),) = load_checker(kind).check(config, Path())
     assert keys == ("arm", "solver")
     assert message.endswith("Installed solvers: iiwa14.")
+
+
+def test_a_wrong_model_of_the_arm_is_a_finding_with_every_driver(overhead: CellConfig) -> None:
+    kind: Any = SimpleNamespace(check=lambda config, cell_folder: ())
+    arm = overhead.arm.model_copy(update={"urdf": "cobot.urdf"})
+    ((keys, message),) = CellChecker(kind).check(overhead.model_copy(update={"arm": arm}), Path())
+    assert (keys, message.partition(",")[0]) == (("arm", "urdf"), "there is no model cobot.urdf")

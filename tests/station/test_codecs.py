@@ -14,8 +14,6 @@ from hypothesis.extra.numpy import arrays
 from executive.cell.devices import CameraImage
 from executive.cell.frame import Answer, Detection, ErrorRates, Observation
 from executive.cell.protocols import BehaviourStep
-from executive.geometry import Pose, rotate_about_z
-from executive.station.border import ANSWER, ARRAY, BEHAVIOUR_STEP, OBSERVATIONS, Codec, RecordedMotion
 from executive.station.border import (
     ANSWER,
     ARRAY,

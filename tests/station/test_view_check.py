@@ -8,10 +8,7 @@ import pytest
 
 from executive.cell.config import CellConfig
 from executive.mission.cell_file import load_cell, read_cell
-from executive.station.check import find_view_errors
-from executive.testing.fake_cell import FakeCell
-from executive.station.check import load_checker
-from executive.station.check import find_view_errors
+from executive.station.check import find_view_errors, load_checker
 from executive.text.yaml_files import get_shipped_folder
 
 CELLS = get_shipped_folder() / "cells"

@@ -19,16 +19,14 @@ import pybullet_data
 from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
-from executive.cell.arm_config import TOOL_LINK, ArmFile
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import STEP
 from executive.cell.frame import Box
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.physics import model_files
-from executive.physics.model_files import find_model, make_rotation, read_robot
+from executive.physics.model_files import find_model, make_rotation
 from executive.processes import build_command
-from executive.text.findings import suggest_choice
 from executive.text.validate import KeyPath
 from executive.text.yaml_files import get_shipped_folder
 
@@ -160,9 +158,7 @@ def compute_mass(config: ObjectConfig) -> float:
 
 
 def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each model of a cell file that is missing, invalid, or of a wrong size.
-
-    The model of the arm must contain the links that the arm file names.
+    """Yield key and message for each model of an object that is missing, invalid, or of a wrong size.
 
     A child process tries each model that is not shipped with the executive or PyBullet; this process reads
     the model afterwards, because reading may take very long.
@@ -177,43 +173,6 @@ def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
             yield from _find_wrong_sizes(label, object_config)
         except InputError as error:
             yield ("objects", label, "mesh" if object_config.mesh else "urdf"), str(error)
-    yield from _find_arm_errors(config.arm)
-
-
-def _find_arm_errors(arm: ArmFile) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each link that the model of the arm lacks, and for wrong joints."""
-    try:
-        robot = read_robot(find_model(arm.urdf))
-    except InputError as error:
-        yield ("arm", "urdf"), str(error)
-        return
-    links = [link.get("name", "") for link in robot.findall("link")]
-    simulation = arm.simulation
-    named_links: list[tuple[KeyPath, str]] = [
-        (("flange", "link"), arm.flange.link),
-        (("simulation", "first_collision_link"), simulation.first_collision_link),
-        (("simulation", "wrist_link"), simulation.wrist_link),
-    ]
-    for index, pair in enumerate(simulation.self_collision_pairs):
-        key_path = ("simulation", "self_collision_pairs", index)
-        named_links += [(key_path, link) for link in pair if link != TOOL_LINK]
-    for keys, link in named_links:
-        if link not in links:
-            hint = suggest_choice(link, links, "Links of the model")
-            yield ("arm", *keys), f'the model {arm.urdf} of the arm {arm.arm} has no link "{link}". {hint}'
-    joints = {joint.findall("child")[0].get("link"): joint for joint in robot.findall("joint[parent][child]")}
-    joint_kinds = []
-    link_name: str | None = arm.flange.link
-    while (joint := joints.pop(link_name, None)) is not None:
-        joint_kinds.append(joint.get("type", ""))
-        link_name = joint.findall("parent")[0].get("link")
-    if arm.flange.link in links and joint_kinds != ["revolute"] * arm.joint_count:
-        kinds = ", ".join(reversed(joint_kinds)) or "none"
-        yield (
-            ("arm", "limits"),
-            f"the model {arm.urdf} must have {arm.joint_count} revolute joints up to the flange; "
-            f"it has: {kinds}",
-        )
 
 
 def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPath, str]]:
