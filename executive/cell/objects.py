@@ -9,7 +9,7 @@ from typing import Annotated, TypeAlias
 
 import numpy as np
 
-from executive.geometry import Array, Pose, Yaw
+from executive.geometry import Array, Pose, Yaw, rotate_about_z
 
 UNKNOWN_LABEL = "unknown"
 """Label of an object without a class."""
@@ -61,8 +61,7 @@ class Target:
 
         The rotation is the identity if the yaw is unknown.
         """
-        angle = self.yaw.angle if self.yaw else 0.0
-        return Pose.of(self.position, (0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)))
+        return Pose(rotate_about_z(self.yaw.angle if self.yaw else 0.0), self.position)
 
 
 @dataclass(frozen=True, eq=False)

@@ -264,7 +264,7 @@ def test_the_object_of_a_node_is_that_of_its_item(state: str, offset: float, is_
     case = Case(during("*/Approach", effects.object_removed()))
     ledger = case.parts.ledger
     look: Any = run_skill(Detect, case.fake).outputs["detections"]
-    places = [Observation(one, np.array([*PLACES[one.label], 0.025]), 0.003) for one in look.confident]
+    places = [Observation(one, np.array([*PLACES[one.label], 0.025]), 0.003, 0.0) for one in look.confident]
     item = {one.label: one.item for one in ledger.observe(look, places)}["sphere"]
     case.fake.world.objects[1].position[0] += offset
     if state != "seen":
