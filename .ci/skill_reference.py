@@ -84,7 +84,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("executive.perception.evidence", "perception/evidence.py", ""),
     ],
     "Test kit: fake cell": [
-        ("fake = FakeCell()", "drivers/fake.py", "FakeCell"),
+        ("fake = FakeCell()", "testing/fake_cell.py", "FakeCell"),
         ("fake.world", "drivers/fake.py", "FakeWorld"),
         ("fake.arm", "drivers/fake.py", "FakeArm"),
         ("fake.tool", "drivers/fake.py", "FakeTool"),
@@ -130,7 +130,7 @@ def _format_table(expression: str, file: str, name: str) -> str:
         title = f"### {name}: `{expression}`"
     text, entries = _parse_docstring(owner)
     attributes = dict(entries.get("Attributes", ()))
-    if file.startswith(("drivers/", "perception/detectors/")) and name != "FakeWorld":
+    if file.startswith(("drivers/", "perception/detectors/", "testing/fake_cell")) and name != "FakeWorld":
         # The methods are those of the protocols.
         rows = [(_format_code(attribute), _escape(meaning)) for attribute, meaning in attributes.items()]
     else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from executive.cell.arm import Goal, Guard, Task
+from executive.cell.arm import Goal, MotionGuard, Task
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
 from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL
@@ -57,7 +57,7 @@ class Approach(Skill):
         grasp, _ = find_grasp()
         # The zero of a load cell drifts; only before the descent, the tool is at rest and certainly empty.
         cell.ledger.record_empty_load(tool.load)
-        yield from follow(self, cell, motion, Guard(touch=grasp.guard == "touch"))
+        yield from follow(self, cell, motion, MotionGuard(touch=grasp.guard == "touch"))
         object_class = cell.classes[self.target.label]
         height = float(cell.arm.tool_pose.position[2])
         start_height = grasp.goal.position[2] + grasp.goal.guarded_length

@@ -177,6 +177,6 @@ def test_every_heading_that_a_guide_links_to_exists() -> None:
 @pytest.mark.parametrize("guide", ["executive/README.md", "CONTRIBUTING.md"])
 def test_every_file_that_a_guide_to_the_code_names_exists(guide: str) -> None:
     named = set(re.findall(r"`((?:\w+/)+(?:[\w.]+)?)`", read(guide)))
-    roots = (ROOT, ROOT / "executive", ROOT / "executive/cells")
+    roots = (ROOT, ROOT / "executive")
     assert named
     assert not {name for name in named if not any((root / name).exists() for root in roots)}

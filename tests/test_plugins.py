@@ -65,12 +65,12 @@ def test_a_skill_of_the_project_is_found_beside_the_installed_ones(project: Writ
     assert list(found) == sorted(found)
 
 
-def test_kinds_of_cells_and_detectors_are_found_likewise(project: Write) -> None:
+def test_drivers_and_kinds_of_detectors_are_found_likewise(project: Write) -> None:
     project(
         "hall_four", "class Bench:\n    pass\n\n\nclass Eye:\n    pass\n",
-        cells='bench = "hall_four.part:Bench"', detectors='eye = "hall_four.part:Eye"',
+        drivers='bench = "hall_four.part:Bench"', detectors='eye = "hall_four.part:Eye"',
     )  # fmt: skip
-    assert load_checker("bench").__name__ == "Bench"
+    assert load_checker("bench").kind.__name__ == "Bench"
     assert find_detector_kinds()["eye"].load().__name__ == "Eye"
 
 
@@ -78,7 +78,7 @@ def test_kinds_of_cells_and_detectors_are_found_likewise(project: Write) -> None
     ("group", "kind", "ask"),
     [
         ("skills", "skill", load_skills),
-        ("cells", "kind of cell", lambda: load_checker("wave")),
+        ("drivers", "driver", lambda: load_checker("wave")),
         ("detectors", "kind of detector", lambda: find_detector_kinds()["wave"].load()),
     ],
 )

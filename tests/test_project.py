@@ -41,7 +41,7 @@ def test_it_says_what_it_registers(write: Write) -> None:
     assert project is not None
     assert (project.file, project.name) == (file, "Blue-Table")
     assert project.read_entries("executive.skills") == {"Wave": "blue.wave:Wave"}
-    assert project.read_entries("executive.cells") == {}
+    assert project.read_entries("executive.drivers") == {}
 
 
 def test_it_is_that_of_the_nearest_file_upwards(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -41,7 +41,7 @@ class Motion(Protocol):
         """Return the joint state `(n,)` at `time` [s]; at rest before time 0 and after `duration`."""
 
 
-class Guard(NamedTuple):
+class MotionGuard(NamedTuple):
     """Events at which an arm stops along the path of its motion, beside collisions.
 
     Attributes:
@@ -153,7 +153,7 @@ class Arm(Protocol):
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
         """Plan a motion from the end of the current motion, for a later call of `plan`."""
 
-    def start(self, motion: Motion, guard: Guard = Guard()) -> None:
+    def start(self, motion: Motion, guard: MotionGuard = MotionGuard()) -> None:
         """Follow `motion` until its end or an event of `guard`; the arm must be at rest at its start."""
 
     def stop(self) -> None:

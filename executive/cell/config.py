@@ -210,7 +210,7 @@ class CellConfig(Section):
     """Description of the cell in one sentence."""
     kind: str = "sim"
     """Kind of cell: `sim`, a simulated cell; `fake`, a cell without physics, for tests of missions; or the
-    name of an entry point of the group `executive.cells`."""
+    name of an entry point of the group `executive.drivers`."""
     arm: ArmConfig
     """Robot arm."""
     tool: SerializeAsAny[ToolModel]

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.arm import Guard, Motion
+from executive.cell.arm import Motion, MotionGuard
 from executive.cell.config import ObjectConfig
 from executive.cell.device_config import STEP
 from executive.cell.frame import Detection
@@ -158,7 +158,7 @@ class ArmDevice(Protocol):
     def contact_point(self) -> Sequence[float] | None:
         """Point `(x, y, z)` [m] at which the last motion collided; None: unknown, or no collision."""
 
-    def execute(self, motion: Motion, guard: Guard) -> None:
+    def execute(self, motion: Motion, guard: MotionGuard) -> None:
         """Begin to follow `motion` from rest at its start; stop along its path as `guard` says.
 
         The arm also stops, and sets `collision`, if it touches something before `motion.guarded_start_time`,

@@ -13,7 +13,7 @@ from pydantic_core import CoreSchema
 
 from executive.cell.arm import Goal
 from executive.cell.device_config import Length, MotionConfig, Section
-from executive.cell.objects import ObjectClass
+from executive.cell.objects import ObjectClass, Target
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.plugins import list_entries
@@ -165,7 +165,7 @@ class ToolModel(Section):
     def list_grasps(
         self,
         object_class: ObjectClass,
-        position: Array,
+        target: Target,
         motion: MotionConfig,
         *,
         attempt: int = 0,
@@ -177,7 +177,7 @@ class ToolModel(Section):
 
         Args:
             object_class: Class of the object.
-            position: Centre of the object `(3,)` [m].
+            target: Place of the object, and its yaw if it is known.
             motion: Heights and speed of guarded motions.
             attempt: Number of failed attempts before this one.
             is_confirmed: True if a measurement of the tool has confirmed the properties of the class.

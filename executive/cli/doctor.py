@@ -84,7 +84,7 @@ def check_packages() -> Iterator[CheckResult]:
 
 
 def check_plugins() -> Iterator[CheckResult]:
-    """Load all installed skills, kinds of cells, kinds of detectors and solvers of arms."""
+    """Load all installed skills, drivers, kinds of detectors and solvers of arms."""
     from executive.behaviours import load_skills
     from executive.cell.devices import DRIVER_GROUP
     from executive.cell.tools import load_tool_models

@@ -56,7 +56,7 @@ def skills_command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
 def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
     """Check skills, print the result of each check, and return True if all checks passed."""
     with keep_stdout_clean():
-        # Only this check needs the work cells, whose import takes half a second.
+        # Only this check needs a station, whose import takes half a second.
         from executive.testing.conformance import list_conformance_checks
 
     verdicts: list[dict[str, Any]] = []

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.cell.arm import Goal, Guard, Motion
+from executive.cell.arm import Goal, Motion, MotionGuard
 from executive.cell.config import CellConfig
 from executive.cell.device_config import STEP
 from executive.cell.devices import DEFAULT_ROLE, CameraImage, DriverOptions, StepClock, TrueObject, WallClock
@@ -258,7 +258,7 @@ class FakeArm:
         self._tool_model = config.tool
         self._path: list[Array] = []
         self._half_length = 0
-        self._guard = Guard()
+        self._guard = MotionGuard()
         self._has_been_free = False
         """True if the tool has touched nothing at some time since the start of the motion."""
 
@@ -275,7 +275,7 @@ class FakeArm:
         """Pose of the tool centre point in the world."""
         return self._kinematics.compute_tool_pose(self.q)
 
-    def execute(self, motion: Motion, guard: Guard) -> None:
+    def execute(self, motion: Motion, guard: MotionGuard) -> None:
         step_count = math.ceil(motion.duration / STEP - MAX_STEP_ERROR)
         self._path = [motion.state_at((number + 1) * STEP).q for number in range(step_count)]
         self._half_length = len(self._path) // 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Sequence
 from typing import TypeVar
 
-from executive.cell.arm import Arm, Goal, Guard, Motion, Task
+from executive.cell.arm import Arm, Goal, Motion, MotionGuard, Task
 from executive.cell.frame import Detections, Observation
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
@@ -122,7 +122,7 @@ def follow(
     skill: Skill,
     cell: Cell,
     motion: Motion,
-    guard: Guard = Guard(),
+    guard: MotionGuard = MotionGuard(),
     until: Callable[[], bool] = lambda: False,
 ) -> Steps:
     """Yield while the arm executes `motion`, until the arm is at rest again.
@@ -171,7 +171,7 @@ def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, goal_name: str) 
     """
     try:
         motion = yield from plan(skill, cell.arm, lambda: (goal, make_transport_task(cell, item)))
-        guard = Guard(lost_grip=True)
+        guard = MotionGuard(lost_grip=True)
         yield from follow(skill, cell, motion, guard, until=lambda: detect_and_record_drop(cell, item))
     except SkillFailed:
         # `dropped` has priority: handlers of the other reasons expect the item in the tool.

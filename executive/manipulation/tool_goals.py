@@ -66,7 +66,7 @@ def predict_next_slot_index(cell: Cell, bin_name: str, excluded_item: Item | Non
 
 def make_obstacle(cell: Cell, target: Target) -> Obstacle:
     """Return the bounding cylinder of a target as an obstacle; of no class: as large as the largest class."""
-    x, y, z = map(float, target.position)
+    x, y, z = map(float, target.pose_at(target.stamp).position)
     object_class = cell.classes.get(target.label)
     classes = [object_class] if object_class else cell.classes.values()
     radius = max(each.radius for each in classes)
@@ -118,7 +118,7 @@ def choose_grasp(
     """
     grasp = cell.tool_model.list_grasps(
         cell.classes[target.label],
-        target.position,
+        target,
         cell.motion,
         attempt=cell.ledger.describe(target.item).attempts,
         is_confirmed=cell.ledger.is_confirmed_by_tool(target.label),

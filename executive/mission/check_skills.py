@@ -228,8 +228,8 @@ def check_loads(
     """Yield an error for each routed class that the tool cannot hold, or a warning if it may be dropped.
 
     The planner limits the accelerations so that the tool holds `safety_factor` times the force on the load,
-    but it never lifts with less than `min_lift_acceleration`. `compute_mass` is that of `CellKind`; if it is
-    None, only classes with a declared mass are checked.
+    but it never lifts with less than `min_lift_acceleration`. `compute_mass` is that of the checker; if
+    it is None, only classes with a declared mass are checked.
     """
     force = config.tool.max_holding_force
     safety_factor = config.tool.safety_factor

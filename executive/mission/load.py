@@ -164,7 +164,7 @@ def _add_library(
     return source.text
 
 
-class CellChecker(Protocol):
+class CellFileChecker(Protocol):
     """Checks of cell files of one kind; `executive.station.check.CellChecker` implements them."""
 
     def check(self, config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
@@ -177,7 +177,7 @@ class CellChecker(Protocol):
         """Return the mass of the objects of a class [kg], 0 if it is unknown."""
 
 
-CheckerFinder = Callable[[str], CellChecker]
+CheckerFinder = Callable[[str], CellFileChecker]
 """Function that returns the checker of a kind of cell; raises InputError if the kind is not installed."""
 
 

@@ -258,7 +258,7 @@ def read_journal(path: Path) -> list[TimedEvent]:
         content = path.read_bytes()
     timed_events: list[TimedEvent] = []
     control_period = 0.0
-    clock_offset = 0.0
+    clock_offsets = [(0, 0.0)]  # Tick and value of each reading of the clock, without discarded ticks.
     lines = content[: _measure_valid_length(content)].splitlines()
     for line_number, line in enumerate(lines, start=1):
         try:
@@ -266,13 +266,16 @@ def read_journal(path: Path) -> list[TimedEvent]:
             event = timed.event
             if isinstance(event, RunStarted):
                 control_period = event.step
-            step_time = timed.tick * control_period + clock_offset
+            elif isinstance(event, events.RunResumed):
+                kept_offsets = [reading for reading in clock_offsets if reading[0] < event.valid_ticks]
+                clock_offsets = kept_offsets or [(0, 0.0)]
+            step_time = timed.tick * control_period + clock_offsets[-1][1]
             if control_period and abs(timed.clock - step_time) > CLOCK_TOLERANCE:
                 raise ValueError(f'"tick" {timed.tick} and "clock" {timed.clock} contradict each other')
             if isinstance(event, events.InputRead) and event.name == "clock" and not event.exception:
                 if not isinstance(event.value, int | float):
                     raise ValueError(f"the clock is {event.value!r}, not a time in seconds")
-                clock_offset = event.value
+                clock_offsets.append((timed.tick, event.value))
             elif isinstance(event, events.InputRead) and not event.exception:
                 check_input(event.name, event.value)
         except ValueError as error:

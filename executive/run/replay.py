@@ -370,10 +370,12 @@ class ResumedRun(Run):
         for recorder in self._recorders:
             super().add_recorder(recorder)
         self._is_realtime = self._is_realtime_after_replay
-        self.begin_step(station.tick_count)
-        self._wall_start = time.monotonic() - self.now
+        self.clock.tick = station.tick_count
         versions = dict(list_versions())
         self.emit(RunResumed(interruption.kept_step_count, interruption.last_action, versions))
+        # The time of the clock is recorded after `RunResumed`, which discards the later steps of the record.
+        self.begin_step(station.tick_count)
+        self._wall_start = time.monotonic() - self.now
 
 
 def halt_running_skills(root: Behaviour) -> None:

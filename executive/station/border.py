@@ -29,7 +29,7 @@ from executive.cell.frame import Answer, Detection, ErrorRates, Observation
 from executive.cell.protocols import BehaviourStep
 from executive.errors import Stopped
 from executive.events import Emit, InputRead, ToolCommanded
-from executive.geometry import Array
+from executive.geometry import Array, Yaw
 
 MAX_PIXELS = 10**8
 """Maximum number of pixels of a recorded image."""
@@ -109,13 +109,17 @@ def decode_answer(value: Any) -> Answer:
 def encode_observation(seen: Observation) -> list[Any]:
     """Return the attributes of an observation as a list."""
     detection = encode_detection(seen.detection)
-    return [detection, seen.position.tolist(), seen.std, seen.is_confident, seen.contradiction]
+    position = seen.position.tolist()
+    return [detection, position, seen.std, seen.stamp, seen.is_confident, seen.contradiction, seen.yaw]
 
 
 def decode_observation(value: Any) -> Observation:
     """Return the observation that `encode_observation` encoded."""
-    detection, position, std, is_confident, contradiction = value
-    return Observation(decode_detection(detection), decode_array(position), std, is_confident, contradiction)
+    detection, position, std, stamp, is_confident, contradiction, yaw = value
+    return Observation(
+        decode_detection(detection), decode_array(position), std, stamp, is_confident, contradiction,
+        yaw=yaw and Yaw(*yaw),
+    )  # fmt: skip
 
 
 def encode_behaviour_step(step: BehaviourStep) -> dict[str, Any]:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CellChecker:
-    """Checks cell files of one kind; implements `executive.mission.load.CellChecker`.
+    """Checks cell files of one kind; implements `executive.mission.load.CellFileChecker`.
 
     Attributes:
         kind: Kind of the driver of the cells.
@@ -95,7 +95,6 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     partial views must see it from all its scan poses together. If the model of the arm is invalid, only its
     errors are reported.
     """
-    # The import loads PyBullet, which takes 0.2 s; a cell without physics does not need it.
     from executive.physics.collision import ClearanceChecker
     from executive.physics.model_files import find_arm_model_errors
 

@@ -12,7 +12,7 @@ from types import GeneratorType
 
 import numpy as np
 
-from executive.cell.arm import Goal, Guard, Motion, Planning, Task
+from executive.cell.arm import Goal, Motion, MotionGuard, Planning, Task
 from executive.cell.devices import ArmDevice
 from executive.cell.protocols import Clock
 from executive.errors import Fault, Unreachable
@@ -209,7 +209,7 @@ class PlannedArm:
         """Begin to plan the next motion; raise Fault if the cell file has no such pose."""
         self._planner.plan_ahead(self._device.end_q, self._find_end(goal), task)
 
-    def start(self, motion: Motion, guard: Guard = Guard()) -> None:
+    def start(self, motion: Motion, guard: MotionGuard = MotionGuard()) -> None:
         """Begin to follow a motion.
 
         Raises:

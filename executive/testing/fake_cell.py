@@ -32,6 +32,7 @@ class FakeCell(Station):
         camera: The fake camera.
         detectors: What finds the objects in frames for each detector, by name of the detector.
         detector: The first detector.
+        ledger: The ledger of the run.
     """
 
     driver: FakeDriver

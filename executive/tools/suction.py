@@ -13,7 +13,7 @@ from pydantic import Field
 
 from executive.cell.arm import Goal
 from executive.cell.device_config import Force, Length, MotionConfig
-from executive.cell.objects import ObjectClass, list_top_heights
+from executive.cell.objects import ObjectClass, Target, list_top_heights
 from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose, ToolMeasurement, ToolModel, ToolPart
 from executive.geometry import Array, Pose
 
@@ -76,7 +76,7 @@ class Suction(ToolModel):
     def list_grasps(
         self,
         object_class: ObjectClass,
-        position: Array,
+        target: Target,
         motion: MotionConfig,
         *,
         attempt: int = 0,
@@ -90,7 +90,7 @@ class Suction(ToolModel):
         After `ATTEMPTS_BEFORE_PROBE` failed attempts, the motion ends `PROBE_CLEARANCE` above the table,
         because the item may be a false detection.
         """
-        x, y, z = map(float, position)
+        x, y, z = map(float, target.pose_at(target.stamp).position)
         # After n failed attempts, the contact point on a solid object lies on a Vogel spiral, at the distance
         # spacing * sqrt(n) and the angle n * GOLDEN_ANGLE; on an object with a hole, it lies on the ring.
         angle = attempt * GOLDEN_ANGLE

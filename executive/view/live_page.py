@@ -76,14 +76,14 @@ class PageChange:
 
 
 @dataclass(frozen=True)
-class CameraImage:
+class SearchedFrame:
     """Frame without its depth image, and the event with the detections in this frame."""
 
     frame: Frame
     search_event: FrameSearched
 
 
-Message = TimedEvent | PageChange | CameraImage
+Message = TimedEvent | PageChange | SearchedFrame
 """Message from the run to the server of the page."""
 
 
@@ -143,7 +143,7 @@ class LivePage:
         self._pose_period = POSE_PERIOD
         self._was_paused = False
         self._last_frame: Frame | None = None
-        self._last_camera_image: CameraImage | None = None
+        self._last_searched_frame: SearchedFrame | None = None
         self.problem = ""
         """Description of the first error of the page, or ""."""
         # The token is sent through the pipe, because every user of the machine can read process arguments.
@@ -176,9 +176,9 @@ class LivePage:
                 # The page does not show the depth image, which is the largest part of a frame.
                 self._last_frame = replace(event.frame, depth=None)
             elif isinstance(event, FrameSearched) and self._last_frame is not None:
-                self._last_camera_image = CameraImage(self._last_frame, event)
+                self._last_searched_frame = SearchedFrame(self._last_frame, event)
                 if self._can_send_images:
-                    self._enqueue(self._last_camera_image)
+                    self._enqueue(self._last_searched_frame)
             elif not isinstance(event, InputRead):
                 self._enqueue(timed)
 
@@ -274,8 +274,8 @@ class LivePage:
         if command.name == "browsers":
             self._browser_count = command.browser_count
             self._pose_period = CPU_RENDERING_POSE_PERIOD if command.is_cpu_rendering else POSE_PERIOD
-            if self._browser_count and self._last_camera_image is not None:
-                self._enqueue(self._last_camera_image)
+            if self._browser_count and self._last_searched_frame is not None:
+                self._enqueue(self._last_searched_frame)
         elif control is not None and command.name == "request":
             control.add_request(command.text)
         elif control is not None:

@@ -34,7 +34,7 @@ from executive import events
 from executive.cell.devices import Shape
 from executive.record.picture_recorder import encode_jpeg
 from executive.record.timeline import STATUS_TEXTS, Timeline
-from executive.view.live_page import LOOPBACK, CameraImage, Message, PageChange, PageCommand
+from executive.view.live_page import LOOPBACK, Message, PageChange, PageCommand, SearchedFrame
 
 if TYPE_CHECKING:
     from executive.view.live_scene import LiveScene
@@ -70,8 +70,8 @@ class PageState:
                 self._timeline(message)
                 self._set_values(clock=message.clock)
                 self._apply_event(message.event)
-            case CameraImage():
-                self._set_values(look=_encode_camera_image(message))
+            case SearchedFrame():
+                self._set_values(look=_encode_searched_frame(message))
             case PageChange():
                 changes = vars(message).items()
                 values = {key: value for key, value in changes if value is not None and key not in SCENE_KEYS}
@@ -114,9 +114,9 @@ class PageState:
             entries[name] = value
 
 
-def _encode_camera_image(camera_image: CameraImage) -> JsonObject:
+def _encode_searched_frame(searched_frame: SearchedFrame) -> JsonObject:
     """Return the detections in a frame and its image as JPEG, darkened where the arm occludes the scene."""
-    frame = camera_image.frame
+    frame = searched_frame.frame
     image = frame.image.copy()
     if frame.visible is not None:
         occluded = ~frame.visible
@@ -125,8 +125,8 @@ def _encode_camera_image(camera_image: CameraImage) -> JsonObject:
     return {
         "source": "data:image/jpeg;base64," + base64.b64encode(encode_jpeg(image)).decode(),
         "width": width, "height": height, "frame": frame.id, "camera": frame.camera,
-        "detector": camera_image.search_event.detector, "stamp": frame.stamp,
-        "detections": list(map(vars, camera_image.search_event.confident)),
+        "detector": searched_frame.search_event.detector, "stamp": frame.stamp,
+        "detections": list(map(vars, searched_frame.search_event.confident)),
     }  # fmt: skip
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.objects import ObjectClass, Obstacle
+from executive.cell.objects import ObjectClass, Obstacle, Target
 from executive.drivers.sim.models import compute_mass, load_mesh
 from executive.drivers.sim.scene import spawn_objects
 from executive.drivers.sim.world import World
@@ -32,7 +32,7 @@ MAX_TRIES = 50
 @contextmanager
 def open_world(cell: CellConfig) -> Iterator[tuple[World, Planner]]:
     """Yield a world without objects, and a planner that makes all checks of the planner of a run."""
-    world, clearance = World(cell, visuals=False), ClearanceChecker(cell)
+    world, clearance = World(cell), ClearanceChecker(cell)
     try:
         yield world, Planner(cell, clearance.check)
     finally:
@@ -132,7 +132,9 @@ class SceneGenerator:
         target, *others = (self._make_obstacle(body, number) for number, body in enumerate(bodies, start=1))
         centre = np.array([target.x, target.y, target.top - kind.height / 2])
         tool = self._cell.tool
-        approach = tool.list_grasps(kind, centre, motion, is_confirmed=True)[0].goal
+        approach = tool.list_grasps(
+            kind, Target("object-1", kind.label, centre, 1.0, 0, 0, 0.0), motion, is_confirmed=True
+        )[0].goal
         surface, force = self._measure_seal(first, approach.position[:2], target.top)
         drop = make_slot_goal(bin, slot, kind.height, self._tallest)
         return Scene(first, kind, surface + tool.touch_distance, force, target, tuple(others), approach, drop)

@@ -156,7 +156,8 @@ class LyingCell(FakeCell):
 
     def audit(self) -> dict[str, int]:
         counts = super().audit()
-        self.arm.start(self.arm.plan("aside").result())
+        arm = self.unrecorded_cell.arm
+        arm.start(arm.plan("aside").result())
         return {**counts, "right": counts["right"] - 1, "wrong_bin": 1}
 
 

@@ -58,7 +58,7 @@ def test_two_packages_that_provide_cv2_are_a_problem(monkeypatch: pytest.MonkeyP
     assert find_statuses(doctor.check_packages())["opencv"] == "problem"
 
 
-@pytest.mark.parametrize("group", ["cells", "detectors"])
+@pytest.mark.parametrize("group", ["drivers", "detectors"])
 def test_a_plugin_that_cannot_be_loaded_is_an_error(
     group: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -85,7 +85,7 @@ def test_all_checks_run_although_one_fails(monkeypatch: pytest.MonkeyPatch) -> N
     def fail() -> None:
         raise InputError("the skill is broken; correct it")
 
-    monkeypatch.setattr("executive.plugins.load_skills", fail)
+    monkeypatch.setattr("executive.behaviours.load_skills", fail)
     monkeypatch.setitem(sys.modules, "executive.perception.detectors.roboflow.inference_process", None)
     statuses = find_statuses(doctor.run_checks())
     assert {name: statuses[name] for name in ("system", "plugins", "simulator")} == {

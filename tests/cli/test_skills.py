@@ -47,7 +47,8 @@ class Rest(Skill):
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.plugins.load_skills", lambda: {"PlaceNeatly": PlaceNeatly, "Rest": Rest})
+    skills = {"PlaceNeatly": PlaceNeatly, "Rest": Rest}
+    monkeypatch.setattr("executive.behaviours.load_skills", lambda: skills)
 
 
 def shown(*words: str) -> Result:

@@ -32,7 +32,7 @@ class Nap(Rest):
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.plugins.load_skills", lambda: {"Rest": Rest, "Nap": Nap})
+    monkeypatch.setattr("executive.behaviours.load_skills", lambda: {"Rest": Rest, "Nap": Nap})
 
 
 def conform(*words: str) -> Result:

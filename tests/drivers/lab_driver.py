@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.cell.arm import Guard, Motion
+from executive.cell.arm import Motion, MotionGuard
 from executive.cell.config import CellConfig
 from executive.cell.devices import DEFAULT_ROLE, CameraImage, DriverOptions, StepClock
 from executive.geometry import Array
@@ -50,7 +50,7 @@ class LabArm:
         """Height of the tip of the tool above the table [m]."""
         return float(self._kinematics.compute_tool_pose(self.q).position[2])
 
-    def execute(self, motion: Motion, guard: Guard) -> None:
+    def execute(self, motion: Motion, guard: MotionGuard) -> None:
         """Jump along the path of a motion."""
         if guard.lost_grip and not self.tool.holding:
             return

@@ -101,7 +101,8 @@ class Bench:
         position = np.array([x, y, 0.025])
         std = by.jitter * frame.compute_depth(position) / float(frame.matrix[0, 0])
         detection = Detection(label, confidence, (0, 0, 1, 1))
-        return Observation(detection, position, std, confidence >= by.threshold, contradiction)
+        is_confident = confidence >= by.threshold
+        return Observation(detection, position, std, frame.stamp, is_confident, contradiction)
 
     def overlooked(self, x: float, y: float) -> float:
         """The chance that an object at a place has been overlooked."""

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ledger_bench import Bench
+from ledger_bench import Bench, take_frame
 
 from executive.cell.frame import Detection, ErrorRates, Observation
 from executive.cell.objects import ObjectClass
-from executive.geometry import GRAVITY
+from executive.geometry import GRAVITY, Yaw, rotate_about_z
 from executive.ledger.belief import Belief
 from executive.ledger.bin_contents import update_bin_log_odds
 from executive.ledger.item import ItemRecord
@@ -114,8 +114,20 @@ def test_agreeing_looks_reduce_the_standard_error_and_a_push_resets_it() -> None
 def test_the_gate_is_as_wide_as_the_measurements_scatter(spread: float, new: float, allowed: float) -> None:
     item = record()
     item.standard_error = spread
-    observation = Observation(Detection("cube", 0.9, (0, 0, 1, 1)), HERE, new)
+    observation = Observation(Detection("cube", 0.9, (0, 0, 1, 1)), HERE, new, 0.0)
     assert compute_association_distance(item, observation, 0.025) == pytest.approx(allowed)
+
+
+def test_a_target_has_time_and_yaw_of_its_last_detection() -> None:
+    item = record()
+    yaw = Yaw(0.5, 0.01)
+    frame = take_frame(7)
+    observation = Observation(Detection("cube", 0.9, (0, 0, 1, 1)), HERE, 0.001, frame.stamp, yaw=yaw)
+    item.store(observation, frame, 0.0, is_unmoved=True)
+    assert (item.target.stamp, item.target.yaw) == (7.0, yaw)
+    pose = item.target.pose_at(9.0)
+    assert np.allclose(pose.rotation, rotate_about_z(yaw.angle))
+    assert np.array_equal(pose.position, HERE)
 
 
 STD = 0.05

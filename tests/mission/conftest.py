@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
-from executive.drivers.sim.kind import SIM_CELL_KIND
 
 import executive.mission.load
 from executive.cell.config import CellConfig
 from executive.mission import cell_file
 from executive.mission.load import LoadedMission, load_mission
 from executive.skill import In, Metres, Out, Skill, param, port
+from executive.station.check import CellChecker
 from executive.tree.node import load_control_nodes
 
 
@@ -68,19 +68,19 @@ SMALL_CELL = Path(__file__).with_name("small_cell.yaml").read_text()
 @pytest.fixture(scope="module")
 def shared_cells() -> Iterator[None]:
     """Read each file once, check each cell once, and load the control nodes once, per module."""
-    check, found = SIM_CELL_KIND.check, {}
+    check, found = CellChecker.check, {}
 
-    def check_once(config: CellConfig, cell_folder: Path) -> Any:
-        key = config.model_dump_json(), cell_folder
+    def check_once(checker: CellChecker, config: CellConfig, cell_folder: Path) -> Any:
+        key = checker, config.model_dump_json(), cell_folder
         if key not in found:
-            found[key] = check(config, cell_folder)
+            found[key] = tuple(check(checker, config, cell_folder))
         return found[key]
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cell_file, "read_source", functools.cache(cell_file.read_source))
         for module in (cell_file, executive.mission.load):
             patch.setattr(module, "parse_yaml", functools.cache(module.parse_yaml))
-        patch.setattr(SIM_CELL_KIND, "check", check_once)
+        patch.setattr(CellChecker, "check", check_once)
         patch.setattr(executive.mission.load, "load_control_nodes", functools.cache(load_control_nodes))
         yield
 

@@ -3,16 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
 
-from executive.cell.config import CellConfig
 from executive.errors import InputError
 from executive.mission.load import LoadedMission
-from executive.testing.fake_cell import FakeCell
+from executive.station.check import CellChecker
 from executive.text.findings import MissionError
 from executive.text.yaml_files import find_mission, get_shipped_folder
 from executive.tree.specification import Reference, SkillNode
@@ -61,22 +60,23 @@ def test_an_override_out_of_range_is_shown_where_it_was_given(load: Load) -> Non
     )
 
 
-def test_findings_of_the_robot_stand_in_the_cell_file(load: Load) -> None:
-    class Short(FakeCell):
-        @staticmethod
-        def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[tuple[str | int, ...], str]]:
-            yield ("bins", "blue_bin", "position"), "0.3 m out of reach"
+def make_checker(*errors: tuple[tuple[str, ...], str]) -> Mock:
+    """Return a checker that finds these errors in every cell file."""
+    return Mock(spec=CellChecker, check=Mock(return_value=errors), labels=Mock(return_value={}))
 
+
+def test_findings_of_the_robot_stand_in_the_cell_file(load: Load) -> None:
+    checker = make_checker((("bins", "blue_bin", "position"), "0.3 m out of reach"))
     with pytest.raises(MissionError) as caught:
-        load(HEAD + "tree: Look\n", find_checker=lambda name: Short)
+        load(HEAD + "tree: Look\n", find_checker=lambda name: checker)
     assert str(caught.value).startswith("cells/small.yaml:16:14: error[robot]: 0.3 m out of reach\n")
 
 
-def test_an_error_of_compute_mass_is_a_finding(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(FakeCell, "check", lambda config, cell_folder: ())
-    monkeypatch.setattr(FakeCell, "compute_mass", Mock(side_effect=InputError("no scale")), raising=False)
+def test_an_error_of_compute_mass_is_a_finding(load: Load) -> None:
+    checker = make_checker()
+    checker.compute_mass.side_effect = InputError("no scale")
     with pytest.raises(MissionError, match=r"cells/small.yaml.*robot.*cube.*no scale"):
-        load(HEAD + "routes: {cube: red_bin}\ntree: Look\n", find_checker=lambda name: FakeCell)
+        load(HEAD + "routes: {cube: red_bin}\ntree: Look\n", find_checker=lambda name: checker)
 
 
 def test_a_link_out_of_the_folder_is_refused(load: Load, tmp_path: Path, small_cell: str) -> None:

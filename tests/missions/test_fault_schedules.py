@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.cell.frame import Answer
-from executive.station.check import load_checker
+from executive.station.station import Station
 from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import (
     after,
@@ -34,7 +34,7 @@ def exchange_objects(occurrence: Occurrence) -> bool:
         thing
         for thing in world.objects
         if thing.label != first.label
-        and not any(b.contains(thing.position) for b in occurrence.context.cell.bins.values())
+        and not any(b.contains(thing.position) for b in occurrence.context.station.cell.bins.values())
     ]
     if not others:
         return False
@@ -47,7 +47,7 @@ def exchange_objects(occurrence: Occurrence) -> bool:
 
 def empty_bin(occurrence: Occurrence) -> bool:
     """Take all objects out of the first bin that holds some, once."""
-    for bin in occurrence.context.cell.bins.values():
+    for bin in occurrence.context.station.cell.bins.values():
         inside = [thing for thing in occurrence.context.world.objects if bin.contains(thing.position)]
         for thing in inside:
             occurrence.emit_event(thing)
@@ -91,7 +91,7 @@ def names_rejected_and_lost_items(result: MissionResult) -> bool:
 @pytest.mark.parametrize("kind", ["bumped objects", "wrong classes", "exchanged objects", "emptied bin"])
 def test_ledger_and_audit_agree_or_the_run_names_the_items(kind: str, cell: str, seed: int) -> None:
     result = run_mission(
-        "sort_overhead", FakeCell if cell == "fake" else load_checker("sim"),
+        "sort_overhead", FakeCell if cell == "fake" else Station,
         seed=seed, faults=schedule(kind, seed), set={"cell.kind": cell},
     )  # fmt: skip
     assert result.agrees or names_rejected_and_lost_items(result)

@@ -6,6 +6,7 @@ import numpy as np
 
 from executive.cell.protocols import Cell, Steps
 from executive.events import ItemChanged, NodeEnded
+from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import during, grip_fails
 from executive.testing.run_mission import MissionResult, run_mission
 from skills.approach import Approach

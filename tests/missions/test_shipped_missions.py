@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from executive.behaviours import load_skills
-from executive.cell.devices import Workcell
 from executive.events import ItemChanged, MotionPlanned, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.station.check import load_checker
+from executive.station.station import Station
 from executive.testing.fake_cell import FakeCell
 from executive.testing.oracle import make_oracle_kind
 
@@ -50,7 +50,7 @@ def loaded(name: str) -> LoadedMission:
     return load_mission(MISSIONS[name], load_skills(), find_checker=load_checker)
 
 
-def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = FakeCell) -> Done:
+def execute(mission: LoadedMission, seed: int, kind: Callable[..., Station] = FakeCell) -> Done:
     """Run a mission."""
     events: list[TimedEvent] = []
     # Where an operator is asked, every class is asked for until there can be none of it left.

@@ -11,6 +11,7 @@ import pytest
 
 from executive.cell.frame import Detection
 from executive.events import ItemChanged
+from executive.perception.camera_model import compute_calibration
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import MissionResult, run_mission
 
@@ -60,8 +61,8 @@ def sorted_beside_banana(
 
     def arrange(fake: FakeCell) -> None:
         def add_banana(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
-            camera = fake.camera.capture()
-            column, row, depth = camera.matrix @ camera.X_WC.inverse().apply(np.array([x, y, 0.025]))
+            matrix, X_WC = compute_calibration(fake.config.cameras["overhead"])
+            column, row, depth = matrix @ X_WC.inverse().apply(np.array([x, y, 0.025]))
             u, v = column / depth, row / depth
             banana = Detection("banana", confidence, (u - 9, v - 9, u + 9, v + 9))
             return [*true, banana] if is_shown(look) else true

@@ -1,4 +1,4 @@
-"""One short mission, and the cells that runs were made on."""
+"""One short mission, and the devices that runs were made on."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NoReturn
 
 import pytest
 
-from executive.testing.fake_cell import FakeCell
+from executive.drivers.fake import FakeDriver
 
 MISSION = """\
 mission: bring_one
@@ -28,16 +28,16 @@ def bring_one(tmp_path: Path) -> str:
 
 
 @pytest.fixture
-def cells(monkeypatch: pytest.MonkeyPatch) -> list[FakeCell]:
-    """The cells that runs were made on."""
-    made: list[FakeCell] = []
+def drivers(monkeypatch: pytest.MonkeyPatch) -> list[FakeDriver]:
+    """The devices that runs were made on."""
+    made: list[FakeDriver] = []
 
-    class Cell(FakeCell):
+    class Driver(FakeDriver):
         def __init__(self, *args, **options) -> None:
             super().__init__(*args, **options)
             made.append(self)
 
-    monkeypatch.setattr("executive.run.assembly.load_checker", lambda name: Cell)
+    monkeypatch.setattr("executive.station.station.load_driver_kind", lambda name: Driver)
     return made
 
 

@@ -130,7 +130,7 @@ def test_a_change_by_another_program_is_a_fault_at_the_next_command_of_the_tool_
     journal.close()
 
 
-@pytest.mark.parametrize(("name", "value"), [("camera.frame", {"size": [1, 2]}), ("arm.tool_pose", [1.0])])
+@pytest.mark.parametrize(("name", "value"), [("camera.image", {"size": [1, 2]}), ("arm.q", ["far"])])
 def test_an_answer_that_cannot_be_replayed_is_refused(path, name, value):
     write(path, at(0, run_started()), at(0, read(name, value)))
     with pytest.raises(InputError, match=f':2: .* the format of the input "{name}"'):

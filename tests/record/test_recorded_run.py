@@ -10,7 +10,6 @@ from unittest.mock import Mock
 import py_trees
 import pytest
 from click.testing import CliRunner, Result
-from executive.station.without_hardware import CellWithoutHardware
 
 from executive.behaviours import load_skills
 from executive.cell.json_values import to_json
@@ -22,6 +21,7 @@ from executive.record.journal import Journal, read_journal
 from executive.record.picture_recorder import PictureRecorder
 from executive.record.recorded_run import GuardedView, RecordOptions, record_run
 from executive.run.assembly import RunOptions
+from executive.station.station import Station
 from executive.testing.fake_cell import FakeCell
 
 
@@ -90,7 +90,7 @@ def test_whatever_ends_a_run_early_view_journal_and_cell_are_closed(run, tmp_pat
     def fails(self):
         raise error
 
-    monkeypatch.setattr(CellWithoutHardware, "audit", fails)
+    monkeypatch.setattr(Station, "audit", fails)
     view, other = Watcher(), Watcher()
     with pytest.raises(type(error)):
         run(view, other)
@@ -138,7 +138,7 @@ class Disk:
 
 
 @pytest.fixture
-def run_command(bring_one, tmp_path, monkeypatch, cells):
+def run_command(bring_one, tmp_path, monkeypatch, drivers):
     """Run the command once, without pictures; the result, and the directory that it left, if any."""
     monkeypatch.setattr(PictureRecorder, "__call__", lambda self, timed: None)
 
@@ -154,10 +154,10 @@ def run_command(bring_one, tmp_path, monkeypatch, cells):
 
 
 @pytest.mark.parametrize("room", [0, 300])
-def test_a_run_whose_world_cannot_be_kept_ends_at_rest_and_says_so(run_command, monkeypatch, cells, room):
+def test_a_run_whose_world_cannot_be_kept_ends_at_rest_and_says_so(run_command, monkeypatch, drivers, room):
     Disk(monkeypatch, room)
     shown, left = run_command()
-    assert cells[-1].arm.at_rest
+    assert drivers[-1].arm.at_rest
     assert "no space left on device" in shown.stderr
     assert "Traceback" not in shown.output
     assert shown.exit_code == (3 if room else 2)

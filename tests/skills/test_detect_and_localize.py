@@ -8,9 +8,11 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from at_hand import intercept
 
 from executive.cell.frame import Detection, Frame
 from executive.errors import NoDepth
+from executive.perception.localization import CellLocalizer
 from executive.skill import SkillFailed
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
@@ -78,16 +80,16 @@ def test_an_uncertain_detection_in_a_bin_is_no_failure(
 
 def test_an_arm_in_the_way_may_be_looked_past(fake: FakeCell) -> None:
     fake.world.put("cube", 0.5, 0.0)
-    fake.camera.sees_table = lambda: False
+    intercept(fake, "camera.sees_table", lambda: False)
     result = run_skill(Detect(), fake)
     assert (result.reason, result.ticks) == ("hidden", 0)
     result = run_skill(Detect(hidden="pass"), fake)
     assert [found.label for found in result.outputs["detections"].confident] == ["cube"]
 
 
-def test_a_moved_camera_is_noticed_in_every_look(fake: FakeCell, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_moved_camera_is_noticed_in_every_look(fake: FakeCell) -> None:
     for displacement, reason in (("", ""), ("camera overhead was moved", "camera_moved"), ("", "")):
-        monkeypatch.setattr(fake.camera, "describe_displacement", Mock(return_value=displacement))
+        intercept(fake, "camera.describe_displacement", Mock(return_value=displacement))
         result = run_skill(Detect(), fake)
         assert (result.reason, result.message) == (reason, displacement)
 
@@ -147,11 +149,11 @@ def test_what_the_detector_is_unsure_of_is_an_item_in_doubt_where_it_seems_to_be
 def test_a_box_in_doubt_without_a_place_is_not_passed_over(
     fake: FakeCell, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def locate(detection: Detection, frame: Frame) -> None:
+    def locate(localizer: CellLocalizer, detection: Detection, frame: Frame) -> None:
         raise NoDepth(f"no depth at the {detection.label}")
 
     detections = unsure(fake)
-    monkeypatch.setattr(type(fake.cell.localizer), "locate", staticmethod(locate))
+    monkeypatch.setattr(CellLocalizer, "locate", locate)
     result = run_skill(Localize(detections=detections), fake)
     assert (result.reason, result.message) == ("no_depth", "no depth at the cube")
     assert fake.ledger.list_items() == []

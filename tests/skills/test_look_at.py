@@ -2,10 +2,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from unittest.mock import Mock
 
 import pytest
+from at_hand import intercept
 
-from executive.cell.frame import Detections
 from executive.cell.objects import Target
 from executive.errors import NoDepth
 from executive.testing.fake_cell import FakeCell
@@ -65,11 +66,6 @@ def test_a_doubtful_detection_beside_the_slot_is_no_answer(fake: FakeCell, place
     assert result.message.startswith("3 images are not enough")
 
 
-def test_a_look_without_depth_is_no_answer(
-    fake: FakeCell, placed: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def localize(detections: Detections) -> None:
-        raise NoDepth("no depth")
-
-    monkeypatch.setattr(type(fake.cell.localizer), "localize", staticmethod(localize))
+def test_a_look_without_depth_is_no_answer(fake: FakeCell, placed: str) -> None:
+    intercept(fake, "localizer.localize", Mock(side_effect=NoDepth("no depth")))
     assert look_at(fake, item=placed, looks=2).reason == "hidden"

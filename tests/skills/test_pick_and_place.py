@@ -5,6 +5,7 @@ from collections.abc import Callable
 import at_hand
 import numpy as np
 import pytest
+from at_hand import intercept
 
 from executive.cell.objects import Target
 from executive.drivers.fake import FakeTool
@@ -151,9 +152,9 @@ def test_the_reason_of_an_item_that_the_tool_drops_again_and_again_is_its_weight
 def test_move_to_scan_goes_to_the_cameras_first_pose_only_if_the_table_is_out_of_view(fake: FakeCell) -> None:
     assert (run_skill(MoveToScan(), fake).ticks, fake.arm.commands) == (0, [])
     run_skill(MoveToScan(pose="aside"), fake)
-    fake.camera.sees_table = lambda: False
+    intercept(fake, "camera.sees_table", lambda: False)
     assert run_skill(MoveToScan(), fake).status == "SUCCESS"
-    assert np.allclose(fake.arm.q, fake.arm.poses["home"])
+    assert np.allclose(fake.arm.q, np.radians(fake.config.arm.poses_deg["home"]))
 
 
 def test_taken_away_while_it_lets_go_it_has_placed_what_fell(fake: FakeCell, held: str) -> None:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future
-from dataclasses import replace
+from unittest.mock import Mock
 
 import pytest
+from at_hand import intercept
 
 from executive.errors import Blocked, Unreachable
-from executive.motion.straight_paths import StraightMotion
 from executive.skill import SkillFailed
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
@@ -54,19 +53,10 @@ def test_what_falls_while_the_way_is_planned_is_dropped_though_there_is_none(
     assert fake.ledger.find_held_item() is None
 
 
-def make_failed(error: Exception) -> Future[StraightMotion]:
-    future = Future[StraightMotion]()
-    future.set_exception(error)
-    return future
-
-
 @pytest.fixture
-def nowhere(fake: FakeCell, monkeypatch: pytest.MonkeyPatch) -> Callable[[Exception], None]:
+def nowhere(fake: FakeCell) -> Callable[[Exception], None]:
     """Makes every plan from now on end with an error."""
-    plan = fake.arm.plan
-    return lambda error: monkeypatch.setattr(
-        fake.arm, "plan", lambda *asked: replace(plan(*asked), future=make_failed(error))
-    )
+    return lambda error: intercept(fake, "plan.result", Mock(side_effect=error))
 
 
 def test_what_cannot_be_carried_away_and_was_not_lifted_is_left_where_it_stood(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 from pathlib import Path
 
+import numpy as np
 import pytest
 from at_hand import look
 
-from executive.cell.arm import Goal
 from executive.station.station import CellOptions, SilentOperator
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import SkillResult, run_skill
@@ -27,7 +27,7 @@ def put(fake: FakeCell, **places: tuple[float, float]) -> None:
 
 def test_without_a_preference_the_shortest_tour_decides(fake: FakeCell, look) -> None:
     put(fake, cube=(0.5, 0.2), duck=(0.5, -0.15))
-    fake.arm.start(fake.arm.plan(Goal((0.5, 0.05, 0.3))).result())
+    fake.arm.set_tool_position(np.array([0.5, 0.05, 0.3]))
     assert select(fake, look(), prefer="nearest").outputs["item"] == "cube-1"
     assert select(fake, look()).outputs["item"] == "duck-1"
 

@@ -14,6 +14,7 @@ from hypothesis.extra.numpy import arrays
 from executive.cell.devices import CameraImage
 from executive.cell.frame import Answer, Detection, ErrorRates, Observation
 from executive.cell.protocols import BehaviourStep
+from executive.geometry import Yaw
 from executive.station.border import (
     ANSWER,
     ARRAY,
@@ -75,14 +76,14 @@ def test_an_answer_comes_back(found: tuple, doubtful: tuple, unknown: tuple, mis
 
 
 @few
-@given(detections, arrays(np.float64, 3, elements=finite), finite, st.booleans(), st.text(max_size=5))
+@given(detections, arrays(np.float64, 3, elements=finite), finite, st.none() | st.builds(Yaw, finite, finite))
 def test_observations_come_back(
-    detection: Detection, position: np.ndarray, std: float, confident: bool, contradiction: str
+    detection: Detection, position: np.ndarray, value: float, yaw: Yaw | None
 ) -> None:
-    (read,) = back(OBSERVATIONS, [Observation(detection, position, std, confident, contradiction)])
+    (read,) = back(OBSERVATIONS, [Observation(detection, position, value, value, False, "size", yaw)])
     assert np.array_equal(read.position, position)
-    others = (read.detection, read.std, read.is_confident, read.contradiction)
-    assert others == (detection, std, confident, contradiction)
+    others = (read.detection, read.std, read.stamp, read.is_confident, read.contradiction, read.yaw)
+    assert others == (detection, value, value, False, "size", yaw)
 
 
 def test_collections_that_a_behaviour_wrote_keep_their_types() -> None:

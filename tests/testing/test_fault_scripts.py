@@ -19,7 +19,7 @@ from executive.events import FaultInjected, NodeEnded, NodeStarted, ToolCommande
 from executive.testing import faults as effects
 from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import after, between, during
-from executive.testing.faulty_cell import Effect, FaultyCell, ScheduledFault
+from executive.testing.faulty_cell import Effect, FaultInjector, ScheduledFault
 from executive.testing.run_mission import run_mission
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect
@@ -40,12 +40,13 @@ class Case:
             self.fake.world.put(label, *place)
         self.events: list[Any] = []
         faults = [between(0.0, end, one) if isinstance(one, Effect) else one for one in script]
-        self.cell = FaultyCell(self.fake, faults, self.events.append)
-        self.parts = self.cell.cell
+        self.injector = FaultInjector(faults)
+        self.injector.install(self.fake, self.events.append)
+        self.parts = self.fake.cell
 
     @property
     def labels(self) -> list[str]:
-        return [one.label for one in self.cell.world.objects]
+        return [one.label for one in self.fake.world.objects]
 
     def hold(self, label: str = "cube") -> None:
         self.fake.world.held_object = next(one for one in self.fake.world.objects if one.label == label)
@@ -54,7 +55,7 @@ class Case:
         """Advance the cell until the condition holds; return the time on its clock [s]."""
         while not condition():
             assert self.parts.clock.now < 50.0, "the condition never holds"
-            self.cell.advance()
+            self.fake.advance()
         return self.parts.clock.now
 
     def start_motion(self) -> float:
@@ -106,10 +107,10 @@ def test_a_fault_of_a_node_is_recorded_with_node_item_and_object() -> None:
 
 
 def test_the_world_of_an_unknown_cell_cannot_be_changed() -> None:
-    members = dict.fromkeys(("accounts", "log_to", "visuals", "audit", "close"))
-    strange: Any = SimpleNamespace(**members, cell=FakeCell().cell, advance=lambda: None)
-    with pytest.raises(InputError, match="not a SimpleNamespace"):
-        FaultyCell(strange, [after(0.0, effects.object_removed(1))]).advance()
+    case = Case(after(0.0, effects.object_removed(1)))
+    case.fake.driver = SimpleNamespace(clock=case.fake.driver.clock)
+    with pytest.raises(InputError, match="not the world of a SimpleNamespace"):
+        case.fake.advance()
 
 
 def test_an_operator_asks_for_a_scan_and_quits() -> None:
@@ -160,7 +161,7 @@ def test_an_unsure_detector_finds_everything_below_its_threshold() -> None:
 @pytest.mark.parametrize("name", ["grip_lost", "arm_collides", "object_removed"])
 def test_an_effect_waits_for_a_fraction_of_a_motion(name: str, fraction: float) -> None:
     case = Case(getattr(effects, name)(fraction=fraction))
-    case.cell.advance()
+    case.fake.advance()
     assert case.events == [], "no motion has begun"
     case.hold()
     duration = case.start_motion()
@@ -177,11 +178,11 @@ def test_an_effect_waits_for_a_fraction_of_a_motion(name: str, fraction: float) 
 
 def test_a_seal_breaks_once_and_only_if_an_object_is_held() -> None:
     case = Case(effects.grip_lost(None))
-    case.cell.advance()
+    case.fake.advance()
     assert case.events == []
     for is_holding in (False, True):
         case.hold()
-        case.cell.advance()
+        case.fake.advance()
         assert (case.fake.tool.holding, len(case.events)) == (is_holding, 1)
 
 
@@ -219,16 +220,16 @@ def test_no_path_is_found_after_the_usual_time() -> None:
     case.wait(lambda: planning.ready)
     with pytest.raises(Unreachable, match="injected fault"):
         planning.result()
-    result = run_skill(MoveToScan, case.cell, inputs={"pose": "aside"})
+    result = run_skill(MoveToScan, case.fake, inputs={"pose": "aside"})
     assert (result.status, case.fake.arm.commands) == ("FAILURE", [])
 
 
 def test_an_occluded_table_is_not_seen_and_is_recorded_once_per_control_step() -> None:
     case = Case(effects.workspace_occluded(), effects.no_depth())
-    assert run_skill(Detect, case.cell).reason == "hidden"
+    assert run_skill(Detect, case.fake).reason == "hidden"
     assert not case.parts.camera.sees_table()
     assert [one.name for one in case.events] == ["workspace_occluded"]
-    detections: Any = run_skill(Detect, case.cell, inputs={"hidden": "pass"}).outputs["detections"]
+    detections: Any = run_skill(Detect, case.fake, inputs={"hidden": "pass"}).outputs["detections"]
     with pytest.raises(NoDepth, match="injected fault"):
         case.parts.localizer.localize(detections)
 
@@ -236,7 +237,7 @@ def test_an_occluded_table_is_not_seen_and_is_recorded_once_per_control_step() -
 @pytest.mark.parametrize(("choice", "gone"), [(1, "cube"), (2, "sphere"), ("nearest", "duck"), (4, "")])
 def test_an_object_is_chosen_by_its_number_or_place(choice: Any, gone: str) -> None:
     case = Case(effects.object_removed(choice))
-    case.cell.advance()
+    case.fake.advance()
     assert case.labels == [label for label in PLACES if label != gone]
     assert [one.object for one in case.events] == [gone] * bool(gone)
 
@@ -245,7 +246,7 @@ def test_the_nearest_object_is_neither_in_a_bin_nor_held() -> None:
     case = Case(effects.object_removed("nearest"))
     case.hold("duck")
     case.fake.world.objects[0].position[:2] = case.parts.bins["red_bin"].slots[0][:2]
-    case.cell.advance()
+    case.fake.advance()
     assert case.labels == ["cube", "duck"]
 
 
@@ -262,8 +263,8 @@ def test_the_nearest_object_is_neither_in_a_bin_nor_held() -> None:
 def test_the_object_of_a_node_is_that_of_its_item(state: str, offset: float, is_removed: bool) -> None:
     case = Case(during("*/Approach", effects.object_removed()))
     ledger = case.parts.ledger
-    look: Any = run_skill(Detect, case.cell).outputs["detections"]
-    places = [Observation(one, np.array([*PLACES[one.label], 0.025]), 0.003) for one in look.confident]
+    look: Any = run_skill(Detect, case.fake).outputs["detections"]
+    places = [Observation(one, np.array([*PLACES[one.label], 0.025]), 0.003, 0.0) for one in look.confident]
     item = {one.label: one.item for one in ledger.observe(look, places)}["sphere"]
     case.fake.world.objects[1].position[0] += offset
     if state != "seen":
@@ -272,7 +273,7 @@ def test_the_object_of_a_node_is_that_of_its_item(state: str, offset: float, is_
         ledger.record_grasp(item)
     if state == "placed":
         ledger.record_placement(item, "blue_bin")
-    case.cell.on_event(at(1, NodeStarted("tree/Approach", "Approach", item)))
+    case.injector.on_event(at(1, NodeStarted("tree/Approach", "Approach", item)))
     assert case.labels == ["cube", *["sphere"] * (not is_removed), "duck"]
 
 
@@ -299,6 +300,6 @@ def test_an_object_is_bumped_aside_to_the_first_free_place(
     case = Case(effects.object_bumped(x, y, 1))
     if neighbour:
         case.fake.world.put("cube", *neighbour)
-    case.cell.advance()
+    case.fake.advance()
     assert case.fake.world.objects[0].position[:2] == pytest.approx(place)
     assert bool(case.events) is not math.isclose(math.dist(place, PLACES["cube"]), 0.0)

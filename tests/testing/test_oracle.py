@@ -18,19 +18,12 @@ def build(missions, request):
     """Builds simulated cells with an oracle; they are closed after the test."""
 
     def build(**oracle):
-        kind = make_oracle_kind(**oracle)
-        worlds = []
-
-        def build_camera(world, *arguments, **options):
-            worlds.append(world)
-            return kind.keywords["build_camera"](world, *arguments, **options)
-
         path = missions / "cells" / "overhead.yaml"
         options = CellOptions(SilentOperator(), cell_folder=path.parent)
         values = {"seed": 3, "routes": SHIPPED_ROUTES, "emit": discard_event, "options": options}
-        cell = kind(load_cell(path), build_camera=build_camera, **values)
+        cell = make_oracle_kind(**oracle)(load_cell(path), **values)
         request.addfinalizer(cell.close)
-        return cell, worlds[0]
+        return cell, cell.driver.world
 
     return build
 

@@ -10,8 +10,9 @@ import pytest
 
 from executive.errors import Fault, InputError
 from executive.events import RunEnded, RunStarted, TimedEvent
+from executive.testing.fake_cell import FakeCell
 from executive.testing.faults import after, detector_dead, during, grip_fails
-from executive.testing.faulty_cell import FaultyCell
+from executive.testing.faulty_cell import FaultInjector
 from executive.testing.run_mission import make_failing, run_mission
 from skills.wait import Wait
 
@@ -89,7 +90,8 @@ def test_a_mission_that_never_ends_ends_as_a_fault(look: Path) -> None:
 
 
 def test_a_cell_whose_time_is_over_says_so_once_so_that_the_arm_can_be_braked() -> None:
-    cell = FaultyCell(FakeCell(), [], timeout=0.01)
+    cell = FakeCell()
+    FaultInjector([], timeout=0.01).install(cell)
     cell.advance()
     cell.advance()
     with pytest.raises(Fault, match=r"has not ended after 0\.01 s"):

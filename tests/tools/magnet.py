@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from executive.cell.arm import Goal
 from executive.cell.device_config import Force, Length, MotionConfig
-from executive.cell.objects import ObjectClass
+from executive.cell.objects import ObjectClass, Target
 from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose, ToolModel, ToolPart
-from executive.geometry import Array
 
 if TYPE_CHECKING:
     from executive.drivers.sim.tool import SimTool
@@ -60,7 +59,7 @@ class Magnet(ToolModel):
     def list_grasps(
         self,
         object_class: ObjectClass,
-        position: Array,
+        target: Target,
         motion: MotionConfig,
         *,
         attempt: int = 0,
@@ -70,7 +69,7 @@ class Magnet(ToolModel):
     ) -> tuple[GraspPose]:
         """Return the grasp at the middle of the top, where the magnet stops on contact."""
         del attempt, is_confirmed, spacing
-        x, y, z = map(float, position)
+        x, y, z = map(float, target.pose_at(target.stamp).position)
         top = z + object_class.height / 2
         goal = Goal(
             (x, y, top - overtravel),

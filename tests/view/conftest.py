@@ -53,7 +53,7 @@ class Doomed(FakeCell):
 
     def advance(self) -> None:
         super().advance()
-        if self.steps == 250:
+        if self.tick_count == 250:
             raise Cut
 
 

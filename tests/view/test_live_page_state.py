@@ -21,7 +21,7 @@ from events import (
 
 from executive.events import Event, OperatorAsked, RequestGiven, TargetSelected
 from executive.geometry import Pose
-from executive.view.live_page import CameraImage, encode_poses
+from executive.view.live_page import SearchedFrame, encode_poses
 from executive.view.live_server import PageState
 
 
@@ -75,7 +75,7 @@ def test_an_image_is_shown_with_what_the_arm_hides_darker() -> None:
     frame = SimpleNamespace(image=image, visible=visible, id=3, camera="wrist", stamp=0.5)
     box = detected("cube", confidence=0.5, box=[1, 2, 3, 4], position=[0.5, 0.0, 0.02])
     page_state = PageState()
-    page_state.apply(CameraImage(frame, frame_searched(box)))
+    page_state.apply(SearchedFrame(frame, frame_searched(box)))
     look = dict(page_state.values["look"])
     data = base64.b64decode(look.pop("source").removeprefix("data:image/jpeg;base64,"))
     assert look == {

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from executive.cell.arm import Guard, Motion
+from executive.cell.arm import Motion, MotionGuard
 from executive.cell.device_config import STEP
 from executive.drivers import world_log
 from executive.drivers.sim.tool import SimTool
@@ -115,7 +115,7 @@ class SimArm:
         self._contact_monitor = ContactMonitor(world, tool)
         self.motion: Trajectory | None = None
         self.motion_time = 0.0
-        self._guard = Guard()
+        self._guard = MotionGuard()
         self._has_been_free = False
         """True if the tool has touched nothing at some time since the start of the motion."""
         self._braking_times: list[float] | None = None
@@ -135,7 +135,7 @@ class SimArm:
     def end_q(self) -> Array:
         return self.commanded_q if self.motion is None else self.motion.end
 
-    def execute(self, motion: Motion, guard: Guard) -> None:
+    def execute(self, motion: Motion, guard: MotionGuard) -> None:
         """Begin to follow a motion; if something has pushed the arm off its start, report a collision."""
         if not self.at_rest:
             raise Fault("the arm cannot start a motion while moving; wait for `at_rest`")

@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from executive.cell.arm import Goal, Guard, Task
+from executive.cell.arm import Goal, MotionGuard, Task
 from executive.cell.config import CellConfig
 from executive.cell.devices import StepClock
 from executive.drivers.sim.arm import SimArm
@@ -90,7 +90,7 @@ class Rig:
         Returns:
             Where the tool felt it `(3,)` [m], and the largest force of its lip until it was at rest [N].
         """
-        self.arm.start(self.planned(goal), Guard(touch=True))
+        self.arm.start(self.planned(goal), MotionGuard(touch=True))
         while not (self.tool.touching or self.arm.at_rest):
             self.step()
         felt, force = self.arm.tool_pose.position, self.pressing()

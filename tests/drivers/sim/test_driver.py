@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from executive.cell.arm import Goal, Guard
+from executive.cell.arm import Goal, MotionGuard
 from executive.cell.config import CellConfig
 from executive.cell.devices import DriverOptions
 from executive.cell.frame import TrueFrame
@@ -86,7 +86,7 @@ def follow_down(config: CellConfig, step: float) -> list[list[float]]:
     driver.world.add_object("cube", Pose.of([0.5, 0.1, 0.025]), (1, 1, 1))
     goal = Goal((0.5, 0.1, 0.04), guarded_length=0.02, guarded_speed=0.05)
     motion = Planner(config).plan(driver.arm.q, goal)
-    driver.arm.execute(motion, Guard(touch=True))
+    driver.arm.execute(motion, MotionGuard(touch=True))
     qs = []
     while not driver.arm.at_rest or len(qs) % round(1 / 60 / step):
         driver.clock.wait_for_tick()
