@@ -24,7 +24,7 @@ class LogFile:
     """A file without a write buffer, so that a killed process loses no written data.
 
     Args:
-        path: Path of the file; None: all data are discarded.
+        path: Path of the file.
         content_name: Name of the content, for the message of a fault.
         length: Length to which an existing file is truncated [byte], or None to keep its content.
 
@@ -32,13 +32,11 @@ class LogFile:
         InputError: The file cannot be opened.
     """
 
-    def __init__(self, path: Path | None, content_name: str, length: int | None = None) -> None:
+    def __init__(self, path: Path, content_name: str, length: int | None = None) -> None:
         self._path = path
         self._content_name = content_name
         self._has_content = bool(length)
         self._file: int | None = None
-        if path is None:
-            return
         with explain_os_errors(InputError, f'cannot write "{path}"'):
             self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
             if length is not None:
@@ -107,15 +105,15 @@ class CommandLog(LogFile):
     """Appends commands to a file, each before its execution.
 
     Args:
-        path: Path of the file, or None to record nothing.
+        path: Path of the file.
         resume: True to append to an existing file, from which an incomplete last command is removed.
 
     Raises:
         InputError: The file cannot be written, or is no log.
     """
 
-    def __init__(self, path: Path | None = None, *, resume: bool = False) -> None:
-        self._length = len(_read_complete_lines(path)) if path and resume else 0
+    def __init__(self, path: Path, *, resume: bool = False) -> None:
+        self._length = len(_read_complete_lines(path)) if resume else 0
         super().__init__(path, "the log of the world", self._length)
         if not resume:
             self._append(FILE_HEADER)
@@ -124,14 +122,15 @@ class CommandLog(LogFile):
         """Append a command."""
         self._append(json.dumps([kind, *arguments]).encode() + b"\n")
 
-    def append_motion(self, motion: Trajectory) -> None:
-        """Append the start of a motion with its states, so that a resumed run can brake along its path."""
-        samples = np.stack(motion.samples).astype("<f8").tobytes()
-        self.append(MOTION, motion.duration, base64.b64encode(samples).decode())
-
     def _append(self, data: bytes) -> None:
         self.write(data, self._length)
         self._length += len(data)
+
+
+def encode_motion(motion: Trajectory) -> tuple[float, str]:
+    """Return the arguments of `MOTION`: a resumed run brakes along the path of the states of the motion."""
+    samples = np.stack(motion.samples).astype("<f8").tobytes()
+    return motion.duration, base64.b64encode(samples).decode()
 
 
 def read_commands(path: Path) -> Iterator[Command]:

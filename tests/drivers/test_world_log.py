@@ -32,7 +32,6 @@ def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
     again = CommandLog(path, resume=True)
     again.append(IDLE_STEP)
     again.close()
-    CommandLog().append(RUN_STEP)  # nothing is kept without a path
     targets, started, idle = read_commands(path)
     assert targets == (RUN_STEP, joints)
     assert idle == (IDLE_STEP, [])

@@ -155,7 +155,7 @@ class SimArm:
         self._has_been_free = not (guard.touch and self._tool.touching)
         self.at_rest = False
         self._contact_monitor.reset()
-        self._world.log.append_motion(motion)
+        self._world.log_command(world_log.MOTION, *world_log.encode_motion(motion))
 
     def stop(self) -> None:
         if self.motion is not None and self._braking_times is None:
@@ -207,7 +207,7 @@ class SimArm:
             self.motion = None
             self._braking_times = None
             self.at_rest = True
-            self._world.log.append(world_log.MOTION_END)
+            self._world.log_command(world_log.MOTION_END)
 
     def _check_guard(self) -> None:
         """Begin to brake at an event of the guard."""

@@ -271,7 +271,7 @@ class SimCamera:
     def capture(self) -> CameraImage:
         """Render an image with noise."""
         self.image_count += 1
-        self._world.log.append(world_log.CAPTURE)
+        self._world.log_command(world_log.CAPTURE)
         image, depth = self._capture_images()
         return CameraImage(image, depth, self._clock.now)
 

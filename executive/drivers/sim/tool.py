@@ -108,14 +108,14 @@ class SimTool:
         return 0.0 if self._grip is None else math.hypot(*self._grip.pull)
 
     def close(self) -> None:
-        self._world.log.append(world_log.CLOSE)
+        self._world.log_command(world_log.CLOSE)
         self._is_closed = True
         self.is_idle = False
         if self._grip is None:
             self._try_to_grip()
 
     def open(self) -> None:
-        self._world.log.append(world_log.OPEN)
+        self._world.log_command(world_log.OPEN)
         self._is_closed = False
         self._separating_body = None
         if self._grip is not None:
@@ -126,7 +126,7 @@ class SimTool:
 
     def lose_grip(self) -> None:
         """Let the held body fall, as after too strong a pull."""
-        self._world.log.append(world_log.GRIP_LOST)
+        self._world.log_command(world_log.GRIP_LOST)
         if self._grip is not None:
             self._separating_body = self._grip.body
             self.dropped_bodies.add(self._grip.body)

@@ -52,7 +52,7 @@ class World(CellWorld):
         labels: Class of each loose object, by body.
         models: Model of each loose object, by body.
         step_count: Number of physics steps.
-        log: Log of the commands to the world; each command is appended before its execution.
+        log: Log of the commands to the world, or None.
         is_idle: True during physics steps that belong to no control step of the run.
         rest_positions: Positions `(3,)` [m] of each object by body: initial position of the run, and position
             after each move by a test and after each release by the tool.
@@ -66,7 +66,7 @@ class World(CellWorld):
         self.labels: dict[int, str] = {}
         self.models: dict[int, ObjectConfig] = {}
         self.step_count = 0
-        self.log = CommandLog()
+        self.log: CommandLog | None = None
         self.is_idle = False
         self._unlogged_targets: tuple[float, ...] = ()
         """Time in the motion [s] and joint positions [rad] of the last command; empty after the next step."""
@@ -105,7 +105,7 @@ class World(CellWorld):
 
     def remove_object(self, body: int) -> None:
         """Remove a loose object from the world."""
-        self.log.append(world_log.REMOVE, body)
+        self.log_command(world_log.REMOVE, body)
         self.removed_objects[body] = replace(self.describe_object(body), is_removed=True)
         del self.labels[body]
         del self.models[body]
@@ -128,7 +128,7 @@ class World(CellWorld):
     def place_object(self, body: int, X_WO: Pose) -> None:
         """Move a loose object to `X_WO`, at rest."""
         self.rest_positions.setdefault(body, []).append(X_WO.position)
-        self.log.append(world_log.SET_POSE, body, *X_WO.position, *X_WO.quaternion)
+        self.log_command(world_log.SET_POSE, body, *X_WO.position, *X_WO.quaternion)
         X_WI = X_WO @ compute_upright_pose(self.models[body]) @ get_inertial_pose(self.client, body)
         self.client.resetBasePositionAndOrientation(body, X_WI.position, X_WI.quaternion)
 
@@ -143,6 +143,11 @@ class World(CellWorld):
             forces=self.config.arm.effort, positionGains=[1.0] * len(q),
         )  # fmt: skip
 
+    def log_command(self, kind: str, *arguments: float | str) -> None:
+        """Append a command to the log, if the world has one, before its execution."""
+        if self.log is not None:
+            self.log.append(kind, *arguments)
+
     def cast_ray(self, origin: Array, direction: Array) -> Array | None:
         """Return the first point `(3,)` [m] of a ray on a body other than arm and tool, or None."""
         start = origin
@@ -156,14 +161,16 @@ class World(CellWorld):
 
     def step(self) -> None:
         """Advance the physics by 1/240 s."""
-        self.log.append(world_log.IDLE_STEP if self.is_idle else world_log.RUN_STEP, *self._unlogged_targets)
+        kind = world_log.IDLE_STEP if self.is_idle else world_log.RUN_STEP
+        self.log_command(kind, *self._unlogged_targets)
         self._unlogged_targets = ()
         self.client.stepSimulation()
         self.step_count += 1
 
     def close(self) -> None:
         """Disconnect from the physics server; the world cannot be used afterwards."""
-        self.log.close()
+        if self.log is not None:
+            self.log.close()
         super().close()
 
 
