@@ -21,9 +21,9 @@ from executive.drivers.sim.scene import SceneConfig
 from executive.mission.grammar import LibraryKeys, MissionKeys, NodeKeys, ParamKeys, SubtreeKeys, UseKeys
 from executive.mission.schema import Schema, make_key_schema, make_schema, make_type_schema
 from executive.perception.detectors.detector_registry import find_detector_kinds
+from executive.perception.detectors.noisy import NoisyOptions
 from executive.perception.detectors.rfdetr import RfdetrOptions
 from executive.perception.detectors.roboflow.detector import RoboflowOptions
-from executive.perception.detectors.simulated import NoisyOptions
 from executive.text.findings import MEANING_BY_CODE
 from executive.text.yaml_files import list_shipped_missions
 from executive.tree.keys import KeyOwner

@@ -43,8 +43,8 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
     "Tool": [
         ("cell.tool", "cell/protocols.py", "Tool"),
         ("cell.tool_model", "cell/tools.py", "ToolModel"),
-        ("grasp = cell.tool_model.list_grasps(...)[0]", "cell/tools.py", "Grasp"),
-        ("measurement = cell.tool_model.measure_contact(...)", "cell/tools.py", "Measurement"),
+        ("grasp = cell.tool_model.list_grasps(...)[0]", "cell/tools.py", "GraspPose"),
+        ("measurement = cell.tool_model.measure_contact(...)", "cell/tools.py", "ToolMeasurement"),
     ],
     "Camera": [
         ("cell.camera", "cell/protocols.py", "Camera"),
@@ -89,7 +89,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("fake.arm", "drivers/fake.py", "FakeArm"),
         ("fake.tool", "drivers/fake.py", "FakeTool"),
         ("fake.camera", "drivers/fake.py", "FakeCamera"),
-        ("fake.detector", "perception/detectors/simulated.py", "TruthDetector"),
+        ("fake.detector", "perception/detectors/cell_detector.py", "TruthDetector"),
     ],
     "Test kit: run a skill or a mission": [
         ("executive.testing.run_skill", "testing/run_skill.py", ""),

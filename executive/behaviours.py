@@ -34,7 +34,7 @@ from py_trees.ports import PortInformation, PortsMixin
 
 from executive.cell.protocols import BehaviourStep, Cell, Clock, Steps
 from executive.errors import Fault, InputError
-from executive.plugins import CLASS_PATH, list_entries
+from executive.plugins import CLASS_PATH, PluginEntry, list_entries
 from executive.skill import Direction, Param, Port, Skill, get_attribute_name, param
 
 _PLAIN_TYPES = (str, int, float, bool, NoneType, list, tuple, dict, set, frozenset, Any)
@@ -359,22 +359,47 @@ PY_TREES_MODULES = ("py_trees.behaviours", "py_trees.timers")
 """Modules of py_trees whose behaviours a mission may use."""
 
 
-def load_skills() -> dict[str, type[Skill]]:
+class _InstalledSkills(Mapping[str, type[Skill]]):
+    """Installed skills by name, each of which is imported at its first use."""
+
+    def __init__(self, entries: Mapping[str, PluginEntry]) -> None:
+        self._entries = entries
+        self._skills: dict[str, type[Skill]] = {}
+
+    def __getitem__(self, name: str) -> type[Skill]:
+        if name not in self._skills:
+            entry = self._entries[name]
+            self._skills[name] = _convert_to_skill(name, entry.value, entry.load())
+        return self._skills[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+
+def load_skills() -> Skills:
     """Return the classes of all registered skills, by name; a behaviour of py_trees becomes a skill.
 
+    A class is imported at the first access to its name, which raises an InputError if the entry is not a
+    skill or cannot be loaded.
+
     Raises:
-        InputError: Two packages register the same name, an entry is not a skill or cannot be loaded, or the
-            pyproject.toml of the project in the working directory is invalid.
+        InputError: Two packages register the same name, or the pyproject.toml of the project in the working
+            directory is invalid.
     """
-    entries = list_entries(SKILL_GROUP, "skill").items()
-    return {name: _convert_to_skill(name, entry.value, entry.load()) for name, entry in entries}
+    return _InstalledSkills(list_entries(SKILL_GROUP, "skill"))
 
 
 def load_behaviour(path: str) -> type[Skill]:
     """Return the behaviour of py_trees at `module:Class` as a skill with the name of the class.
 
-    A mission cannot execute code: the module must belong to py_trees, or contain a registered skill. The
-    function `load_skills` imports the modules of all registered skills anyway.
+    A mission cannot execute code: the module must belong to py_trees, or contain a registered skill, which a
+    mission may import anyway.
 
     Raises:
         InputError: The path is malformed, the module is not permitted, or the class cannot be used.

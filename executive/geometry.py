@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +17,18 @@ Array = NDArray[np.float64]
 """NumPy array of floats; docstrings state the shape."""
 GRAVITY = 9.81
 """Gravitational acceleration [m/s²]."""
+
+
+class Yaw(NamedTuple):
+    """Measured angle of an object about the vertical axis.
+
+    Attributes:
+        angle: Rotation from the x axis of the frame towards its y axis [rad].
+        std: Standard deviation of the angle [rad].
+    """
+
+    angle: float
+    std: float
 
 
 @dataclass(frozen=True, eq=False)

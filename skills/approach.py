@@ -71,6 +71,8 @@ class Approach(Skill):
             cell.ledger.invalidate_positions()
             message = f"the tool touched something at {height * 1000:.0f} mm on its way to {item}"
             raise self.failure("blocked", f"{message}, which {expectation}")
+        if not is_touching:
+            return
         measurement = cell.tool_model.measure_contact(
             object_class, self.target.position, height, cell.classes, self.overtravel
         )

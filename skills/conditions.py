@@ -133,7 +133,7 @@ class IsReachable(Skill):
     def run(self, cell: Cell) -> None:
         """Solve the inverse kinematics of the arm, without planning a motion."""
         object_class = cell.classes[self.target.label]
-        grasps = cell.tool_model.list_grasps(object_class, self.target.position, cell.motion)
+        grasps = cell.tool_model.list_grasps(object_class, self.target, cell.motion)
         problems = [cell.arm.describe_unreachable(grasp.goal) for grasp in grasps]
         if all(problems):
             raise self.failure("unreachable", f"{self.target.item}: {problems[0]}")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from executive.cell.protocols import Cell, Steps
-from executive.manipulation.motions import follow, make_task, plan, wait_for_rest
+from executive.cell.protocols import Camera, Cell, Steps
+from executive.manipulation.motions import move_to_pose
 from executive.skill import Skill, param
 
 
@@ -26,14 +26,11 @@ class MoveToScan(Skill):
     moves = True
 
     def run(self, cell: Cell) -> Steps:
-        """Select the pose and move to it."""
-        yield from wait_for_rest(cell.arm)
-        pose = self.pose
-        if pose == "auto":
-            if cell.camera.sees_table():
-                return
-            pose = cell.camera.scan_poses[0]
-        elif pose == "next":
-            pose = cell.camera.next_pose()
-        motion = yield from plan(self, cell.arm, lambda: (pose, make_task(cell)))
-        yield from follow(self, cell, motion)
+        """Select the pose when the arm is at rest, and move to it."""
+        return move_to_pose(self, cell, lambda: self._select_pose(cell.camera))
+
+    def _select_pose(self, camera: Camera) -> str | None:
+        """Return the name of the pose, or None if the arm need not move."""
+        if self.pose == "auto":
+            return None if camera.sees_table() else camera.scan_poses[0]
+        return camera.next_pose() if self.pose == "next" else self.pose

@@ -25,7 +25,7 @@ from executive.campaign.jobs import MAX_CRASHES, JobOptions, SweepJob, make_faul
 from executive.campaign.results import RunRecord
 from executive.errors import InputError
 from executive.processes import WorkerPool
-from executive.run.run_control import HALT_SIGNALS, handle_signals
+from executive.run.operator import HALT_SIGNALS, handle_signals
 
 CONNECTION_TIMEOUT = 10.0
 """Maximum time for the connection to the scheduler [s]."""

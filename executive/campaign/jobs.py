@@ -24,7 +24,7 @@ from executive.processes import WorkerPool, kill_workers
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions
-from executive.run.run_control import HALT_SIGNALS, handle_signals
+from executive.run.operator import HALT_SIGNALS, handle_signals
 from executive.station.check import load_checker
 from executive.station.station import Station
 from executive.view.report import try_write_report

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.events import Event
-from executive.geometry import Array, Pose
+from executive.geometry import Array, Pose, Yaw
 
 Box = tuple[float, float, float, float]
 """Left, top, right and bottom side [pixel] of a box in an image; pixel i covers [i, i + 1)."""
@@ -247,12 +247,16 @@ class Observation:
         detection: The detection.
         position: Centre of the object `(3,)` [m] in the world.
         std: Standard deviation of the random error of the position along each axis [m].
+        stamp: Capture time of the image [s].
         is_confident: False if the detection is in `Answer.doubtful`, or if `contradiction` is not empty.
         contradiction: Sentence that states how the size or height contradicts the detected class, or "".
+        yaw: Angle of the object in the world; None if it is unknown.
     """
 
     detection: Detection
     position: Array
     std: float
+    stamp: float
     is_confident: bool = True
     contradiction: str = ""
+    yaw: Yaw | None = None

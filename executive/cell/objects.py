@@ -9,7 +9,7 @@ from typing import Annotated, TypeAlias
 
 import numpy as np
 
-from executive.geometry import Array
+from executive.geometry import Array, Pose, Yaw
 
 UNKNOWN_LABEL = "unknown"
 """Label of an object without a class."""
@@ -36,11 +36,14 @@ class Target:
     Attributes:
         item: Id of the item.
         label: Class name.
-        position: Centre of the object `(3,)` [m] in the world, at half the height of its class.
+        position: Centre of the object `(3,)` [m] in the frame of `surface` at `stamp`, at half the height of
+            its class.
         confidence: Confidence of the last detection, 0 to 1.
         frame: Id of the last frame that showed the item.
         change_count: Number of robot actions that may have moved objects before the capture of that frame.
         stamp: Capture time of the last frame that showed the item [s].
+        yaw: Angle of the object in the frame of `surface` at `stamp`; None if it is unknown.
+        surface: Name of the surface on which the object lies; the frame of the table is the world.
     """
 
     item: ItemName
@@ -50,6 +53,16 @@ class Target:
     frame: int
     change_count: int
     stamp: float
+    yaw: Yaw | None = None
+    surface: str = "table"
+
+    def pose_at(self, time: float) -> Pose:  # noqa: ARG002
+        """Return the pose of the object in the frame of its surface at a time [s]; on the table it rests.
+
+        The rotation is the identity if the yaw is unknown.
+        """
+        angle = self.yaw.angle if self.yaw else 0.0
+        return Pose.of(self.position, (0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)))
 
 
 @dataclass(frozen=True, eq=False)

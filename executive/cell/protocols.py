@@ -15,7 +15,7 @@ from executive.cell.arm import Arm
 from executive.cell.device_config import MotionConfig
 from executive.cell.frame import Answer, Box, Detection, Detections, Frame, Observation
 from executive.cell.objects import Bin, Item, KnownItem, ObjectClass, Quotas, Target
-from executive.cell.tools import Measurement, ToolModel
+from executive.cell.tools import ToolMeasurement, ToolModel
 from executive.geometry import Array
 
 
@@ -151,7 +151,7 @@ class Ledger(Protocol):
     def record_empty_load(self, load: float) -> None:
         """Record the load of the empty tool at rest [N]."""
 
-    def record_measurement(self, item: Item, measurement: Measurement) -> bool:
+    def record_measurement(self, item: Item, measurement: ToolMeasurement) -> bool:
         """Record a contact with an item, and return False if its measurement contradicts the class."""
 
     def record_weight(self, item: Item, weight: float, std: float) -> str:

@@ -13,7 +13,7 @@ from pydantic_core import CoreSchema
 
 from executive.cell.arm import Goal
 from executive.cell.device_config import Length, MotionConfig, Section
-from executive.cell.objects import ObjectClass
+from executive.cell.objects import ObjectClass, Target
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.plugins import list_entries
@@ -45,7 +45,7 @@ class ToolPart:
 
 
 @dataclass(frozen=True)
-class Grasp:
+class GraspPose:
     """An approach after which the tool can grip an object.
 
     Attributes:
@@ -63,7 +63,7 @@ class Grasp:
 
 
 @dataclass(frozen=True)
-class Measurement:
+class ToolMeasurement:
     """Evidence about the class of an object that the tool measured at its contact with the object.
 
     Attributes:
@@ -115,12 +115,12 @@ class ToolModel(Section):
         Raises:
             ValueError: The kind is not installed, or its class cannot be loaded.
         """
-        kind = section.get("kind", DEFAULT_KIND)
+        kind = str(section.get("kind", DEFAULT_KIND))
         entries = list_entries(TOOL_GROUP, "kind of tool")
         if kind not in entries:
             raise ValueError(f'has no installed kind "{kind}"; installed: {", ".join(entries) or "none"}')
         try:
-            model: type[ToolModel] = entries[str(kind)].load()
+            model: type[ToolModel] = entries[kind].load()
         except InputError as error:
             raise ValueError(str(error)) from error
         return model
@@ -165,19 +165,19 @@ class ToolModel(Section):
     def list_grasps(
         self,
         object_class: ObjectClass,
-        position: Array,
+        target: Target,
         motion: MotionConfig,
         *,
         attempt: int = 0,
         is_confirmed: bool = False,
         overtravel: float = OVERTRAVEL,
         spacing: float = CONTACT_SPACING,
-    ) -> Sequence[Grasp]:
+    ) -> Sequence[GraspPose]:
         """Return the possible grasps of an object, at least one, the best first.
 
         Args:
             object_class: Class of the object.
-            position: Centre of the object `(3,)` [m].
+            target: Place of the object, and its yaw if it is known.
             motion: Heights and speed of guarded motions.
             attempt: Number of failed attempts before this one.
             is_confirmed: True if a measurement of the tool has confirmed the properties of the class.
@@ -193,7 +193,7 @@ class ToolModel(Section):
         height: float,  # noqa: ARG002
         classes: Mapping[str, ObjectClass],  # noqa: ARG002
         overtravel: float = OVERTRAVEL,  # noqa: ARG002
-    ) -> Measurement:
+    ) -> ToolMeasurement:
         """Return the evidence of a contact with an object; the default is no evidence.
 
         Args:
@@ -203,7 +203,7 @@ class ToolModel(Section):
             classes: Classes of the cell by label.
             overtravel: As in `list_grasps`.
         """
-        return Measurement()
+        return ToolMeasurement()
 
     def find_distinct_labels(self, classes: Mapping[str, ObjectClass]) -> Collection[str]:  # noqa: ARG002
         """Return the classes that a measurement of the tool distinguishes from all other `classes`."""

@@ -132,7 +132,7 @@ def tree_command(
         loaded = load_mission(mission, load_skills(), overrides, replacing_cell=cell)
         # No node of the tree is executed, so that none needs a clock or a ledger.
         placeholder_cell: Any = SimpleNamespace(clock=None, ledger=None)
-        nodes = make_outline(build_tree(loaded, loaded.skills, placeholder_cell, Blackboard(), discard_event))
+        nodes = make_outline(build_tree(loaded, placeholder_cell, Blackboard(), discard_event))
         nodes = fold_subtrees(nodes) if fold else nodes
         match "".join(formats).removeprefix("--format ").removeprefix("--"):
             case "svg":

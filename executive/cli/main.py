@@ -17,7 +17,7 @@ import click
 
 from executive.cli.streams import use_tolerant_streams
 from executive.errors import ExecutiveError, ExitCode, shorten_quotations
-from executive.run.run_control import TERMINATION_SIGNALS, handle_signals
+from executive.run.operator import TERMINATION_SIGNALS, handle_signals
 
 COMMANDS: Mapping[str, str] = {
     "run": "run",

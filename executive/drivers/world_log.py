@@ -78,11 +78,10 @@ FILE_HEADER = b"executive world 4\n"
 """First line of every log of commands, with the version of the format."""
 
 RUN_STEP = "step"
-"""Kind of a physics step that belongs to the run."""
+"""Kind of a physics step that belongs to the run. The arguments are none, or the time in the motion [s] and
+the joint positions [rad] to which the step moves the arm."""
 IDLE_STEP = "idle"
 """Kind of a physics step that does not belong to the run."""
-JOINT_TARGETS = "joints"
-"""Kind of new joint targets; the arguments are the time in the motion [s] and the joint positions [rad]."""
 MOTION = "motion"
 """Kind of the start of a motion; the arguments are its duration [s] and its samples as base64."""
 MOTION_END = "rest"

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from executive.cell.config import LedgerConfig
-from executive.cell.tools import Measurement
+from executive.cell.tools import ToolMeasurement
 from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, State
 
 MIN_EXISTENCE_PROBABILITY = 0.9
@@ -121,7 +121,7 @@ class Certainty:
             # A rejected item counts as existing, so that the end of the run does not discard it as a phantom.
             belief.log_odds = max(belief.log_odds, 0.0)
 
-    def add_measurement(self, record: ItemRecord, measurement: Measurement) -> bool:
+    def add_measurement(self, record: ItemRecord, measurement: ToolMeasurement) -> bool:
         """Update an item with a measurement of the tool; return False if it contradicts the class.
 
         After a measurement that agrees with the class, others are no contradiction, because the item may have

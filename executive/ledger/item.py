@@ -14,7 +14,7 @@ from executive.cell.json_values import round_values
 from executive.cell.objects import Item, Target
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
-from executive.geometry import Array
+from executive.geometry import Array, Yaw
 from executive.ledger.belief import Belief
 
 SAME_POSITION_TOLERANCE = 0.01
@@ -75,6 +75,7 @@ class ItemRecord:
         stamp: Capture time of the last image that showed the item, or of the last image before its placement
             [s].
         confidence: Confidence of the last detection, 0 to 1.
+        yaw: Angle of the object in the world at the last detection; None if it is unknown.
         state: State of the item.
         bin: Name of the bin that contains the item, or "".
         reason: Reason of the state, or "".
@@ -109,6 +110,7 @@ class ItemRecord:
     frame_id: int = 0
     stamp: float = 0.0
     confidence: float = 0.0
+    yaw: Yaw | None = None
     state: State = State.SEEN
     bin: str = ""
     reason: str = ""
@@ -145,7 +147,7 @@ class ItemRecord:
         """The item as the target that skills receive."""
         return Target(
             self.item, self.label, self.position, self.confidence, self.frame_id, self.change_count,
-            self.stamp,
+            self.stamp, self.yaw,
         )  # fmt: skip
 
     @property
@@ -220,7 +222,8 @@ class ItemRecord:
         self.confidence = observation.detection.confidence
         self.change_count = frame.change_count
         self.frame_id = frame.id
-        self.stamp = frame.stamp
+        self.stamp = observation.stamp
+        self.yaw = observation.yaw
 
     def mark_as_detected_in_bin(self, frame: Frame) -> None:
         """Record that a frame shows the placed item in its bin."""
@@ -251,6 +254,7 @@ class ItemRecord:
         self.frame_id = new_item.frame_id
         self.stamp = new_item.stamp
         self.confidence = new_item.confidence
+        self.yaw = new_item.yaw
         if self.state is State.PHANTOM:
             self.belief.log_odds = new_item.belief.log_odds
             self.reason = ""

@@ -13,7 +13,7 @@ from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.frame import Detections, Frame, FrameCaptured, Observation
 from executive.cell.objects import Bin, Item, KnownItem, ObjectClass, Quotas, Target
 from executive.cell.protocols import Presence, Routes
-from executive.cell.tools import Measurement
+from executive.cell.tools import ToolMeasurement
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
@@ -134,7 +134,7 @@ class Tracker:
     def record_empty_load(self, load: float) -> None:
         self.empty_load = load
 
-    def record_measurement(self, item: Item, measurement: Measurement) -> bool:
+    def record_measurement(self, item: Item, measurement: ToolMeasurement) -> bool:
         record = self._records.find(item)
         if self._certainty.add_measurement(record, measurement):
             return True

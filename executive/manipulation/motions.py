@@ -146,6 +146,20 @@ def follow(
         raise skill.failure("blocked", arm.collision)
 
 
+def move_to_pose(skill: Skill, cell: Cell, select_pose: Callable[[], str | None]) -> Steps:
+    """Yield until the arm has moved to a named pose; `select_pose` returns it, or None to stay.
+
+    `select_pose` is called when the arm is at rest.
+
+    Raises:
+        SkillFailed: No motion was found, or the arm collided; the reason is `unreachable` or `blocked`.
+    """
+    yield from wait_for_rest(cell.arm)
+    if (pose := select_pose()) is not None:
+        motion = yield from plan(skill, cell.arm, lambda: (pose, make_task(cell)))
+        yield from follow(skill, cell, motion)
+
+
 def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, goal_name: str) -> Steps:
     """Yield until the arm has moved `item` to `goal`; read the sensor of the tool in every control step.
 

@@ -13,7 +13,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.frame import Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, Item, ObjectClass, Obstacle, Target, is_quota_reached
 from executive.cell.protocols import Cell
-from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, Grasp
+from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose
 from executive.errors import NoDepth
 
 MAX_ROLL_DISTANCE = 0.002
@@ -66,7 +66,7 @@ def predict_next_slot_index(cell: Cell, bin_name: str, excluded_item: Item | Non
 
 def make_obstacle(cell: Cell, target: Target) -> Obstacle:
     """Return the bounding cylinder of a target as an obstacle; of no class: as large as the largest class."""
-    x, y, z = map(float, target.position)
+    x, y, z = map(float, target.pose_at(target.stamp).position)
     object_class = cell.classes.get(target.label)
     classes = [object_class] if object_class else cell.classes.values()
     radius = max(each.radius for each in classes)
@@ -107,7 +107,7 @@ def _list_bin_obstacles(cell: Cell, excluded_item: Item | None) -> Iterator[Obst
 
 def choose_grasp(
     cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = CONTACT_SPACING
-) -> tuple[Grasp, Task]:
+) -> tuple[GraspPose, Task]:
     """Return the best grasp of a target, and the task of the approach; each attempt has another grasp.
 
     Args:
@@ -118,7 +118,7 @@ def choose_grasp(
     """
     grasp = cell.tool_model.list_grasps(
         cell.classes[target.label],
-        target.position,
+        target,
         cell.motion,
         attempt=cell.ledger.describe(target.item).attempts,
         is_confirmed=cell.ledger.is_confirmed_by_tool(target.label),

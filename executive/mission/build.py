@@ -21,7 +21,6 @@ from executive.tree.tree_node import SkillLeaf, TreeNode
 
 def build_tree(
     loaded: LoadedMission,
-    skills: Mapping[str, type[Skill]],
     cell: Cell,
     blackboard: Blackboard,
     emit: Emit,
@@ -29,14 +28,13 @@ def build_tree(
 ) -> TreeNode:
     """Return the root of a new behaviour tree; every node of the tree has a unique, readable `path`.
 
-    `skills` contains the installed skills by name. `substitutes` contains skills that run in place of the
-    mission's skills, by pattern of node paths. In a pattern, `*` matches any characters, including `/`. The
-    first matching pattern applies.
+    `substitutes` contains skills that run in place of the mission's skills, by pattern of node paths. In a
+    pattern, `*` matches any characters, including `/`. The first matching pattern applies.
 
     Raises:
         InputError: A pattern matches no skill node.
     """
-    builder = TreeBuilder({**loaded.skills, **skills}, cell, blackboard, emit, substitutes or {})
+    builder = TreeBuilder(loaded.skills, cell, blackboard, emit, substitutes or {})
     root = builder.build_node(loaded.tree)
     paths = [node.path for node in root.iterate() if isinstance(node, SkillLeaf)]
     for pattern in builder.substitutes:

@@ -190,10 +190,15 @@ class _CellFileReader:
             message = f'an arm other than {arm_file.arm} needs the key "file" with the path of an arm file'
             self.findings.append(make_error(urdf.span, "no-arm", message))
             return None
-        complete_arm = _merge_sections(arm, arm_root, excluded=("limits",) if is_default else ())
-        entries = (
-            replace(entry, value=complete_arm) if entry.value is arm else entry for entry in root.entries
-        )
+        if is_default:
+            given = tuple(entry for entry in arm_root.entries if entry.key.text != "limits")
+            arm_root = replace(arm_root, entries=given)
+        sections = [
+            replace(entry, value=_merge_section(entry.value, arm_root.get(entry.key.text)))
+            for entry in arm.entries
+        ]
+        complete_arm = _inherit_entries(replace(arm, entries=tuple(sections)), arm_root)
+        entries = (replace(one, value=complete_arm) if one.value is arm else one for one in root.entries)
         return replace(root, entries=tuple(entries))
 
     def arrange_matrices(self, node: YamlNode, keys: KeyPath = ()) -> YamlNode:
@@ -266,35 +271,19 @@ def _merge_entry(entry: YamlEntry, base: YamlMapping) -> YamlEntry:
     for detector in detectors.entries:
         base_detector = base_detectors.get(detector.key.text)
         if base_detector is None or detector.value.python_value is not None:
-            entries.append(replace(detector, value=_merge_detector(detector.value, base_detector)))
+            entries.append(replace(detector, value=_merge_section(detector.value, base_detector)))
     detectors_of_file = replace(detectors, entries=tuple(entries))
     return replace(entry, value=_inherit_entries(detectors_of_file, base_detectors, detectors.keys))
 
 
-def _merge_detector(detector: YamlNode, base_detector: YamlNode | None) -> YamlNode:
-    """Return a detector, completed by keys of the base's detector if both detectors have the same kind."""
-    if not isinstance(detector, YamlMapping) or not isinstance(base_detector, YamlMapping):
-        return detector
-    kind = detector.get("kind")
-    base_kind = base_detector.get("kind")
+def _merge_section(section: YamlNode, base: YamlNode | None) -> YamlNode:
+    """Return a section, completed by keys of the base's section if it declares no kind or the same kind."""
+    if not isinstance(section, YamlMapping) or not isinstance(base, YamlMapping):
+        return section
+    kind = section.get("kind")
+    base_kind = base.get("kind")
     is_same_kind = kind is None or (base_kind and kind.python_value == base_kind.python_value)
-    return _inherit_entries(detector, base_detector) if is_same_kind else detector
-
-
-def _merge_sections(arm: YamlMapping, arm_file: YamlMapping, excluded: tuple[str, ...]) -> YamlMapping:
-    """Return the section of an arm, with the missing keys of the section and of each of its sections."""
-    entries = []
-    for entry in arm.entries:
-        base = arm_file.get(entry.key.text)
-        if (
-            isinstance(entry.value, YamlMapping)
-            and isinstance(base, YamlMapping)
-            and entry.key.text not in excluded
-        ):
-            entries.append(replace(entry, value=_inherit_entries(entry.value, base)))
-        else:
-            entries.append(entry)
-    return _inherit_entries(replace(arm, entries=tuple(entries)), arm_file, excluded)
+    return _inherit_entries(section, base) if is_same_kind else section
 
 
 def _inherit_entries(mapping: YamlMapping, base: YamlMapping, excluded: tuple[str, ...] = ()) -> YamlMapping:

@@ -111,7 +111,6 @@ def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:
     objects = {} if context.cell is None else context.cell.objects
     routes: dict[str, set[str]] = {label: set(bins) for label, bins in context.mission.routes.items()}
     spans: dict[str, Span] = {label: label.span for label in context.mission.routes}
-    weighing_skills = [name for name, skill in context.skills.items() if _is_weighing(skill)]
     skills = (skill for _, skill in context.find_installed_skills(context.nodes))
     is_weighed = any(map(_is_weighing, skills))
     for label, section in objects.items():
@@ -127,6 +126,7 @@ def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:
             message = (
                 f"{label} looks like {detected}, their routes differ, and no node weighs the held object"
             )
+            weighing_skills = [name for name, skill in context.skills.items() if _is_weighing(skill)]
             hint = f"Before the transport, insert {' or '.join(weighing_skills)}."
             yield make_error(spans.get(label, spans[detected]), "unweighed", message, hint)
 
@@ -237,7 +237,7 @@ def check_loads(
         section = config.objects[label]
         if problem := config.tool.explain_unsuitable(section.build_class(label)):
             hint = "Delete the route, or use another tool."
-            yield make_error(cell.find_span(("objects", label), at_key=True), "unsuitable", problem, hint)
+            yield make_error(cell.find_span(("objects", label), at_key=True), "robot", problem, hint)
             continue
         key = "mass" if section.mass is not None else "urdf" if section.urdf else "mesh"
         span = cell.find_span(("objects", label, key))

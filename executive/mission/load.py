@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -258,7 +259,7 @@ def load_mission(
     mission = files.mission
     cell = files.cell
     findings = list(files.findings)
-    skills = {**skills, **files.behaviours}
+    skills = ChainMap(dict(files.behaviours), cast("dict[str, type[Skill]]", skills))
     config = cell.config if cell else None
     checker = None
     classes_by_detector = {}

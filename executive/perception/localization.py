@@ -82,7 +82,8 @@ class CellLocalizer:
             std = max(std, UNKNOWN_POSITION_STD)
         elif not is_doubtful:
             contradiction = self._describe_contradiction(detections, detection, position)
-        return Observation(detection, position, std, not (is_doubtful or contradiction), contradiction)
+        is_confident = not (is_doubtful or contradiction)
+        return Observation(detection, position, std, frame.stamp, is_confident, contradiction)
 
     def _describe_contradiction(self, detections: Detections, detection: Detection, position: Array) -> str:
         """Return a text with evidence against the detected class; "" if there is none.

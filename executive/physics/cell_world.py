@@ -29,33 +29,6 @@ CYLINDER_MARGIN = 0.001
 """Collision margin that Bullet adds on all sides to a cylinder of a URDF [m]."""
 TOOL_MASS = 0.1
 """Mass of the tool [kg]."""
-TOOL_URDF = Template("""
-  <link name="tool">
-    <inertial>
-      <origin xyz="0 0 $centre"/>
-      <mass value="$mass"/>
-      <inertia ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-5"/>
-    </inertial>$parts
-  </link>
-  <joint name="tool_joint" type="fixed">
-    <parent link="$flange_link"/>
-    <child link="tool"/>
-    <origin xyz="0 0 $flange_offset"/>
-  </joint>
-</robot>
-""")
-"""End of the URDF of an arm, with the tool."""
-TOOL_PART_URDF = Template("""
-    <visual>
-      <origin xyz="0 0 $centre"/>
-      <geometry><cylinder length="$length" radius="$radius"/></geometry>
-      <material name="Grey"/>
-    </visual>
-    <collision>
-      <origin xyz="0 0 $centre"/>
-      <geometry><cylinder length="$collision_length" radius="$collision_radius"/></geometry>
-    </collision>""")
-"""Cylinder of a tool in `TOOL_URDF`."""
 # Indices of values in a contact point or closest point of PyBullet, for a query with the bodies A and B.
 BODY_B = 2
 LINK_A = 3
@@ -149,8 +122,10 @@ class CellWorld:
         path = find_model(self.config.arm.urdf)
         text = path.read_text().replace('filename="meshes/', f'filename="{path.parent}/meshes/')
         tool = self.config.tool
+        text_of_tool, text_of_part = Path(__file__).with_name("tool.urdf").read_text().split("</robot>\n")
+        part_template = Template(text_of_part)
         parts = "".join(
-            TOOL_PART_URDF.substitute(
+            part_template.substitute(
                 centre=tool.length - part.offset - part.length / 2,
                 length=part.length,
                 radius=part.radius,
@@ -159,14 +134,10 @@ class CellWorld:
             )
             for part in tool.parts
         )
-        urdf = TOOL_URDF.substitute(
-            centre=tool.length / 2,
-            mass=TOOL_MASS,
-            parts=parts,
-            flange_link=self.config.arm.flange.link,
-            flange_offset=self.config.arm.flange.offset,
-        )
-        text = text.replace("</robot>", urdf)
+        flange = self.config.arm.flange
+        values = {"flange_link": flange.link, "flange_offset": flange.offset}
+        values |= {"centre": tool.length / 2, "mass": TOOL_MASS, "parts": parts}
+        text = text.replace("</robot>", Template(text_of_tool).substitute(values) + "</robot>")
         with tempfile.TemporaryDirectory() as folder:
             urdf_path = Path(folder) / "arm_with_tool.urdf"
             urdf_path.write_text(text)

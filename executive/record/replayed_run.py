@@ -19,8 +19,8 @@ from executive.record.recorded_run import RecordOptions, execute_recorded
 from executive.record.result import Result, is_resumable, read_result
 from executive.record.run_directory import RunDirectory, find_recorded_options, read_mission_of_run
 from executive.record.timeline import get_skill_name
-from executive.run.assembly import ResumedRun, RunOptions, assemble_replay, assemble_resumed
-from executive.run.replay import InputLog
+from executive.run.assembly import RunOptions
+from executive.run.replay import InputLog, ResumedRun, assemble_replay, assemble_resumed
 from executive.skill import Skill
 
 EVENTS_WITHOUT_REPLAY = (RunStarted, MotionPlanned, RequestGiven)

@@ -16,7 +16,7 @@ from executive.record.diagnosis import Diagnosis
 from executive.record.journal import find_run_end
 from executive.record.run_directory import RunDirectory, write_atomically
 from executive.record.timeline import PlanningTotals, Timeline
-from executive.station.audit import AUDIT_KEYS
+from executive.station.station import AUDIT_KEYS
 
 QUIT_REQUEST = "quit"
 """Request of the operator to end the run."""

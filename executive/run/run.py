@@ -32,7 +32,7 @@ from executive.manipulation.tool_goals import (
     sort_pickable_targets,
 )
 from executive.processes import shorten_collections
-from executive.run.run_control import RunControl, halt_on_signals
+from executive.run.operator import RunControl, halt_on_signals
 from executive.station.station import Station
 from executive.tree.tree_node import TreeNode, halt
 
@@ -255,7 +255,8 @@ class Run:
                 is_tree_ticked = False
                 if self._is_realtime:
                     time.sleep(max(0.0, self._wall_start + self.now - time.monotonic()))
-                control.wait_while_paused()
+                if not control.is_idle:
+                    control.wait_while_paused()
             loop_end = _HALTED
         except Stopped:
             loop_end = _HALTED

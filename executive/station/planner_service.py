@@ -26,8 +26,8 @@ DIFFERENTIATION_STEP = 1e-4
 """Time step of the numerical derivative of the tool position [s]."""
 
 PlanMotion = Callable[[Array, Goal | Array, Task], Motion]
-"""Function that plans a motion from rest at joint positions `(n,)` [rad] to a goal or to other joint positions;
-it raises Unreachable or Blocked if there is none."""
+"""Function that plans a motion from rest at joint positions to a goal or to other joint positions, each of
+shape `(n,)` [rad]; it raises Unreachable or Blocked if there is none."""
 
 
 @dataclass(eq=False)

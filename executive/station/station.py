@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -17,6 +18,7 @@ from executive.cell.devices import (
     DriverOptions,
     RayCaster,
     Rebuildable,
+    TrueObject,
     TrueWorld,
     Visible,
     Visuals,
@@ -24,19 +26,17 @@ from executive.cell.devices import (
     is_rehearsal,
     load_driver_kind,
 )
-from executive.cell.objects import Quotas
+from executive.cell.objects import UNKNOWN_LABEL, Bin, Quotas
 from executive.cell.protocols import Behaviours, Cell, Clock, Operator, Routes
 from executive.events import Emit, TargetSelected
+from executive.geometry import Array
+from executive.ledger.item import ItemRecord, State
 from executive.ledger.tracker import Tracker
 from executive.motion.arms import build_planning_kinematics
 from executive.motion.joints import Kinematics
-from executive.motion.planner import Planner
-from executive.motion.straight_paths import plan_straight_motion
-from executive.perception.detectors.cell_detector import CellDetector, build_cell_detectors
+from executive.perception.detectors.cell_detector import CellDetector, TruthDetector, build_cell_detectors
 from executive.perception.detectors.detector_registry import KindMaker, make_installed_kind
-from executive.perception.detectors.simulated import TruthDetector
 from executive.perception.localization import CellLocalizer
-from executive.station.audit import count_outcomes
 from executive.station.border import Border
 from executive.station.camera import CellCamera, Robot
 from executive.station.planner_service import PlannedArm, PlannerService
@@ -50,6 +50,7 @@ class SilentOperator:
         self._requests = list(requests)
 
     def ask(self, choices: Sequence[str]) -> str | None:
+        """Return the next class of the list, or None at its end."""
         del choices
         return self._requests.pop(0) if self._requests else None
 
@@ -257,12 +258,85 @@ def _build_planner(
 ) -> PlannerService:
     """Return the planner service of a cell; without physics, motions have straight joint paths."""
     planning_time = config.motion.planning_time
+    # Each cell needs only one planner; PyBullet and the libraries of the second one take 0.3 s to load.
     if is_without_physics:
+        from executive.motion.straight_paths import plan_straight_motion
+
         plan_straight = partial(plan_straight_motion, config, kinematics)
         return PlannerService(plan_straight, clock, planning_time, emit)
-    # The import loads PyBullet, which takes 0.2 s; a cell without physics and a replay do not need it.
+    from executive.motion.planner import Planner
     from executive.physics.collision import ClearanceChecker
 
     checker = ClearanceChecker(config)
     planner = Planner(config, checker.check, kinematics)
     return PlannerService(planner.plan, clock, planning_time, emit, checker.close)
+
+
+AUDIT_KEYS = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
+"""Keys of the object counts of an audit: objects in permitted bins (`right`), in other bins, on the table
+(`left`), elsewhere; and, counted a second time, objects that fell into a wrong bin or were never detected."""
+
+
+def count_outcomes(
+    objects: Iterable[TrueObject],
+    records: Sequence[ItemRecord],
+    bins: Mapping[str, Bin],
+    routes: Routes,
+    max_distance: float,
+    ignored_positions: Sequence[Array] = (),
+) -> dict[str, int]:
+    """Return the number of objects by outcome.
+
+    * `right`: objects in a permitted bin
+    * `wrong_bin`: objects in another bin, except objects that fell into it
+    * `left`: objects on the table, and the held object
+    * `elsewhere`: objects below the table, and objects that fell into a wrong bin
+    * `fell_in_wrong_bin`: only the objects that fell into a wrong bin
+    * `unseen`: objects that were never seen: the ledger contains no item, except phantoms, whose first
+      position has a horizontal distance of at most `max_distance` [m] from a rest position of the object
+      or from the centre of its bin
+
+    A removed object counts only if it was seen: by its bin if the tool placed it there, else as `elsewhere`.
+    An object with `UNKNOWN_LABEL` that was never seen counts only if it is in a wrong bin, not as `unseen`;
+    so does any other unseen object that was detected with an ignored label, at one of `ignored_positions`.
+    """
+    counts = dict.fromkeys(AUDIT_KEYS, 0)
+    first_positions = [record.first_position for record in records if record.state is not State.PHANTOM]
+    for final_object in objects:
+        # For an item in a bin, a resumed run records the centre of the bin as first position.
+        bin_centre = [bins[final_object.bin].position] if final_object.bin else []
+        positions = (*final_object.rest_positions, *bin_centre)
+        is_seen = _is_any_near(first_positions, positions, max_distance)
+        if not is_seen and _is_any_near(ignored_positions, positions, max_distance):
+            final_object = replace(final_object, label=UNKNOWN_LABEL)
+        for key in _find_outcomes(final_object, _find_place(final_object, routes), is_seen):
+            counts[key] += 1
+    return counts
+
+
+def _is_any_near(points: Sequence[Array], positions: Sequence[Array], max_distance: float) -> bool:
+    """Return True if a point `(3,)` [m] is at most `max_distance` [m] from a position, seen from above."""
+    return any(math.dist(point[:2], place[:2]) <= max_distance for point in points for place in positions)
+
+
+def _find_outcomes(final_object: TrueObject, place: str, is_seen: bool) -> Iterator[str]:
+    """Yield the keys of the counts that include an object with a final `place`."""
+    if final_object.is_removed:
+        if is_seen:
+            was_placed = place in ("right", "wrong_bin") and not final_object.is_dropped
+            yield place if was_placed else "elsewhere"
+    elif place == "wrong_bin" and final_object.is_dropped:
+        yield from ("elsewhere", "fell_in_wrong_bin")
+    elif place == "wrong_bin" or is_seen or final_object.label != UNKNOWN_LABEL:
+        yield place
+    if not (is_seen or final_object.is_removed or final_object.label == UNKNOWN_LABEL):
+        yield "unseen"
+
+
+def _find_place(final_object: TrueObject, routes: Routes) -> str:
+    """Return `right`, `wrong_bin`, `left` or `elsewhere` for the final position, without regard to drops."""
+    if final_object.is_held:
+        return "left"
+    if not final_object.bin:
+        return "elsewhere" if final_object.bin is None else "left"
+    return "right" if final_object.bin in routes.get(final_object.label, ()) else "wrong_bin"

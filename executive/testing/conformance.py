@@ -20,7 +20,7 @@ import numpy as np
 from executive.cell.device_config import STEP
 from executive.cell.frame import Detections
 from executive.cell.objects import Item, Target
-from executive.cell.tools import Measurement
+from executive.cell.tools import ToolMeasurement
 from executive.manipulation.motions import capture_and_detect, complete, localize_and_observe
 from executive.mission.ports import describe_type, find_element_type, is_assignable
 from executive.skill import ANY, EMPTY, HALT, HOLDING, Direction, Param, Port, Skill
@@ -176,7 +176,7 @@ def _build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
         fake.arm.set_tool_position(first.position + offset)
     if is_holding:
         fake.tool.close()
-        fake.ledger.record_measurement(first.item, Measurement())
+        fake.ledger.record_measurement(first.item, ToolMeasurement())
         fake.ledger.record_grasp(first.item)
         detections, targets = _detect_targets(fake)
     item = first.item if skill.tool_state[0] is HOLDING else targets[0].item

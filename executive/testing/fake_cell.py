@@ -10,8 +10,8 @@ from executive.cell.protocols import Routes
 from executive.drivers.fake import FakeDriver
 from executive.events import Emit, discard_event
 from executive.mission.cell_file import load_cell
+from executive.perception.detectors.cell_detector import TruthDetector
 from executive.perception.detectors.detector_registry import DetectorContext
-from executive.perception.detectors.simulated import TruthDetector
 from executive.station.station import CellOptions, SilentOperator, Station
 from executive.text.yaml_files import get_shipped_folder
 

@@ -26,7 +26,7 @@ from executive.drivers.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.perception.camera_model import NEAR_PLANE, project
-from executive.perception.detectors.simulated import TruthDetector
+from executive.perception.detectors.cell_detector import TruthDetector
 from executive.station.station import Station
 
 

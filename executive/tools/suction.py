@@ -13,8 +13,8 @@ from pydantic import Field
 
 from executive.cell.arm import Goal
 from executive.cell.device_config import Force, Length, MotionConfig
-from executive.cell.objects import ObjectClass, list_top_heights
-from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, Grasp, Measurement, ToolModel, ToolPart
+from executive.cell.objects import ObjectClass, Target, list_top_heights
+from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose, ToolMeasurement, ToolModel, ToolPart
 from executive.geometry import Array, Pose
 
 if TYPE_CHECKING:
@@ -76,21 +76,21 @@ class Suction(ToolModel):
     def list_grasps(
         self,
         object_class: ObjectClass,
-        position: Array,
+        target: Target,
         motion: MotionConfig,
         *,
         attempt: int = 0,
         is_confirmed: bool = False,
         overtravel: float = OVERTRAVEL,
         spacing: float = CONTACT_SPACING,
-    ) -> tuple[Grasp]:
+    ) -> tuple[GraspPose]:
         """Return the grasp from above at the contact point of an attempt.
 
         After a failed attempt, the whole guarded part is slow, because the expected height may be wrong.
         After `ATTEMPTS_BEFORE_PROBE` failed attempts, the motion ends `PROBE_CLEARANCE` above the table,
         because the item may be a false detection.
         """
-        x, y, z = map(float, position)
+        x, y, z = map(float, target.pose_at(target.stamp).position)
         # After n failed attempts, the contact point on a solid object lies on a Vogel spiral, at the distance
         # spacing * sqrt(n) and the angle n * GOLDEN_ANGLE; on an object with a hole, it lies on the ring.
         angle = attempt * GOLDEN_ANGLE
@@ -112,7 +112,7 @@ class Suction(ToolModel):
         is_central = math.dist((contact_x, contact_y), (x, y)) <= object_class.radius / 2
         proves_absence = is_central and end_height < z and end_height <= 2 * PROBE_CLEARANCE
         contact_height = end_height + guarded_length - motion.descent
-        return (Grasp(goal, contact_height, proves_absence),)
+        return (GraspPose(goal, contact_height, proves_absence),)
 
     def measure_contact(
         self,
@@ -121,7 +121,7 @@ class Suction(ToolModel):
         height: float,
         classes: Mapping[str, ObjectClass],
         overtravel: float = OVERTRAVEL,
-    ) -> Measurement:
+    ) -> ToolMeasurement:
         """Return the evidence of the height of a touch.
 
         A touch at a wrong height missed the top if it is below the centre of the object or more than
@@ -131,7 +131,7 @@ class Suction(ToolModel):
         errors = {label: _compute_height_error(label, height, classes) for label in classes}
         error = errors[object_class.label]
         if abs(error) <= MAX_TOUCH_HEIGHT_ERROR:
-            return Measurement()
+            return ToolMeasurement()
         contradiction = (
             f"it was touched {height * 1000:.0f} mm above the table, and a {object_class.label} is "
             f"{object_class.height * 1000:.0f} mm high"
@@ -139,7 +139,7 @@ class Suction(ToolModel):
         is_near_top = height >= _compute_min_contact_height(object_class, float(position[2]), overtravel)
         fits_no_class = all(abs(other) > OTHER_CLASS_TOLERANCE for other in errors.values())
         may_be_wrong = is_near_top and error < 0 and fits_no_class
-        return Measurement(contradiction, may_be_wrong, is_miss=not is_near_top)
+        return ToolMeasurement(contradiction, may_be_wrong, is_miss=not is_near_top)
 
     def find_distinct_labels(self, classes: Mapping[str, ObjectClass]) -> frozenset[str]:
         """Return the classes whose height differs by more than `MAX_TOUCH_HEIGHT_ERROR` from all others."""

@@ -26,8 +26,8 @@ from executive.perception.evidence import describe_unknown_labels
 from executive.record.diagnosis import format_diagnosis, make_resume_command, wrap_lines
 from executive.record.result import Result
 from executive.record.timeline import STATUS_TEXTS, Timeline
+from executive.run.operator import RunControl
 from executive.run.run import Run
-from executive.run.run_control import RunControl
 from executive.view.text import draw_line_prefixes, select_active_nodes
 
 REDRAWS_PER_SECOND = 10

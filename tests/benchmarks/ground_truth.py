@@ -20,9 +20,8 @@ from executive.perception.detectors.detector_registry import KindMaker, make_ins
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
-from executive.station.audit import count_outcomes
 from executive.station.check import load_checker
-from executive.station.station import Station
+from executive.station.station import Station, count_outcomes
 from tests.benchmarks.forks import ForkRunner
 
 HUNG = "HUNG"

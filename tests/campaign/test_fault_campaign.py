@@ -21,7 +21,7 @@ from executive.errors import InputError
 from executive.events import RunEnded
 from executive.mission.analysis import UnhandledFailure
 from executive.mission.load import load_mission
-from executive.station.audit import AUDIT_KEYS
+from executive.station.station import AUDIT_KEYS
 from executive.testing.fake_cell import FakeCell
 from executive.testing.faulty_cell import ScheduledFault
 

@@ -24,7 +24,7 @@ from executive.mission.load import load_mission
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions
-from executive.run.run_control import HALT_SIGNALS, RunControl, halt_on_signals
+from executive.run.operator import HALT_SIGNALS, RunControl, halt_on_signals
 
 SLOW = pytest.mark.slow
 SETTINGS = SweepSettings(

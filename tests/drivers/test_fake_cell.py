@@ -13,7 +13,7 @@ from executive.cell.devices import check_driver_options
 from executive.cell.frame import Detections
 from executive.errors import InputError
 from executive.mission.cell_file import load_cell
-from executive.station.audit import AUDIT_KEYS
+from executive.station.station import AUDIT_KEYS
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.detect import Detect

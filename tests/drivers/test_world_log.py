@@ -9,14 +9,7 @@ import numpy as np
 import pytest
 
 from executive.cell.arm import Goal
-from executive.drivers.world_log import (
-    IDLE_STEP,
-    JOINT_TARGETS,
-    OPEN,
-    RUN_STEP,
-    CommandLog,
-    read_commands,
-)
+from executive.drivers.world_log import IDLE_STEP, JOINT_TARGETS, OPEN, RUN_STEP, CommandLog, read_commands
 from executive.errors import InputError
 from executive.motion.planner import Planner
 from executive.testing.fake_cell import load_empty_cell

@@ -10,7 +10,7 @@ from ledger_bench import Bench, Thing
 
 from executive.cell.frame import ErrorRates, assume_rates
 from executive.cell.objects import ObjectClass, Target
-from executive.cell.tools import Measurement
+from executive.cell.tools import ToolMeasurement
 from executive.errors import Fault
 from executive.events import DetectedObject, FrameSearched, ItemChanged
 
@@ -100,7 +100,7 @@ def test_an_item_is_skipped_only_if_the_mission_was_completed_without_an_attempt
 def test_an_item_that_was_still_in_doubt_or_contradicted_is_not_skipped(bench: Bench) -> None:
     bench.look(CUBE, FAR)
     bench.look(("duck", 0.5, 0.0), FAR)  # a contradiction about the class of the first
-    bench.ledger.record_measurement("cube-2", Measurement("it was touched 60 mm above the table"))
+    bench.ledger.record_measurement("cube-2", ToolMeasurement("it was touched 60 mm above the table"))
     assert {state for state, _ in bench.end().values()} == {"rejected"}
 
 
@@ -274,7 +274,7 @@ def test_an_item_is_a_phantom_if_the_tool_found_only_the_table_there_three_times
         bench.ledger.record_failed_pick("cube-1", found_table=True)
     bench.look(("cube", 0.5 + moved, 0.0), FAR)
     if touches_other:
-        bench.ledger.record_measurement("cube-2", Measurement())
+        bench.ledger.record_measurement("cube-2", ToolMeasurement())
     bench.ledger.reject("cube-1", "could not be picked")
     assert bench.end()["cube-1"] == final
 
@@ -326,7 +326,7 @@ def test_a_touch_may_miss_the_top_once_and_later_an_object_may_lie_on_its_side(
     bench: Bench, touches: list[str], answers: list[bool]
 ) -> None:
     bench.look(CUBE)
-    measurements = [Measurement(touch, may_be_wrong=True) for touch in touches]
+    measurements = [ToolMeasurement(touch, may_be_wrong=True) for touch in touches]
     found = [bench.ledger.record_measurement("cube-1", measurement) for measurement in measurements]
     assert found == answers
 

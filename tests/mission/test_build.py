@@ -50,7 +50,7 @@ def built(load: Callable[..., LoadedMission], skills: dict[str, type[Skill]]) ->
     def built(text: str, scope: Blackboard | None = None, emit: Any = discard_event) -> Any:
         clock = SimpleNamespace(now=0.0)
         cell: Any = SimpleNamespace(clock=clock, ledger=None)
-        return build_tree(load(text), skills, cell, Blackboard() if scope is None else scope, emit)
+        return build_tree(load(text), cell, Blackboard() if scope is None else scope, emit)
 
     return built
 

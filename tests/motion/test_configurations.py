@@ -42,6 +42,14 @@ def test_every_posture_points_down_over_the_goal_inside_the_limits(place, yaw, l
             )
 
 
+def test_a_goal_with_several_yaws_has_the_configurations_of_each() -> None:
+    position = (0.5, 0.1, 0.1)
+    both = find_configuration_pairs(ARM, Goal(position, (0.3, -0.5)), 0.05, START)
+    each = [find_configuration_pairs(ARM, Goal(position, (yaw,)), 0.05, START) for yaw in (0.3, -0.5)]
+    assert np.array_equal(both.lower_qs, np.vstack([pairs.lower_qs for pairs in each]))
+    assert both.branches == each[0].branches + each[1].branches
+
+
 def test_a_free_yaw_turns_joint_7_no_more_than_the_way_down_asks_for() -> None:
     start = START.copy()
     start[6] = LIMITS.position.upper[6]

@@ -11,7 +11,7 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.cell.frame import Detection
 from executive.perception.detectors.detector_registry import DetectorContext
-from executive.perception.detectors.simulated import NoisyDetector
+from executive.perception.detectors.noisy import NoisyDetector
 
 CLASSES = ("cube", "sphere", "duck")
 LOOKS = 1000

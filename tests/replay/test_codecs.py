@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 from executive.cell.frame import Answer, Detection, ErrorRates, Frame, Observation
 from executive.cell.protocols import BehaviourStep
 from executive.geometry import Pose, rotate_about_z
-from executive.station.codecs import ANSWER, ARRAY, BEHAVIOUR_STEP, OBSERVATIONS, Codec, RecordedMotion
+from executive.station.border import ANSWER, ARRAY, BEHAVIOUR_STEP, OBSERVATIONS, Codec, RecordedMotion
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 few = settings(max_examples=25)

@@ -19,9 +19,8 @@ from executive.events import Event, NodeEnded, NodeStarted, OperatorAsked, Reque
 from executive.mission.load import load_mission
 from executive.record.replayed_run import replay_and_compare
 from executive.run.assembly import RunOptions, assemble
-from executive.run.operator import ScriptedOperator, TerminalOperator, parse_request
+from executive.run.operator import RunControl, ScriptedOperator, TerminalOperator, parse_request
 from executive.run.replay import InputLog
-from executive.run.run_control import RunControl
 from executive.testing.fake_cell import FakeCell
 
 CHOICES = ("cube", "sphere", "duck")

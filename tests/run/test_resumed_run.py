@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from at_hand import look
 
-from executive.run.assembly import reconcile_ledger
+from executive.run.replay import reconcile_ledger
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach

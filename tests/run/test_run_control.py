@@ -12,8 +12,8 @@ from executive.errors import Fault
 from executive.events import Event, FaultRaised, ItemChanged, RunEnded, TimedEvent
 from executive.mission.load import load_mission
 from executive.run.assembly import RunOptions, assemble
+from executive.run.operator import RunControl
 from executive.run.run import Run
-from executive.run.run_control import RunControl
 from executive.testing.fake_cell import FakeCell
 
 

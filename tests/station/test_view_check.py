@@ -10,7 +10,7 @@ from executive.drivers.sim.kind import SIM_CELL_KIND
 from executive.cell.config import CellConfig
 from executive.cell.devices import CellKind
 from executive.mission.cell_file import load_cell, read_cell
-from executive.station.view_check import find_view_errors
+from executive.station.check import find_view_errors
 from executive.testing.fake_cell import FakeCell
 from executive.text.yaml_files import get_shipped_folder
 

@@ -13,7 +13,7 @@ from events import at
 
 from executive.cell.frame import Observation
 from executive.cell.protocols import Request
-from executive.cell.tools import Measurement
+from executive.cell.tools import ToolMeasurement
 from executive.errors import InputError, NoDepth, Unavailable, Unreachable
 from executive.events import FaultInjected, NodeEnded, NodeStarted, ToolCommanded
 from executive.testing import faults as effects
@@ -268,7 +268,7 @@ def test_the_object_of_a_node_is_that_of_its_item(state: str, offset: float, is_
     case.fake.world.objects[1].position[0] += offset
     if state != "seen":
         case.hold("sphere")
-        ledger.record_measurement(item, Measurement())
+        ledger.record_measurement(item, ToolMeasurement())
         ledger.record_grasp(item)
     if state == "placed":
         ledger.record_placement(item, "blue_bin")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from executive.cell.arm import Goal
 from executive.cell.device_config import Force, Length, MotionConfig
 from executive.cell.objects import ObjectClass
-from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, Grasp, ToolModel, ToolPart
+from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose, ToolModel, ToolPart
 from executive.geometry import Array
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class Magnet(ToolModel):
         is_confirmed: bool = False,
         overtravel: float = OVERTRAVEL,
         spacing: float = CONTACT_SPACING,
-    ) -> tuple[Grasp]:
+    ) -> tuple[GraspPose]:
         """Return the grasp at the middle of the top, where the magnet stops on contact."""
         del attempt, is_confirmed, spacing
         x, y, z = map(float, position)
@@ -77,7 +77,7 @@ class Magnet(ToolModel):
             guarded_length=motion.descent + overtravel,
             guarded_speed=motion.descent_speed,
         )
-        return (Grasp(goal, contact_height=top),)
+        return (GraspPose(goal, contact_height=top),)
 
     def build_sim(self, world: World, noise_seed: int = 0) -> SimTool:
         """Return the simulated magnet, which holds a cube within reach."""

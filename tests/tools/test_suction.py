@@ -10,7 +10,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.device_config import MotionConfig
 from executive.cell.objects import ObjectClass
-from executive.cell.tools import Measurement
+from executive.cell.tools import ToolMeasurement
 from executive.geometry import make_tool_down_pose
 from executive.tools.suction import CupContact, Suction, compute_breakaway_force, measure_contact
 
@@ -86,7 +86,7 @@ def test_half_the_gap_and_half_the_tilt_leave_a_quarter_of_the_force() -> None:
         assert compute_breakaway_force(bad, TOOL) == 0.0
 
 
-def measure(label: str, height: float) -> Measurement:
+def measure(label: str, height: float) -> ToolMeasurement:
     """Return the evidence of a touch of an object on the table, if the whole upper half counts as the top."""
     centre = np.array([0.5, 0.0, CLASSES[label].height / 2])
     return TOOL.measure_contact(CLASSES[label], centre, height, CLASSES, overtravel=0.03)

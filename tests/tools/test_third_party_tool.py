@@ -72,7 +72,7 @@ def put_objects(cell: FakeCell) -> None:
 def test_a_mission_with_it_is_checked(write: WriteMission) -> None:
     assert CliRunner().invoke(main, ["check", str(write("{cube: red_bin}"))]).exit_code == 0
     result = CliRunner().invoke(main, ["check", str(write("{cube: red_bin, sphere: blue_bin}"))])
-    assert "error[unsuitable]: the magnet cannot hold a sphere" in result.output
+    assert "error[robot]: the magnet cannot hold a sphere" in result.output
 
 
 def test_its_section_is_validated_with_its_own_keys(mission: Path) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from executive.run.run_control import RunControl
+from executive.run.operator import RunControl
 from executive.view.terminal import KeyReader
 
 PATIENCE = 10.0

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from executive.events import BranchChosen, NodeEnded, NodeStarted, TimedEvent
 from executive.record.result import Result
-from executive.run.run_control import RunControl
+from executive.run.operator import RunControl
 from executive.view.terminal import LineView, TerminalView, format_repeat_command, format_summary
 
 GRASP = "tree/sort/repeat/Grasp"

@@ -179,23 +179,26 @@ class SimArm:
         self._world.command_arm(self._commanded_q, self._motion_time)
 
     def advance(self) -> None:
-        """Check guards, disturbances and collisions, and send the command for the next physics step."""
-        if self._motion is None:
+        """Check guards, collisions and disturbances, and send the command for the next physics step."""
+        motion = self._motion
+        if motion is None:
             return
         if self._braking_times is None:
             self._check_guard()
         if self._braking_times is None:
-            tip_may_touch = self._motion_time >= self._motion.guarded_start_time
+            tip_may_touch = self._motion_time >= motion.guarded_start_time
             message, self.contact_point = self._contact_monitor.find_new_contact(tip_may_touch)
-            if message := message or self._describe_disturbance(TRACKING_TOLERANCE):
+            if not message and np.abs(self.q - self._commanded_q).max() > TRACKING_TOLERANCE:
+                message = self._describe_disturbance(TRACKING_TOLERANCE)
+            if message:
                 self.stop_after_collision(message)
         if self._braking_times is None:
             self._motion_time += STEP
-            has_ended = self._motion_time >= self._motion.duration
+            has_ended = self._motion_time >= motion.duration
         else:
             self._motion_time = self._braking_times.pop(0)
             has_ended = not self._braking_times
-        self._commanded_q = self._motion.state_at(self._motion_time).q
+        self._commanded_q = motion.state_at(self._motion_time).q
         self.send_command()
         if has_ended:
             self._motion = None

@@ -91,9 +91,11 @@ class SimDriver:
             self._step()
 
     def _step(self) -> None:
-        self.arm.advance()
+        if not self.arm.at_rest:
+            self.arm.advance()
         self.world.step()
-        self.tool.advance()
+        if not self.tool.is_idle:
+            self.tool.advance()
 
     def log_to(self, path: Path) -> None:
         self.world.log = CommandLog(path)

@@ -44,9 +44,6 @@ class WorldRebuilder:
         self.image_count = 0
         self._world = world
         self._tool = tool
-        self._next_targets = self.braking_start
-        """Joint targets and time that the next physics step uses. Targets that no step has used are ignored:
-        if the arm braked from them, it would move by two steps at once, which may tear off a load."""
 
     def execute(self, command: Command) -> None:
         """Execute the next command.
@@ -82,13 +79,12 @@ class WorldRebuilder:
         if kind in (world_log.RUN_STEP, world_log.IDLE_STEP):
             if kind == world_log.RUN_STEP:
                 self.step_count += 1
-            if self._next_targets[0].size:
-                world.command_arm(*self._next_targets)
-            self.braking_start = self._next_targets
+            if numbers.size:
+                self.braking_start = (numbers[1:], float(numbers[0]))
+            if self.braking_start[0].size:
+                world.command_arm(*self.braking_start)
             world.step()
             tool.advance()
-        elif kind == world_log.JOINT_TARGETS:
-            self._next_targets = (numbers[1:], float(numbers[0]))
         elif kind == world_log.CAPTURE:
             self.image_count += 1
         elif kind == world_log.MOTION_END:

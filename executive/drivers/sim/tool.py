@@ -56,6 +56,9 @@ class SimTool:
 
     Attributes:
         load_std: Standard deviation of the noise of `load` [N].
+        holding: True while the tool holds a body.
+        held_body: The held body, or None; ground truth for tests and audit, not for skills.
+        is_idle: True while the tool is open and holds nothing; `advance` then has no effect.
         dropped_bodies: Bodies that the tool lost and has not gripped since; ground truth, not for skills.
     """
 
@@ -68,6 +71,9 @@ class SimTool:
         self._reach = reach
         self.load_std = model.load_std
         self._noise_seed = noise_seed
+        self.holding = False
+        self.held_body: int | None = None
+        self.is_idle = True
         self._is_closed = False
         self._grip: _Grip | None = None
         self._separating_body: int | None = None  # Lost body that is still within reach.
@@ -85,10 +91,6 @@ class SimTool:
         return is_touching
 
     @property
-    def holding(self) -> bool:
-        return self._grip is not None
-
-    @property
     def holding_force(self) -> float:
         return 0.0 if self._grip is None else self._grip.force
 
@@ -101,11 +103,6 @@ class SimTool:
         return force + float(random_generator.normal(0.0, self.load_std))
 
     @property
-    def held_body(self) -> int | None:
-        """The held body, or None; ground truth for tests and audit, not for skills."""
-        return None if self._grip is None else self._grip.body
-
-    @property
     def pull(self) -> float:
         """Filtered pull on the held body [N], 0 if there is none; ground truth, not for skills."""
         return 0.0 if self._grip is None else math.hypot(*self._grip.pull)
@@ -113,6 +110,7 @@ class SimTool:
     def close(self) -> None:
         self._world.log.append(world_log.CLOSE)
         self._is_closed = True
+        self.is_idle = False
         if self._grip is None:
             self._try_to_grip()
 
@@ -124,6 +122,7 @@ class SimTool:
             body = self._grip.body
             self._world.rest_positions.setdefault(body, []).append(self._world.get_object_pose(body).position)
             self._release(self._grip)
+        self.is_idle = True
 
     def lose_grip(self) -> None:
         """Let the held body fall, as after too strong a pull."""
@@ -153,6 +152,8 @@ class SimTool:
             body, force = found
             self.dropped_bodies.discard(body)
             self._grip = _Grip(body, self._attach(body), force)
+            self.held_body = body
+            self.holding = True
             # Tip and body overlap slightly, and their contact forces would act against the constraint.
             self._set_collision(body, False)
 
@@ -172,6 +173,8 @@ class SimTool:
         self._world.client.removeConstraint(grip.constraint)
         self._set_collision(grip.body, True)
         self._grip = None
+        self.held_body = None
+        self.holding = False
 
     def _set_collision(self, body: int, enabled: bool) -> None:
         world = self._world

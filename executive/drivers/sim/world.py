@@ -68,6 +68,8 @@ class World(CellWorld):
         self.step_count = 0
         self.log = CommandLog()
         self.is_idle = False
+        self._unlogged_targets: tuple[float, ...] = ()
+        """Time in the motion [s] and joint positions [rad] of the last command; empty after the next step."""
         self.rest_positions: dict[int, list[Array]] = {}
         self.removed_objects: dict[int, TrueObject] = {}
 
@@ -135,7 +137,7 @@ class World(CellWorld):
 
         If a command precedes every physics step, the full position gain leaves a tracking error of 0.0005°.
         """
-        self.log.append(world_log.JOINT_TARGETS, time, *q)
+        self._unlogged_targets = (time, *q.tolist())
         self.client.setJointMotorControlArray(
             self.arm, self.joints, pybullet.POSITION_CONTROL, targetPositions=q.tolist(),
             forces=self.config.arm.effort, positionGains=[1.0] * len(q),
@@ -154,7 +156,8 @@ class World(CellWorld):
 
     def step(self) -> None:
         """Advance the physics by 1/240 s."""
-        self.log.append(world_log.IDLE_STEP if self.is_idle else world_log.RUN_STEP)
+        self.log.append(world_log.IDLE_STEP if self.is_idle else world_log.RUN_STEP, *self._unlogged_targets)
+        self._unlogged_targets = ()
         self.client.stepSimulation()
         self.step_count += 1
 

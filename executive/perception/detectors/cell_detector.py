@@ -7,16 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
-from executive.cell.config import CellConfig
-from executive.cell.frame import Answer, Detection, ErrorRates, Frame
+import numpy as np
+
+from executive.cell.config import CellConfig, DetectorConfig
+from executive.cell.device_config import CameraConfig
+from executive.cell.frame import Answer, Detection, ErrorRates, Frame, TrueFrame
 from executive.cell.objects import ObjectClass
 from executive.cell.protocols import Clock
 from executive.errors import Crowded, DeadlinePassed, Unavailable
 from executive.perception.detectors.detector_registry import (
+    DetectorContext,
     DetectorKind,
     KindMaker,
     build_kinds,
@@ -218,3 +223,63 @@ def _is_valid(detection: Detection, frame: Frame) -> bool:
     is_in_image = right >= 0 and bottom >= 0 and left <= width and top <= height
     is_printable = detection.label.isprintable() and len(detection.label) <= MAX_LABEL_LENGTH
     return is_box and is_in_image and 0 <= detection.confidence <= 1 and is_printable
+
+
+TRUE_CONFIDENCE = 0.9
+"""Confidence of true detections, unless the threshold in the cell file is higher."""
+
+
+@dataclass(eq=False)
+class TruthDetector:
+    """Detector that returns the true detections of a `TrueFrame`, unless a test replaces `make_answer`.
+
+    The detector omits boxes whose centre is outside the requested view or occluded by the arm.
+
+    Attributes:
+        camera: Camera of the frames.
+        confidence: Confidence of all detections.
+        seed: Random seed of the noise; each frame has its own noise.
+        box_std: Standard deviation of the noise of each box coordinate [pixel].
+        make_answer: Returns the detections, or a message if the detector is unavailable. Its arguments are
+            the number of the request (from 1) and the true detections.
+        request_count: Number of requests so far.
+        is_fake: True: the error rates in the cell file need not be measured.
+        is_instant: True: the detector needs no thread, which a fork of the process would not copy.
+    """
+
+    camera: CameraConfig
+    confidence: float
+    seed: int
+    box_std: float = 0.0
+    make_answer: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = field(
+        default=lambda _request_number, true_detections: true_detections
+    )
+    request_count: int = 0
+    is_fake: ClassVar[bool] = True
+    is_instant: ClassVar[bool] = True
+
+    @classmethod
+    def from_config(
+        cls, config: DetectorConfig, context: DetectorContext, box_std: float = 0.0
+    ) -> TruthDetector:
+        """Return a detector in place of the detector of any kind in a section of a cell file."""
+        return cls(context.camera, max(TRUE_CONFIDENCE, config.threshold), context.seed, box_std)
+
+    def detect(self, frame: Frame, view: str) -> Sequence[Detection]:
+        """Return the true detections, with noise."""
+        assert isinstance(frame, TrueFrame), "true detections require frames of a fake camera or TruthCamera"
+        self.request_count += 1
+        random_generator = np.random.default_rng([self.seed, frame.id])
+        left, top, right, bottom = self.camera.get_view_box(view)
+        detections = []
+        for true_detection in frame.true_detections:
+            sides = np.array(true_detection.box) + random_generator.normal(0.0, self.box_std, 4)
+            box = (sides[0], sides[1], sides[2], sides[3])
+            detection = replace(true_detection, box=box, confidence=self.confidence)
+            column, row = detection.centre
+            if left <= column < right and top <= row < bottom and frame.visible[int(row), int(column)]:
+                detections.append(detection)
+        answer = self.make_answer(self.request_count, detections)
+        if isinstance(answer, str):
+            raise Unavailable(answer)
+        return answer

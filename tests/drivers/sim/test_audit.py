@@ -13,7 +13,7 @@ from executive.drivers.sim.cell import list_final_objects
 from executive.cell.devices import TrueObject
 from executive.cell.objects import UNKNOWN_LABEL, Bin
 from executive.geometry import Pose
-from executive.station.audit import AUDIT_KEYS, count_outcomes
+from executive.station.station import AUDIT_KEYS, count_outcomes
 
 IN_BIN, ON_TABLE, ON_FLOOR = (0.2, -0.44, 0.12), (0.5, 0.0, 0.025), (1.4, 0.0, -0.6)
 NONE = dict.fromkeys(AUDIT_KEYS, 0)
