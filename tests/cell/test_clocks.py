@@ -77,8 +77,12 @@ def test_its_time_goes_on_after_a_resumption(halted_and_resumed: list[Result]) -
     halted, result = halted_and_resumed
     assert (halted.status, result.status, result.items.placed) == ("HALTED", "SUCCESS", 2)
     events = read_journal(Path(result.run) / "journal.jsonl")
-    (resumed,) = [timed for timed in events if isinstance(timed.event, RunResumed)]
-    assert halted.robot_time_s <= resumed.clock <= halted.robot_time_s + 1.0
+    (number,) = [number for number, timed in enumerate(events) if isinstance(timed.event, RunResumed)]
+    resumed = events[number]
+    kept_times = [timed.clock for timed in events[:number] if timed.tick < resumed.event.valid_ticks]
+    assert kept_times[-1] <= resumed.clock <= halted.robot_time_s + 1.0
+    later_times = [timed.clock for timed in events[number:]]
+    assert later_times == sorted(later_times)
 
 
 def test_a_resumed_run_is_replayed(halted_and_resumed: list[Result]) -> None:
