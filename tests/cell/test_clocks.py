@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from executive.behaviours import load_skills
-from executive.events import ItemChanged, RunResumed, TimedEvent
+from executive.events import InputRead, ItemChanged, RunResumed, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
@@ -77,8 +77,13 @@ def test_its_time_goes_on_after_a_resumption(halted_and_resumed: list[Result]) -
     halted, result = halted_and_resumed
     assert (halted.status, result.status, result.items.placed) == ("HALTED", "SUCCESS", 2)
     events = read_journal(Path(result.run) / "journal.jsonl")
-    (resumed,) = [timed for timed in events if isinstance(timed.event, RunResumed)]
-    assert halted.robot_time_s <= resumed.clock <= halted.robot_time_s + 1.0
+    (number,) = [number for number, timed in enumerate(events) if isinstance(timed.event, RunResumed)]
+    resumed = events[number]
+    kept_times = [timed.clock for timed in events[:number] if timed.tick < resumed.event.valid_ticks]
+    assert kept_times[-1] <= resumed.clock <= halted.robot_time_s + 1.0
+    # The event of a reading of the clock has the time on the previous reading.
+    later_times = [timed.clock for timed in events[number:] if not isinstance(timed.event, InputRead)]
+    assert later_times == sorted(later_times)
 
 
 def test_a_resumed_run_is_replayed(halted_and_resumed: list[Result]) -> None:
