@@ -77,7 +77,7 @@ def test_drivers_and_kinds_of_detectors_are_found_likewise(project: Write) -> No
 @pytest.mark.parametrize(
     ("group", "kind", "ask"),
     [
-        ("skills", "skill", load_skills),
+        ("skills", "skill", lambda: load_skills()["wave"]),
         ("drivers", "driver", lambda: load_checker("wave")),
         ("detectors", "kind of detector", lambda: find_detector_kinds()["wave"].load()),
     ],
@@ -115,7 +115,7 @@ def test_of_a_project_that_is_installed_its_file_counts(project: Write, packages
 def test_a_module_without_the_skill_is_refused(project: Write, text: str, problem: str) -> None:
     project("hall_three", text, skills='Wave = "hall_three.part:Wave"')
     with pytest.raises(InputError, match=problem):
-        load_skills()
+        load_skills()["Wave"]
 
 
 NOD = """
