@@ -11,9 +11,12 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from executive.errors import InputError, Stopped
-from executive.events import Emit, OperatorAsked, RequestGiven
+
+if TYPE_CHECKING:
+    from executive.events import Emit
 
 PAUSE_POLL_PERIOD = 0.05
 """Period at which a paused run handles signals and calls the callbacks of `call_between_ticks` [s]."""
@@ -160,6 +163,8 @@ class ScriptedOperator:
 
     def ask(self, choices: Sequence[str]) -> str | None:
         """Return the next request, or None at the end of the list."""
+        from executive.events import RequestGiven  # The import takes 0.3 s, and `--help` imports this file.
+
         request = parse_request(self._requests.pop(0), choices) if self._requests else None
         self._emit(RequestGiven(request))
         return request
@@ -185,6 +190,8 @@ class TerminalOperator:
         Raises:
             Stopped: The run was stopped before a request.
         """
+        from executive.events import OperatorAsked, RequestGiven  # As in `ScriptedOperator.ask`.
+
         # A request that was given before this question, for instance by a second click, must have no effect.
         while self._control.take_request() is not None:
             pass

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rig import Rig
 
-from executive.cell.arm import Goal
+from executive.cell.arm import Goal, MotionGuard
 from executive.errors import Fault
 from executive.motion.trajectory import RETREAT_TIME
 
@@ -46,6 +46,15 @@ def test_a_motion_that_starts_elsewhere_is_a_fault_with_numbers(rig: Rig) -> Non
     with pytest.raises(Fault, match=r"the start of the motion .* joint \d is .*° away; 0\.2°"):
         rig.arm.start(motion)
     rig.go("home")
+
+
+def test_it_follows_one_motion_at_a_time_and_none_of_another_arm(rig: Rig) -> None:
+    with pytest.raises(Fault, match="follows trajectories, not a str"):
+        rig.device.execute("home", MotionGuard())  # type: ignore[arg-type]
+    motion = rig.planned(OVER)
+    rig.device.execute(motion, MotionGuard())
+    with pytest.raises(Fault, match="start a motion while moving"):
+        rig.device.execute(motion, MotionGuard())
 
 
 def test_an_arm_pushed_off_its_path_reports_a_collision_and_moves_back(rig: Rig) -> None:

@@ -11,7 +11,6 @@ import pytest
 
 from executive.behaviours import load_skills
 from executive.cell.device_config import STEP
-from executive.drivers.sim.arm import SimArm
 from executive.drivers.sim.driver import SimDriver
 from executive.errors import InputError
 from executive.events import discard_event
@@ -47,10 +46,6 @@ def driver_of(station: Station) -> SimDriver:
     return station.driver
 
 
-def arm_of(station: Station) -> SimArm:
-    return driver_of(station).arm
-
-
 def state_of(station: Station) -> str:
     """Everything that moves, and the seal."""
     world, tool = driver_of(station).world, driver_of(station).tool
@@ -82,7 +77,7 @@ def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
         if cell.tick_count in TICKS:
             copy = folder / str(cell.tick_count)
             copy.write_bytes((folder / "log").read_bytes())
-            arm = arm_of(cell)
+            arm = driver_of(cell).arm
             snapshots.append(Left(copy, state_of(cell), cell.tick_count, arm.motion, arm.motion_time))
         if cell.tick_count == max(TICKS):
             raise Cut
@@ -131,9 +126,9 @@ def test_the_arm_brakes_on_the_path_it_was_on(cells: list[tuple[Left, Station]],
                 break
             cell.advance()
             assert one.motion is not None
-            on_path = one.motion.state_at(arm_of(cell).motion_time).q
-            assert np.abs(arm_of(cell).commanded_q - on_path).max() < 1e-7, one.tick
-            commands.append(arm_of(cell).commanded_q)
+            on_path = one.motion.state_at(driver_of(cell).arm.motion_time).q
+            assert np.abs(driver_of(cell).arm.commanded_q - on_path).max() < 1e-7, one.tick
+            commands.append(driver_of(cell).arm.commanded_q)
         assert cell.cell.arm.at_rest, one.tick
         if len(commands) > 3:
             accelerations = np.diff(commands, 2, axis=0) / STEP**2
