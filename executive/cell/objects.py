@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, TypeAlias
+from typing import Annotated, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -36,14 +36,12 @@ class Target:
     Attributes:
         item: Id of the item.
         label: Class name.
-        position: Centre of the object `(3,)` [m] in the frame of `surface` at `stamp`, at half the height of
-            its class.
+        position: Centre of the object `(3,)` [m] at `stamp`, at half the height of its class.
         confidence: Confidence of the last detection, 0 to 1.
         frame: Id of the last frame that showed the item.
         change_count: Number of robot actions that may have moved objects before the capture of that frame.
         stamp: Capture time of the last frame that showed the item [s].
-        yaw: Angle of the object in the frame of `surface` at `stamp`; None if it is unknown.
-        surface: Name of the surface on which the object lies; the frame of the table is the world.
+        yaw: Angle of the object at `stamp`; None if it is unknown.
     """
 
     item: ItemName
@@ -54,12 +52,13 @@ class Target:
     change_count: int
     stamp: float
     yaw: Yaw | None = None
-    surface: str = "table"
+    omits_none: ClassVar[bool] = True
 
     def pose_at(self, time: float) -> Pose:  # noqa: ARG002
-        """Return the pose of the object in the frame of its surface at a time [s]; on the table it rests.
+        """Return the pose of the object at a time [s], without a rotation if its yaw is unknown.
 
-        The rotation is the identity if the yaw is unknown.
+        The frame of the pose is that of the surface on which the object lies: the table, whose frame is the
+        world, and on which an object rests.
         """
         return Pose(rotate_about_z(self.yaw.angle if self.yaw else 0.0), self.position)
 
