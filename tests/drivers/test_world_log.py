@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from executive.cell.arm import Goal
-from executive.drivers.world_log import IDLE_STEP, OPEN, RUN_STEP, CommandLog, read_commands
+from executive.drivers.world_log import IDLE_STEP, MOTION, RUN_STEP, CommandLog, encode_motion, read_commands
 from executive.errors import InputError
 from executive.motion.planner import Planner
 from executive.testing.fake_cell import load_empty_cell
@@ -26,7 +26,7 @@ def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
     joints = [1 / 3, *np.random.default_rng(1).normal(size=7)]
     motion = Planner(cell).plan(np.radians(cell.arm.poses_deg["home"]), Goal((0.5, 0.0, 0.1)))
     written.append(RUN_STEP, *joints)
-    written.append_motion(motion)
+    written.append(MOTION, *encode_motion(motion))
     written.close()
     written.close()
     again = CommandLog(path, resume=True)
