@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from executive.cell.arm import Goal
-from executive.drivers.world_log import IDLE_STEP, MOTION, RUN_STEP, CommandLog, encode_motion, read_commands
+from executive.drivers.world_log import (
+    IDLE_STEP,
+    MOTION,
+    OPEN,
+    RUN_STEP,
+    CommandLog,
+    encode_motion,
+    read_commands,
+)
 from executive.errors import InputError
 from executive.motion.planner import Planner
 from executive.testing.fake_cell import load_empty_cell
