@@ -72,7 +72,6 @@ def run_command(
         from executive.run.assembly import RunOptions
         from executive.station.check import load_checker
         from executive.view import terminal
-        from executive.view.live_page import LivePage
         from executive.view.report import try_write_report
 
         console = Console(file=open_unescaped_stderr())
@@ -83,8 +82,12 @@ def run_command(
         elif not quiet:
             terminal_view = terminal.LineView(sys.stderr)
         with contextlib.ExitStack() as exit_stack:
-            page = LivePage() if has_page else None
-            if page is not None:
+            page = None
+            if has_page:
+                # Only a page needs the web server.
+                from executive.view.live_page import LivePage
+
+                page = LivePage()
                 exit_stack.callback(page.finish)
                 click.echo(f"watch the run at {page.address}", err=True)
             views = [GuardedView(view) for view in (terminal_view, page) if view is not None]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -263,18 +263,10 @@ def _make_rotation(vector_deg: ArrayLike) -> Pose:
     return Pose(np.asarray(cv2.Rodrigues(np.radians(vector_deg))[0]), np.zeros(3))
 
 
-MAX_REST_SPEED = 0.002
-"""Speed below which an object counts as at rest [m/s]."""
-MIN_SETTLING_STEPS = 60
-"""Minimum number of physics steps until rest; released objects are slow in the first steps."""
-MAX_SETTLING_STEPS = 480
-"""Maximum number of physics steps until rest."""
 MAX_STACK_OFFSET = 0.004
 """Maximum offset between the axes of two stacked objects, along x and y [m]."""
 PUSH_SPEED = 0.1
 """Horizontal speed given to an upper object to test a stack [m/s]; a stable object stops within 1 mm."""
-MAX_DISPLACEMENT = 0.005
-"""Maximum distance of an object in a stable stack from its goal position [m]."""
 
 
 def build_initial_world(
@@ -329,7 +321,7 @@ def spawn_objects(world: World, seed: int, unknown: UnknownConfig | None = None)
         X_WO = Pose(rotate_about_z(rng.uniform(0, math.tau)), np.array([*position, height]))
         colour = model.colours[int(rng.integers(len(model.colours)))]
         bodies.append(world.add_object(label, X_WO, colour, model))
-    _step_until_rest(world, bodies, lambda: False)
+    world.settle(bodies)
     if config.table.stacked:
         _stack_objects(world, bodies[:count], config.table.stacked, rng)
     return tuple(bodies)
@@ -370,31 +362,15 @@ def _try_stack(world: World, upper: int, lower: int, rng: np.random.Generator) -
     position = np.array([*(lower_position[:2] + offset), height])
     goals = {**initial_poses, upper: Pose(rotate_about_z(rng.uniform(0, math.tau)), position)}
     world.place_object(upper, goals[upper])
-    _step_until_rest(world, list(goals), lambda: _has_moved(world, goals))
+    world.settle(goals, goals)
     angle = rng.uniform(0, math.tau)
     world.client.resetBaseVelocity(upper, [PUSH_SPEED * math.cos(angle), PUSH_SPEED * math.sin(angle), 0.0])
-    _step_until_rest(world, list(goals), lambda: _has_moved(world, goals))
-    if not _has_moved(world, goals):
+    world.settle(goals, goals)
+    if not world.has_moved(goals):
         return True
     for body, X_WO in initial_poses.items():
         world.place_object(body, X_WO)
     return False
-
-
-def _has_moved(world: World, goals: Mapping[int, Pose]) -> bool:
-    return any(
-        float(np.linalg.norm(world.get_object_pose(body).position - X_WO.position)) > MAX_DISPLACEMENT
-        for body, X_WO in goals.items()
-    )
-
-
-def _step_until_rest(world: World, bodies: Sequence[int], must_end: Callable[[], bool]) -> None:
-    """Step until all bodies are at rest or `must_end` returns True, at most `MAX_SETTLING_STEPS` times."""
-    for step in range(MAX_SETTLING_STEPS):
-        world.step()
-        speeds = [np.linalg.norm(world.client.getBaseVelocity(body)[0]) for body in bodies]
-        if (step >= MIN_SETTLING_STEPS and max(speeds, default=0.0) < MAX_REST_SPEED) or must_end():
-            return
 
 
 MAX_POSITION_ATTEMPTS = 2000

@@ -7,7 +7,7 @@ equal objects in equal order are bitwise identical.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,6 +39,14 @@ MAX_RAY_LENGTH = 5.0
 """Maximum length of a ray [m]."""
 RAY_RESTART_DISTANCE = 1e-4
 """Distance behind a hit of the arm at which a ray is cast again [m]."""
+MAX_REST_SPEED = 0.002
+"""Speed below which an object counts as at rest [m/s]."""
+MIN_SETTLING_STEPS = 60
+"""Minimum number of physics steps until rest; released objects are slow in the first steps."""
+MAX_SETTLING_STEPS = 480
+"""Maximum number of physics steps until rest."""
+MAX_DISPLACEMENT = 0.005
+"""Maximum distance of an object in a stable stack from its goal [m]."""
 
 
 class World(CellWorld):
@@ -166,6 +174,22 @@ class World(CellWorld):
         self._unlogged_targets = ()
         self.client.stepSimulation()
         self.step_count += 1
+
+    def settle(self, bodies: Collection[int], goals: Mapping[int, Pose] | None = None) -> None:
+        """Step until all bodies are at rest or one has left its goal, at most `MAX_SETTLING_STEPS` times."""
+        for step in range(MAX_SETTLING_STEPS):
+            self.step()
+            speeds = [np.linalg.norm(self.client.getBaseVelocity(body)[0]) for body in bodies]
+            is_at_rest = step >= MIN_SETTLING_STEPS and max(speeds, default=0.0) < MAX_REST_SPEED
+            if is_at_rest or self.has_moved(goals or {}):
+                return
+
+    def has_moved(self, goals: Mapping[int, Pose]) -> bool:
+        """Return True if a body is more than `MAX_DISPLACEMENT` away from its pose in `goals`."""
+        return any(
+            float(np.linalg.norm(self.get_object_pose(body).position - X_WO.position)) > MAX_DISPLACEMENT
+            for body, X_WO in goals.items()
+        )
 
     def close(self) -> None:
         """Disconnect from the physics server; the world cannot be used afterwards."""
