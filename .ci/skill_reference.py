@@ -79,7 +79,6 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
     ],
     "Functions that skills share": [
         ("executive.manipulation.motions", "manipulation/motions.py", ""),
-        ("executive.manipulation.drops", "manipulation/drops.py", ""),
         ("executive.manipulation.tool_goals", "manipulation/tool_goals.py", ""),
         ("executive.perception.evidence", "perception/evidence.py", ""),
     ],

@@ -7,8 +7,7 @@ import math
 from executive.cell.arm import Goal
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.drops import fail_if_dropped
-from executive.manipulation.motions import transport
+from executive.manipulation.motions import fail_if_dropped, transport
 from executive.manipulation.tool_goals import choose_bin
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Newtons, Out, Seconds, Skill, param, port
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from executive.campaign.jobs import MissionUnderTest
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.drops import detect_and_record_drop
+from executive.manipulation.motions import detect_and_record_drop
 from executive.record.timeline import Activation
 from executive.skill import EMPTY, HOLDING, Skill
 from executive.testing import faults as effects

@@ -14,7 +14,7 @@ import PIL.Image
 
 from executive.cell.config import CellConfig
 from executive.drivers.sim.camera import Image, Light, render
-from executive.drivers.sim.rebuild import WorldRebuilder
+from executive.drivers.sim.driver import WorldRebuilder
 from executive.drivers.sim.scene import build_world_of_run
 from executive.drivers.world_log import RUN_STEP, read_commands
 from executive.errors import InputError, explain_os_errors

@@ -9,8 +9,12 @@ from at_hand import pick
 from executive.cell.arm import Goal, Task
 from executive.cell.objects import Obstacle, Target
 from executive.geometry import GRAVITY
-from executive.manipulation.drops import MAX_PREDICTABLE_SPEED, detect_and_record_drop, predict_landing
-from executive.manipulation.motions import plan
+from executive.manipulation.motions import (
+    MAX_PREDICTABLE_SPEED,
+    detect_and_record_drop,
+    plan,
+    predict_landing,
+)
 from executive.manipulation.tool_goals import list_obstacles
 from executive.station.planner_service import PlannedArm
 from executive.testing.fake_cell import FakeCell
