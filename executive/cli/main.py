@@ -33,8 +33,8 @@ COMMANDS: Mapping[str, str] = {
     "faults": "sweep",
     "replay": "run",
     "report": "run",
-    "doctor": "doctor",
-    "init": "init",
+    "doctor": "setup",
+    "init": "setup",
 }
 """Module in `executive.cli` of each command, in the order of `--help`."""
 
