@@ -21,8 +21,7 @@ from events import (
 
 from executive.events import Event, OperatorAsked, RequestGiven, TargetSelected
 from executive.geometry import Pose
-from executive.view.live_page import CameraImage, encode_poses
-from executive.view.live_server import PageState
+from executive.view.live_page import CameraImage, PageState, encode_poses
 
 
 @pytest.mark.parametrize(
