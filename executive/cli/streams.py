@@ -1,4 +1,7 @@
-"""Standard streams that tolerate write errors and escape control characters, and a clean stdout."""
+"""Output of commands: streams that tolerate write errors, a clean stdout, results, tables and progress bars.
+
+The functions import rich themselves, because a command that needs no rich would wait 0.1 s.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,18 @@ import contextlib
 import ctypes
 import io
 import json
+import math
 import os
 import sys
-from collections.abc import Iterator
-from typing import Any, TextIO, cast
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import click
 
 from executive.errors import escape_control_characters
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
 
 
 class TolerantStream:
@@ -111,3 +118,48 @@ def print_json(value: Any) -> None:
 def print_result(value: Any, text: str, *, as_json: bool) -> None:
     """Print the result of a command to stdout: `value` as JSON, or `text`."""
     print_json(value) if as_json else click.echo(text)
+
+
+@contextlib.contextmanager
+def show_progress(description: str, *, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
+    """Show a progress bar with rate and remaining time if stderr is a terminal; yield the update function.
+
+    The arguments of the update function are the numbers of completed parts and of all parts of the work.
+
+    Args:
+        description: Name of the work, beside the bar.
+        quiet: True to show nothing.
+    """
+    from rich import progress
+    from rich.console import Console
+
+    console = Console(file=open_unescaped_stderr())
+    is_hidden = quiet or not console.is_interactive
+    # The remaining time is estimated from all completed parts, because a part may take minutes.
+    with progress.Progress(
+        progress.TextColumn("{task.description}"), progress.BarColumn(), progress.MofNCompleteColumn(),
+        progress.TextColumn("{task.fields[rate]}"), progress.TimeRemainingColumn(),
+        console=console, disable=is_hidden, speed_estimate_period=math.inf,
+    ) as bar:  # fmt: skip
+        task = bar.add_task(description, total=None, rate="")
+
+        def update(completed: int, total: int) -> None:
+            bar.update(task, completed=completed, total=total)
+            if speed := bar.tasks[0].speed:
+                bar.update(task, rate=f"{60 * speed:.1f} per minute")
+
+        yield update
+
+
+def print_report(lines_and_tables: Iterable[RenderableType]) -> None:
+    """Print lines of text, which are not wrapped, and tables to stderr."""
+    from rich.console import Console
+
+    console = Console(stderr=True, highlight=False, markup=False, force_terminal=False)
+    for line_or_table in lines_and_tables:
+        console.print(line_or_table, soft_wrap=isinstance(line_or_table, str))
+
+
+def print_halt() -> None:
+    """Print the consequences of the received Ctrl-C or SIGTERM."""
+    click.echo("halting: no new runs start, and current runs end", err=True)

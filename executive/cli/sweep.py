@@ -10,7 +10,14 @@ from typing import Any
 import click
 
 from executive.cli import options
-from executive.cli.streams import keep_stdout_clean, print_json, print_result
+from executive.cli.streams import (
+    keep_stdout_clean,
+    print_halt,
+    print_json,
+    print_report,
+    print_result,
+    show_progress,
+)
 from executive.errors import ExitCode
 
 
@@ -55,7 +62,6 @@ def sweep_command(
         from executive.campaign.jobs import JobOptions
         from executive.campaign.sweep import create_sweep, make_settings, open_sweep, read_results, run_sweep
         from executive.cell.json_values import to_json
-        from executive.cli.progress import print_halt, print_report, show_progress
 
         conditions = sweep_reports.parse_requirement(require) if require else ()
         if resume is not None:
@@ -130,7 +136,6 @@ def compare_command(
         from executive.campaign.jobs import JobOptions
         from executive.campaign.sweep_summary import SweepResults, compute_differences, pair_runs
         from executive.cell.json_values import to_json
-        from executive.cli.progress import print_halt, print_report, show_progress
 
         if resume is not None:
             databases = sweep.open_comparison(resume)
@@ -208,7 +213,6 @@ def faults_command(
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.campaign import faults as fault_campaign
         from executive.campaign.jobs import JobOptions, load_mission_under_test
-        from executive.cli.progress import print_halt, show_progress
 
         mission_under_test = load_mission_under_test(mission, overrides, oracle, seed, cell)
         with show_progress("faults", quiet=as_json or list_only or fault_numbers is not None) as progress:

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from executive.cli import options
-from executive.cli.streams import keep_stdout_clean, print_json
+from executive.cli.streams import keep_stdout_clean, print_json, print_report, show_progress
 from executive.errors import InputError
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -37,7 +37,6 @@ def dataset_command(
     with keep_stdout_clean():
         # The imports take a second, for which `--help` and wrong options must not wait.
         from executive.campaign.evaluation import load_cells
-        from executive.cli.progress import show_progress
         from executive.training.rendering import generate_dataset
 
         configs = list(load_cells(cells).values())
@@ -79,7 +78,6 @@ def train_command(
 
     with keep_stdout_clean():
         # The imports take a second, for which `--help` and wrong options must not wait.
-        from executive.cli.progress import show_progress
         from executive.training.train import load_dataset, train
 
         splits = load_dataset(dataset)
@@ -178,11 +176,9 @@ def evaluate_command(
     with keep_stdout_clean():
         # The imports take a second, for which `--help` and wrong options must not wait.
         from executive.campaign import evaluation
-        from executive.cli.progress import print_report, show_progress
         from executive.training.dataset import save_image
         from executive.training.evaluate import draw_sheet
         from executive.training.samples import LabelledDataset
-        from executive.view.detector_results import list_metrics
 
         worst_mistakes: list[Any] = []
         samples = LabelledDataset(dataset) if dataset else None
@@ -199,7 +195,7 @@ def evaluate_command(
             name = " on ".join(filter(None, (cell_name, str(dataset or ""))))
             start_time = time.monotonic()
             result = evaluation.measure_detector(detector, settings, worst_mistakes, show_progress)
-            print_report(list_metrics(name, detector.name, result))
+            print_report(evaluation.list_metrics(name, detector.name, result))
             kind = detector.configs[detector.name].kind
             results[name] = {"detector": detector.name, "kind": kind, **result.to_dict()}
             if not is_stored or detector.cell is None:
