@@ -298,20 +298,16 @@ def list_metrics(source: str, detector: str, evaluation: Evaluation) -> Iterator
         f"mAP50 {evaluation.map50:.4f}, mAP50-95 {evaluation.map50_95:.4f}"
     )
     if evaluation.by_class:
-        yield _make_class_table(evaluation)
+        table = _make_table("class", "objects", "precision", "recall")
+        for label, metrics in evaluation.by_class.items():
+            table.add_row(label, f"{metrics.objects}", f"{metrics.precision:.2%}", f"{metrics.recall:.2%}")
+        yield table
         yield _make_confusion_table(evaluation)
     yield _make_error_table(evaluation)
     if evaluation.reliability is not None:
         yield "  upper 95 % confidence bounds of the error rates, for the ledger:"
         yield "  " + ", ".join(f"{name} {value:g}" for name, value in evaluation.reliability.rates)
         yield ""
-
-
-def _make_class_table(evaluation: Evaluation) -> Table:
-    table = _make_table("class", "objects", "precision", "recall")
-    for label, metrics in evaluation.by_class.items():
-        table.add_row(label, f"{metrics.objects}", f"{metrics.precision:.2%}", f"{metrics.recall:.2%}")
-    return table
 
 
 def _make_confusion_table(evaluation: Evaluation) -> Table:

@@ -23,7 +23,7 @@ COMMANDS: Mapping[str, str] = {
     "run": "run",
     "check": "check",
     "tree": "check",
-    "skills": "skills",
+    "skills": "check",
     "schema": "check",
     "dataset": "training",
     "train": "training",

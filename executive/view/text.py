@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from rich.cells import cell_len
@@ -79,7 +79,10 @@ def draw_text(nodes: Sequence[OutlineNode], *, shows_ports: bool = False, shows_
         indent = prefix.replace("├─", "│ ").replace("└─", "  ") + ("│  " if children else "   ")
         detail = f"  ({node.detail})" if node.detail else ""
         lines += _wrap_line(f"{node.name}{detail}", prefix, indent)
-        for text in _list_details(node, shows_ports, shows_reasons):
+        details = [node.trigger] if shows_reasons else []
+        details += ["; ".join(describe_connections(node))] if shows_ports else []
+        details += [describe_reasons(node)] if shows_reasons else []
+        for text in filter(None, details):
             lines += _wrap_line(text, indent, indent)
     return "\n".join(lines)
 
@@ -106,15 +109,6 @@ def _wrap_line(text: str, first_indent: str, indent: str) -> list[str]:
         text, max(MAX_LINE_LENGTH, len(indent) + _MIN_TEXT_LENGTH), initial_indent=first_indent,
         subsequent_indent=f"{indent}  ", break_long_words=False, break_on_hyphens=False,
     )  # fmt: skip
-
-
-def _list_details(node: OutlineNode, shows_ports: bool, shows_reasons: bool) -> Iterator[str]:
-    if shows_reasons and node.trigger:
-        yield node.trigger
-    if shows_ports and (texts := describe_connections(node)):
-        yield "; ".join(texts)
-    if shows_reasons and node.reasons:
-        yield describe_reasons(node)
 
 
 def describe_connections(node: OutlineNode) -> list[str]:
