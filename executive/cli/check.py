@@ -136,8 +136,7 @@ def tree_command(
         from executive.record.run_directory import format_tree
         from executive.tree.blackboard import Blackboard
         from executive.view.btcpp import format_btcpp
-        from executive.view.svg import make_svg
-        from executive.view.text import draw_text, fold_subtrees
+        from executive.view.drawing import draw_text, fold_subtrees, make_svg
 
         loaded = load_mission(mission, load_skills(), overrides, replacing_cell=cell)
         # No node of the tree is executed, so that none needs a clock or a ledger.

@@ -29,7 +29,7 @@ from executive.tree.specification import (
     Value,
     VariableName,
 )
-from executive.view.text import replace_invalid_xml_characters
+from executive.view.drawing import replace_invalid_xml_characters
 
 _REGISTERED_NAMES = frozenset(Path(__file__).with_name("btcpp_names.txt").read_text("utf-8").split())
 """Names that BehaviorTree.CPP 4.10 registers or reserves."""

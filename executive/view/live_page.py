@@ -38,7 +38,7 @@ from executive.record.picture_recorder import encode_jpeg
 from executive.record.result import Result
 from executive.record.timeline import STATUS_TEXTS, Timeline
 from executive.run.run import Run
-from executive.view.svg import NodeResult, make_svg
+from executive.view.drawing import NodeResult, make_svg
 
 LOOPBACK = "127.0.0.1"
 """Network address at which the page is served."""
