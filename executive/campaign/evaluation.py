@@ -6,7 +6,7 @@ import contextlib
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
@@ -168,45 +168,39 @@ def measure_detector(
     if settings.dataset is not None:
         known_classes = classes or find_detectable_labels(detector.configs, detector.base_folder)[name] or ()
         settings.dataset.match_classes(known_classes, f"detector {name}")
-    with _open_images(detector.cell, settings, progress) as samples:
-        evaluated_detector = EvaluatedDetector(
-            detector.configs, name, base=detector.base_folder, camera=camera, view=settings.view,
-            classes=classes,
+    images: Images | None = settings.dataset
+    if images is None:
+        assert detector.cell is not None
+        images = _render_images(detector.cell, settings, progress)
+    evaluated_detector = EvaluatedDetector(
+        detector.configs, name, base=detector.base_folder, camera=camera, view=settings.view, classes=classes
+    )
+    with contextlib.closing(evaluated_detector), progress(f"running {name}") as update:
+        return evaluate.evaluate(
+            evaluated_detector, _iterate_with_progress(images, update), mistakes=mistakes,
+            localizer=localizer, cell=cell_of_images, threshold=settings.threshold,
         )  # fmt: skip
-        with contextlib.closing(evaluated_detector), progress(f"running {name}") as update:
-            return evaluate.evaluate(
-                evaluated_detector, _iterate_with_progress(samples, update), mistakes=mistakes,
-                localizer=localizer, cell=cell_of_images, threshold=settings.threshold,
-            )  # fmt: skip
 
 
-@contextlib.contextmanager
-def _open_images(
-    cell: CellConfig | None, settings: ImageSettings, progress: OpenProgressBar
-) -> Iterator[Images]:
-    """Open the images of the dataset, or render scenes of the cell; a context manager."""
-    if settings.dataset is not None:
-        yield settings.dataset
-        return
-    assert cell is not None
-    with tempfile.TemporaryDirectory() as folder:
-        images: Images
-        with progress(f"rendering {cell.cell}") as update:
-            if settings.is_randomized:
+def _render_images(
+    cell: CellConfig, settings: ImageSettings, progress: OpenProgressBar
+) -> list[LabelledImage]:
+    """Return rendered scenes of the cell."""
+    with progress(f"rendering {cell.cell}") as update:
+        if settings.is_randomized:
+            with tempfile.TemporaryDirectory() as folder:
                 generate_dataset(
                     [cell], Path(folder), image_count=settings.image_count, seed=settings.seed,
                     layout="coco", worker_count=settings.workers, valid_fraction=1.0, progress=update,
                 )  # fmt: skip
-                images = LabelledDataset(Path(folder))
-            else:
-                object_counts = (0, find_max_object_count(cell, MAX_OBJECT_COUNT))
-                table = cell.table.model_copy(update={"objects": object_counts})
-                images = render_run_frames(
-                    cell.model_copy(update={"table": table}), image_count=settings.image_count,
-                    seed=settings.seed, worker_count=settings.workers, progress=update,
-                    scene=load_scene(settings.scene, cell),
-                )  # fmt: skip
-        yield images
+                return list(LabelledDataset(Path(folder)))
+        object_counts = (0, find_max_object_count(cell, MAX_OBJECT_COUNT))
+        table = cell.table.model_copy(update={"objects": object_counts})
+        return render_run_frames(
+            cell.model_copy(update={"table": table}), image_count=settings.image_count,
+            seed=settings.seed, worker_count=settings.workers, progress=update,
+            scene=load_scene(settings.scene, cell),
+        )  # fmt: skip
 
 
 def _iterate_with_progress(images: Images, update: Callable[[int, int], None]) -> Iterator[LabelledImage]:
@@ -333,8 +327,7 @@ def _make_error_table(evaluation: Evaluation) -> Table:
         ("time from frame to detections [ms]", evaluation.latency),
     ):
         if distribution is not None:
-            values = (distribution.median, distribution.p95, distribution.p99, distribution.worst)
-            table.add_row(quantity, *(f"{value:.2f}" for value in values))
+            table.add_row(quantity, *(f"{value:.2f}" for value in astuple(distribution)))
     return table
 
 

@@ -141,13 +141,12 @@ def compare_command(
             databases = sweep.open_comparison(resume)
         else:
             assert seeds is not None
-            settings_a = sweep.make_settings(
-                missions[0], seeds, {**overrides, **overrides_a}, {}, scene, save_images, cell_a or cell
-            )
-            settings_b = sweep.make_settings(
-                missions[-1], seeds, {**overrides, **overrides_b}, {}, scene, save_images, cell_b or cell
-            )
-            databases = sweep.create_comparison([settings_a, settings_b], runs_folder)
+            sides = ((missions[0], overrides_a, cell_a), (missions[-1], overrides_b, cell_b))
+            settings = [
+                sweep.make_settings(name, seeds, overrides | own, {}, scene, save_images, own_cell or cell)
+                for name, own, own_cell in sides
+            ]
+            databases = sweep.create_comparison(settings, runs_folder)
         results: list[SweepResults] = []
         for side, database in zip("AB", databases, strict=True):
             with closing(database):

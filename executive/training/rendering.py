@@ -302,12 +302,8 @@ class SceneRenderer:
             origin: Position in the camera image at which the boxes have the coordinates (0, 0) [pixel].
             scale: Factor from pixels of the camera image to pixels of the boxes.
         """
-        labels = []
-        boxes: list[Box] = []
+        labelled_objects = []
         ignored_boxes: list[Box] = []
-        fractions = []
-        positions = []
-        centres = []
         heavily_occluded_count = 0
         for body, scene_object in objects.items():
             mask = rendered.segmentation == body
@@ -322,31 +318,31 @@ class SceneRenderer:
             corners = np.array(models.compute_bounding_box(pixels)).reshape(2, 2)
             visible_corners = corners.clip(rendered.region[:2], rendered.region[2:])
             left, top, right, bottom = ((visible_corners - origin) * scale).ravel().tolist()
+            box = (left, top, right, bottom)
             is_heavily_occluded = fraction < MIN_LABELLED_VISIBLE_FRACTION
             heavily_occluded_count += is_heavily_occluded
             if is_heavily_occluded or _measure_contrast(rendered.image, mask) < min_contrast:
-                ignored_boxes.append((left, top, right, bottom))
+                ignored_boxes.append(box)
                 continue
             centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-            labels.append(scene_object.label)
-            boxes.append((left, top, right, bottom))
-            fractions.append(fraction)
             pixel = corners.mean(axis=0)
-            positions.append(intersect_plane(rendered.matrix, rendered.X_WC, pixel, float(centre[2])))
-            centres.append(centre)
+            position = intersect_plane(rendered.matrix, rendered.X_WC, pixel, float(centre[2]))
+            labelled_objects.append((scene_object.label, box, fraction, position, centre))
         if heavily_occluded_count > max(1, len(objects) * MAX_HEAVILY_OCCLUDED_FRACTION):
             return None
+        columns = zip(*labelled_objects, strict=True) if labelled_objects else [()] * 5
+        labels, boxes, fractions, positions, centres = columns
         truth = {
             "camera": self._camera_name,
             "part": rendered.region,
             "matrix": rendered.matrix,
             "X_WC": rendered.X_WC.to_rounded_list(9),
-            "labels": tuple(labels),
+            "labels": labels,
             "positions": np.array(positions).reshape(-1, 3),
             "centres": np.array(centres).reshape(-1, 3),
             "visible_fraction": np.array(fractions),
         }
-        return LabelledImage("", rendered.image, tuple(labels), tuple(boxes), tuple(ignored_boxes), truth)
+        return LabelledImage("", rendered.image, labels, boxes, tuple(ignored_boxes), truth)
 
 
 def _measure_contrast(image: Image, mask: NDArray[np.bool_]) -> float:

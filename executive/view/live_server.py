@@ -272,12 +272,6 @@ class Server:
                 with contextlib.suppress(ConnectionError):
                     await browser.send_str(text)
 
-    async def send_periodically(self) -> None:
-        """Send the changes of the page once per `MESSAGE_PERIOD`, until the task is cancelled."""
-        while True:
-            await asyncio.sleep(MESSAGE_PERIOD)
-            await self.send_changes()
-
     async def close(self) -> None:
         """Send the last changes, and close all connections."""
         await self.send_changes()
@@ -399,10 +393,11 @@ async def _serve(
     runner = web.AppRunner(server.app, access_log=None)
     await runner.setup()
     await web.SockSite(runner, listener).start()
-    sender = asyncio.create_task(server.send_periodically())
     threading.Thread(target=read_batches, daemon=True).start()
-    await input_ended.wait()
-    sender.cancel()
+    while not input_ended.is_set():
+        await server.send_changes()
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(input_ended.wait(), MESSAGE_PERIOD)
     await server.close()
 
 
