@@ -153,7 +153,6 @@ class LivePage:
         self._queue: queue.SimpleQueue[tuple[str, int] | Message | None] = queue.SimpleQueue()
         self._run: Run | None = None
         self._visuals: Visuals | None = None
-        self._has_server_ended = False
         self._browser_count = 0
         self._next_pose_time = 0.0
         self._pose_period = POSE_PERIOD
@@ -248,7 +247,7 @@ class LivePage:
 
     def _enqueue(self, message: Message) -> None:
         """Queue a message for the server, unless the server has ended."""
-        if not self._has_server_ended:
+        if self._server.poll() is None:
             self._queue.put(message)
 
     @contextlib.contextmanager
@@ -273,7 +272,6 @@ class LivePage:
                 pipe.flush()
                 if not is_last_batch:
                     time.sleep(BATCH_PERIOD)
-        self._has_server_ended = True
 
     def _read_commands(self) -> None:
         """Run the commands that the server writes to stdout, until the server ends."""
@@ -282,7 +280,6 @@ class LivePage:
             with self._catch_errors():
                 self._run_command(PageCommand(**json.loads(line)))
         self._browser_count = 0
-        self._has_server_ended = True
 
     def _run_command(self, command: PageCommand) -> None:
         """Run a command of a browser; most command names are the names of methods of `RunControl`."""
