@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 import click
 
-from executive.cli.options import cell_option, check_usage, json_option, mission_argument, overrides_option
-from executive.cli.streams import keep_stdout_clean, print_json, print_result
+from executive.cli import shared
 from executive.errors import ExitCode, InputError
 
 if TYPE_CHECKING:
@@ -33,16 +32,16 @@ Declaration = Mapping[str, Any]
 
 @click.command(name="check")
 @click.argument("missions", metavar="MISSION...", nargs=-1, required=True)
-@overrides_option
-@cell_option
-@json_option
+@shared.overrides_option
+@shared.cell_option
+@shared.json_option
 def check_command(missions: tuple[str, ...], overrides: dict[str, str], cell: str, as_json: bool) -> ExitCode:
     """Check missions without running them.
 
     Prints the errors and warnings of each MISSION (a file or the name of a shipped mission), and the failures
     that can end its run. Exit code 2 if a mission has errors.
     """
-    with keep_stdout_clean():
+    with shared.keep_stdout_clean():
         # The imports take 0.3 s, for which `--help` must not wait.
         from executive.behaviours import load_skills
         from executive.mission.load import load_mission
@@ -76,7 +75,7 @@ def check_command(missions: tuple[str, ...], overrides: dict[str, str], cell: st
             entries = [{**asdict(finding), "excerpt": finding.shown_excerpt} for finding in listed_findings]
             endings = list(map(asdict, failures))
             reports.append({"mission": mission, "ok": is_valid, "findings": entries, "endings": endings})
-    print_result(reports, "\n".join(texts), as_json=as_json)
+    shared.print_result(reports, "\n".join(texts), as_json=as_json)
     return ExitCode.SUCCESS if all(report["ok"] for report in reports) else ExitCode.INVALID_INPUT
 
 
@@ -96,9 +95,9 @@ def _list_failure_lines(failures: Sequence[UnhandledFailure]) -> Iterator[str]:
 
 
 @click.command(name="tree")
-@mission_argument
-@overrides_option
-@cell_option
+@shared.mission_argument
+@shared.overrides_option
+@shared.cell_option
 @click.option("--ports", is_flag=True, help="Print the inputs (?: possibly unset) and outputs of each skill.")
 @click.option(
     "--reasons", is_flag=True,
@@ -110,7 +109,7 @@ def _list_failure_lines(failures: Sequence[UnhandledFailure]) -> Iterator[str]:
     "--format", "format_name", type=click.Choice(("svg", "json", "btcpp")),
     help="The same as --svg or --json; btcpp: XML for BehaviorTree.CPP 4 and its editor Groot2.",
 )  # fmt: skip
-@json_option
+@shared.json_option
 def tree_command(
     mission: str, overrides: dict[str, str], cell: str, ports: bool, reasons: bool, fold: bool, as_svg: bool,
     format_name: str | None, as_json: bool,
@@ -125,8 +124,8 @@ def tree_command(
     details = list(compress(("--ports", "--reasons"), (ports, reasons)))
     conflict_message = f"{' and '.join(formats)} exclude each other; give one of them"
     redundancy_message = f"{''.join(formats)} always contains ports and reasons; omit {' and '.join(details)}"
-    check_usage((len(formats) > 1, conflict_message), (formats and details, redundancy_message))
-    with keep_stdout_clean():
+    shared.check_usage((len(formats) > 1, conflict_message), (formats and details, redundancy_message))
+    with shared.keep_stdout_clean():
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.behaviours import load_skills
         from executive.events import discard_event
@@ -153,7 +152,7 @@ def tree_command(
                 output = format_btcpp(loaded.mission, loaded.skills)
             case _:
                 output = draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
-    print_result(output, output, as_json=as_json)
+    shared.print_result(output, output, as_json=as_json)
 
 
 @click.command(name="schema")
@@ -170,7 +169,7 @@ def schema_command(cell: bool, arm: bool, library: bool, journal: bool) -> None:
     """
     if cell + arm + library + journal > 1:
         raise click.UsageError("--cell, --arm, --library and --journal exclude each other; give one of them")
-    with keep_stdout_clean():
+    with shared.keep_stdout_clean():
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.behaviours import load_skills
         from executive.mission import schema
@@ -186,20 +185,20 @@ def schema_command(cell: bool, arm: bool, library: bool, journal: bool) -> None:
         else:
             make_schema = schema.make_library_schema if library else schema.make_mission_schema
             content = make_schema(load_skills(), load_control_nodes())
-    print_json(content)
+    shared.print_json(content)
 
 
 @click.command(name="skills")
 @click.argument("name", required=False)
 @click.option("--conform", is_flag=True, help="Check that NAME, or every skill, conforms to the skill rules.")
-@json_option
+@shared.json_option
 def skills_command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
     """List the installed skills, or describe one skill.
 
     With NAME, prints all ports, params and failure reasons of this skill. Exit code 1 if a check of --conform
     fails or cannot be run.
     """
-    with keep_stdout_clean():
+    with shared.keep_stdout_clean():
         # The imports take 0.2 s, for which `--help` must not wait.
         from executive.behaviours import load_skills
         from executive.text.findings import suggest_choice
@@ -213,20 +212,20 @@ def skills_command(name: str | None, conform: bool, as_json: bool) -> ExitCode:
         return ExitCode.SUCCESS if _check_conformance(skills, as_json) else ExitCode.FAILURE
     declarations = [collect_declarations(key, skill) for key, skill in skills.items()]
     text = "\n".join(map(_describe_skill if name else _summarize_skill, declarations))
-    print_result(declarations if name is None else declarations[0], text, as_json=as_json)
+    shared.print_result(declarations if name is None else declarations[0], text, as_json=as_json)
     return ExitCode.SUCCESS
 
 
 def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
     """Check skills, print the result of each check, and return True if all checks passed."""
-    with keep_stdout_clean():
+    with shared.keep_stdout_clean():
         # Only this check needs the work cells, whose import takes half a second.
         from executive.testing.conformance import list_conformance_checks
 
     verdicts: list[dict[str, Any]] = []
     for name, skill in skills.items():
         for check in list_conformance_checks(skill, name=name):
-            with keep_stdout_clean():
+            with shared.keep_stdout_clean():
                 problems = check.find_problems()
             status = "failed" if problems else "ok"
             rule = check.rule.__name__
@@ -238,7 +237,7 @@ def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool
                 click.echo(": ".join([f"{status:7}  {name}.{rule}", *problems[:1]]))
     failed_count = sum(verdict["status"] != "ok" for verdict in verdicts)
     if as_json:
-        print_json(verdicts)
+        shared.print_json(verdicts)
     else:
         skills_text = f"{len(skills)} skill{'' if len(skills) == 1 else 's'}"
         counts = f"{len(verdicts) - failed_count} ok" + (f", {failed_count} failed" if failed_count else "")

@@ -15,7 +15,7 @@ from typing import Any
 
 import click
 
-from executive.cli.streams import use_tolerant_streams
+from executive.cli.shared import use_tolerant_streams
 from executive.errors import ExecutiveError, ExitCode, shorten_quotations
 from executive.run.run_control import TERMINATION_SIGNALS, handle_signals
 

@@ -18,8 +18,7 @@ from typing import NamedTuple
 
 import click
 
-from executive.cli.options import json_option
-from executive.cli.streams import keep_stdout_clean, print_result
+from executive.cli import shared
 from executive.errors import ExitCode, InputError, explain_os_errors
 
 TEMPLATE = Path(__file__).parent / "template"
@@ -53,17 +52,17 @@ class CheckResult(NamedTuple):
 
 
 @click.command(name="doctor")
-@json_option
+@shared.json_option
 def doctor_command(as_json: bool) -> ExitCode:
     """Check this installation.
 
     Checks Python, display, key of Roboflow, packages, plugins and simulator. Exit code 1 if a problem
     prevents runs. A note concerns an optional feature.
     """
-    with keep_stdout_clean():
+    with shared.keep_stdout_clean():
         results = list(run_checks())
     lines = [f"{status:7}  {subject:9}  {message}" for status, subject, message in results]
-    print_result([result._asdict() for result in results], "\n".join(lines), as_json=as_json)
+    shared.print_result([result._asdict() for result in results], "\n".join(lines), as_json=as_json)
     return ExitCode.FAILURE if any(result.status == "problem" for result in results) else ExitCode.SUCCESS
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from executive.campaign.evaluation import list_metrics
-from executive.cli.streams import print_report
+from executive.cli.shared import print_report
 from executive.training.metrics import (
     ClassMetrics,
     CountedRate,
