@@ -15,8 +15,8 @@ from executive.behaviours import load_skills
 from executive.cell.arm_config import ArmFile
 from executive.cell.config import CellConfig
 from executive.cell.device_config import Section
+from executive.cli.check import Declaration, collect_declarations
 from executive.cli.main import main as command_line
-from executive.cli.skills import Declaration, collect_declarations
 from executive.drivers.sim.scene import SceneConfig
 from executive.mission.grammar import LibraryKeys, MissionKeys, NodeKeys, ParamKeys, SubtreeKeys, UseKeys
 from executive.mission.schema import Schema, make_key_schema, make_schema, make_type_schema

@@ -1,4 +1,4 @@
-"""Evaluation of detectors on labelled images, rendered or from a dataset."""
+"""Evaluation of detectors on labelled images, rendered or from a dataset; its text, tables and file."""
 
 from __future__ import annotations
 
@@ -6,8 +6,12 @@ import contextlib
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
+
+from rich.box import SIMPLE_HEAD
+from rich.console import RenderableType
+from rich.table import Column, Table
 
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.drivers.sim.scene import find_max_object_count, load_scene
@@ -164,45 +168,39 @@ def measure_detector(
     if settings.dataset is not None:
         known_classes = classes or find_detectable_labels(detector.configs, detector.base_folder)[name] or ()
         settings.dataset.match_classes(known_classes, f"detector {name}")
-    with _open_images(detector.cell, settings, progress) as samples:
-        evaluated_detector = EvaluatedDetector(
-            detector.configs, name, base=detector.base_folder, camera=camera, view=settings.view,
-            classes=classes,
+    images: Images | None = settings.dataset
+    if images is None:
+        assert detector.cell is not None
+        images = _render_images(detector.cell, settings, progress)
+    evaluated_detector = EvaluatedDetector(
+        detector.configs, name, base=detector.base_folder, camera=camera, view=settings.view, classes=classes
+    )
+    with contextlib.closing(evaluated_detector), progress(f"running {name}") as update:
+        return evaluate.evaluate(
+            evaluated_detector, _iterate_with_progress(images, update), mistakes=mistakes,
+            localizer=localizer, cell=cell_of_images, threshold=settings.threshold,
         )  # fmt: skip
-        with contextlib.closing(evaluated_detector), progress(f"running {name}") as update:
-            return evaluate.evaluate(
-                evaluated_detector, _iterate_with_progress(samples, update), mistakes=mistakes,
-                localizer=localizer, cell=cell_of_images, threshold=settings.threshold,
-            )  # fmt: skip
 
 
-@contextlib.contextmanager
-def _open_images(
-    cell: CellConfig | None, settings: ImageSettings, progress: OpenProgressBar
-) -> Iterator[Images]:
-    """Open the images of the dataset, or render scenes of the cell; a context manager."""
-    if settings.dataset is not None:
-        yield settings.dataset
-        return
-    assert cell is not None
-    with tempfile.TemporaryDirectory() as folder:
-        images: Images
-        with progress(f"rendering {cell.cell}") as update:
-            if settings.is_randomized:
+def _render_images(
+    cell: CellConfig, settings: ImageSettings, progress: OpenProgressBar
+) -> list[LabelledImage]:
+    """Return rendered scenes of the cell."""
+    with progress(f"rendering {cell.cell}") as update:
+        if settings.is_randomized:
+            with tempfile.TemporaryDirectory() as folder:
                 generate_dataset(
                     [cell], Path(folder), image_count=settings.image_count, seed=settings.seed,
                     layout="coco", worker_count=settings.workers, valid_fraction=1.0, progress=update,
                 )  # fmt: skip
-                images = LabelledDataset(Path(folder))
-            else:
-                object_counts = (0, find_max_object_count(cell, MAX_OBJECT_COUNT))
-                table = cell.table.model_copy(update={"objects": object_counts})
-                images = render_run_frames(
-                    cell.model_copy(update={"table": table}), image_count=settings.image_count,
-                    seed=settings.seed, worker_count=settings.workers, progress=update,
-                    scene=load_scene(settings.scene, cell),
-                )  # fmt: skip
-        yield images
+                return list(LabelledDataset(Path(folder)))
+        object_counts = (0, find_max_object_count(cell, MAX_OBJECT_COUNT))
+        table = cell.table.model_copy(update={"objects": object_counts})
+        return render_run_frames(
+            cell.model_copy(update={"table": table}), image_count=settings.image_count,
+            seed=settings.seed, worker_count=settings.workers, progress=update,
+            scene=load_scene(settings.scene, cell),
+        )  # fmt: skip
 
 
 def _iterate_with_progress(images: Images, update: Callable[[int, int], None]) -> Iterator[LabelledImage]:
@@ -274,3 +272,66 @@ def store_evaluation(
         old_measurements = envelope.read_measurements(path)
         write_atomically(path, envelope.format_measurements(old_measurements, new_measurement))
     return path
+
+
+def list_metrics(source: str, detector: str, evaluation: Evaluation) -> Iterator[RenderableType]:
+    """Yield lines and tables with the accuracy of the detector `detector`, measured on `source`."""
+    yield f"{source}, detector {detector}"
+    yield f"  {evaluation.objects} objects on {evaluation.images} images, threshold {evaluation.threshold:g}"
+    if evaluation.unavailable:
+        fraction = evaluation.unavailable / evaluation.images
+        images_text = f"{evaluation.unavailable} of {evaluation.images} images ({fraction:.1%})"
+        yield f"  unavailable for {images_text}, last reason: {evaluation.why}"
+    if not evaluation.answered_by:
+        return
+    if set(evaluation.answered_by) != {detector}:
+        counts = (f"{name} ({count})" for name, count in evaluation.answered_by.items())
+        yield f"  answered by {', '.join(counts)}"
+    yield (
+        f"  precision {evaluation.precision:.2%}, recall {evaluation.recall:.2%}, "
+        f"mAP50 {evaluation.map50:.4f}, mAP50-95 {evaluation.map50_95:.4f}"
+    )
+    if evaluation.by_class:
+        table = _make_table("class", "objects", "precision", "recall")
+        for label, metrics in evaluation.by_class.items():
+            table.add_row(label, f"{metrics.objects}", f"{metrics.precision:.2%}", f"{metrics.recall:.2%}")
+        yield table
+        yield _make_confusion_table(evaluation)
+    yield _make_error_table(evaluation)
+    if evaluation.reliability is not None:
+        yield "  upper 95 % confidence bounds of the error rates, for the ledger:"
+        yield "  " + ", ".join(f"{name} {value:g}" for name, value in evaluation.reliability.rates)
+        yield ""
+
+
+def _make_confusion_table(evaluation: Evaluation) -> Table:
+    """Return a table with the number of objects by true class (rows) and detected class (columns)."""
+    table = _make_table("true \\ detected", *next(iter(evaluation.confusion.values())))
+    for true_class, counts in evaluation.confusion.items():
+        # True negatives are not counted in object detection.
+        cells = (
+            "" if true_class == detected_class == NO_OBJECT else str(count)
+            for detected_class, count in counts.items()
+        )
+        table.add_row(true_class, *cells)
+    return table
+
+
+def _make_error_table(evaluation: Evaluation) -> Table:
+    """Return a table with the median, percentiles and maximum of the position errors and the latency."""
+    table = _make_table("", "median", "95 %", "99 %", "worst")
+    for quantity, distribution in (
+        ("box centre error [px]", evaluation.centre),
+        ("box centre error at the object's height [mm]", evaluation.position),
+        ("localization error [mm]", evaluation.localized),
+        ("time from frame to detections [ms]", evaluation.latency),
+    ):
+        if distribution is not None:
+            table.add_row(quantity, *(f"{value:.2f}" for value in astuple(distribution)))
+    return table
+
+
+def _make_table(row_heading: str, *headings: str) -> Table:
+    """Return an empty table with a left-aligned column for the names of rows, and right-aligned columns."""
+    columns = (Column(heading, justify="right") for heading in headings)
+    return Table(row_heading, *columns, box=SIMPLE_HEAD, padding=(0, 1))

@@ -64,22 +64,21 @@ def _complete_settings(settings: SweepSettings) -> SweepSettings:
     weights.
     """
     skills = load_skills()
-    missions = []
+    inputs: list[object] = []
     for variant in settings.variants:
         overrides = {**settings.overrides, **variant}
         loaded = load_mission(settings.mission, skills, overrides, load_checker, settings.replacing_cell)
-        check_driver_options(loaded.cell_config.kind, settings.driver_options)
-        load_scene(settings.scene, loaded.cell_config)
-        missions.append(loaded)
-    inputs: list[object] = [] if settings.scene is None else [read_source(settings.scene).text]
-    for loaded in missions:
         cell = loaded.cell_config
+        check_driver_options(cell.kind, settings.driver_options)
+        load_scene(settings.scene, cell)
         names = [] if cell.kind == FAKE_KIND else [*cell.detectors]
         weights = [compute_fingerprint(cell, name, loaded.cell_path.parent)["weights"] for name in names]
         inputs += [loaded.text, dict(loaded.libraries), cell.model_dump(mode="json"), weights]
+    if settings.scene is not None:
+        inputs.insert(0, read_source(settings.scene).text)
     inputs_hash = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
-    name = missions[0].mission.name
-    return replace(settings, mission_name=name, cell=str(missions[0].cell_path), inputs_hash=inputs_hash)
+    name = loaded.mission.name
+    return replace(settings, mission_name=name, cell=str(loaded.cell_path), inputs_hash=inputs_hash)
 
 
 def create_sweep(settings: SweepSettings, runs_folder: Path) -> ResultsDatabase:

@@ -27,9 +27,9 @@ from executive.campaign.sweep_summary import (
 from executive.errors import InputError, explain_os_errors
 from executive.record.result import Audit
 from executive.record.run_directory import RunDirectory, write_atomically
+from executive.view.drawing import render_template
 from executive.view.report import try_write_report
 from executive.view.terminal import describe_end
-from executive.view.text import render_template
 
 MAX_LISTED_SEEDS = 10
 """Maximum number of seeds that are listed for a group of failures."""

@@ -15,7 +15,7 @@ from typing import Any
 
 import click
 
-from executive.cli.streams import use_tolerant_streams
+from executive.cli.shared import use_tolerant_streams
 from executive.errors import ExecutiveError, ExitCode, shorten_quotations
 from executive.run.operator import TERMINATION_SIGNALS, handle_signals
 
@@ -23,7 +23,7 @@ COMMANDS: Mapping[str, str] = {
     "run": "run",
     "check": "check",
     "tree": "check",
-    "skills": "skills",
+    "skills": "check",
     "schema": "check",
     "dataset": "training",
     "train": "training",
@@ -33,8 +33,8 @@ COMMANDS: Mapping[str, str] = {
     "faults": "sweep",
     "replay": "run",
     "report": "run",
-    "doctor": "doctor",
-    "init": "init",
+    "doctor": "setup",
+    "init": "setup",
 }
 """Module in `executive.cli` of each command, in the order of `--help`."""
 
@@ -70,18 +70,14 @@ class CommandGroup(click.Group):
             ctx.fail(f'there is no command "{args[0]}"; did you mean "{suggestions[0]}"?')
         return super().resolve_command(ctx, args)
 
-    def main(
-        self, args: Sequence[str] | None = None, prog_name: str | None = None,
-        complete_var: str | None = None, standalone_mode: bool = True, **extra: Any,
-    ) -> Any:  # fmt: skip
+    def main(self, args: Sequence[str] | None = None, *_: Any, **options: Any) -> Any:
         """Run a command and exit with its exit code; tracebacks are printed only with `--debug`."""
-        del standalone_mode  # This group always runs as a main program.
         args = list(sys.argv[1:] if args is None else args)
         gc.set_threshold(START_THRESHOLD)
         with use_tolerant_streams():
             try:
                 with handle_signals(TERMINATION_SIGNALS, signal.default_int_handler):
-                    exit_code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+                    exit_code = super().main(args, **{**options, "standalone_mode": False})
             except (Exception, KeyboardInterrupt) as error:
                 exit_code = _show_error(error, debug="--debug" in args)
         sys.exit(exit_code if isinstance(exit_code, int) else 0)

@@ -9,22 +9,21 @@ from pathlib import Path
 
 import click
 
-from executive.cli import options
-from executive.cli.streams import keep_stdout_clean, open_unescaped_stderr, print_json, print_result
+from executive.cli import shared
 from executive.errors import ExitCode
 
 
 @click.command(name="run")
 @click.argument("mission", metavar="MISSION", required=False)
 @click.option("--resume", metavar="RUN", help="Resume an interrupted run: a run directory or `latest`.")
-@options.seed_option
-@options.overrides_option
-@options.cell_option
-@options.scene_option
-@options.video_option
-@options.force_option
-@options.runs_option
-@options.json_option
+@shared.seed_option
+@shared.overrides_option
+@shared.cell_option
+@shared.scene_option
+@shared.video_option
+@shared.force_option
+@shared.runs_option
+@shared.json_option
 @click.option("--quiet", is_flag=True, help="Print only the cause if the run does not succeed.")
 @click.option("--view", "has_page", is_flag=True, help="Show the run on a web page, and print its address.")
 @click.option("--paused", is_flag=True, help="Wait for the operator before the first control step.")
@@ -44,20 +43,20 @@ def run_command(
 
     MISSION is a file or the name of a shipped mission.
     """
-    has_mission_options = options.is_any_given(
+    has_mission_options = shared.is_any_given(
         ctx, "mission", "seed", "overrides", "requests", "cell", "scene"
     )
     has_keyboard = sys.stdin is not None and sys.stdin.isatty()
     settings_text = "mission, seed, params, requests, cell and scene from the run"
     pauses_forever = paused and not has_page and (quiet or not has_keyboard)
-    options.check_usage(
+    shared.check_usage(
         (mission is None and resume is None, "give a MISSION, or a run with --resume RUN"),
         (resume is not None and has_mission_options, f"--resume takes {settings_text}; omit them"),
         (pauses_forever, "--paused needs --view or a keyboard in a terminal to continue the run"),
         # The simulator would end the process if it could not open its window.
         (gui and not os.environ.get("DISPLAY"), "--gui needs a display, but DISPLAY is not set; omit --gui"),
     )
-    with keep_stdout_clean():
+    with shared.keep_stdout_clean():
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from rich.console import Console
 
@@ -74,7 +73,7 @@ def run_command(
         from executive.view import terminal
         from executive.view.report import try_write_report
 
-        console = Console(file=open_unescaped_stderr())
+        console = Console(file=shared.open_unescaped_stderr())
         is_redrawn = sys.stderr.isatty() and console.is_terminal and not console.is_dumb_terminal
         terminal_view: terminal.TerminalView | terminal.LineView | None = None
         if is_redrawn and not quiet:
@@ -105,7 +104,7 @@ def run_command(
                 assert resume is not None
                 path = find_run(resume, runs_folder)
                 if video is not None:
-                    options.check_video(video, read_cell(path).kind, force=force)
+                    shared.check_video(video, read_cell(path).kind, force=force)
                 result = resume_run(path, load_skills(), run_options, record)
                 events = read_journal(path / "journal.jsonl")
                 start_event = find_run_start(events, path, "run the mission again")
@@ -116,7 +115,7 @@ def run_command(
                 for warning in loaded_mission.warnings if views else ():
                     click.echo(str(warning), err=True)
                 if video is not None:
-                    options.check_video(video, loaded_mission.cell_config.kind, force=force)
+                    shared.check_video(video, loaded_mission.cell_config.kind, force=force)
                 result = record_run(loaded_mission, run_options, runs_folder, record)
                 repeat_arguments = (mission, seed, overrides)
             # The command that repeats the run also contains requests that the operator made during the run.
@@ -141,9 +140,9 @@ def run_command(
             end_description = terminal.describe_end(result.status, result.reason, result.node, result.message)
             click.echo("\n".join(filter(None, (result.disagreement, end_description))), err=True)
     if as_json:
-        print_json(to_json(result))
+        shared.print_json(to_json(result))
     if video is not None:
-        with keep_stdout_clean():
+        with shared.keep_stdout_clean():
             # The import takes 0.1 s, and only a video needs it.
             from executive.view.video import write_video
 
@@ -155,12 +154,12 @@ def run_command(
 @click.command(name="replay")
 @click.argument("run", metavar="RUN")
 @click.option(
-    "--mission", "mission_file", type=options.FILE, help="Mission file instead of the recorded mission."
+    "--mission", "mission_file", type=shared.FILE, help="Mission file instead of the recorded mission."
 )
-@options.video_option
-@options.force_option
-@options.runs_option
-@options.json_option
+@shared.video_option
+@shared.force_option
+@shared.runs_option
+@shared.json_option
 def replay_command(
     run: str, mission_file: Path | None, video: Path | None, force: bool, runs_folder: Path, as_json: bool
 ) -> ExitCode:
@@ -171,7 +170,7 @@ def replay_command(
     from the record; the first difference is printed. With --video, the world of the run is simulated again,
     also after a halt or an interruption.
     """
-    with keep_stdout_clean():
+    with shared.keep_stdout_clean():
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.behaviours import load_skills
         from executive.record.journal import read_journal
@@ -183,31 +182,31 @@ def replay_command(
             # The import takes 0.1 s, and only a video needs it.
             from executive.view.video import write_video
 
-            options.check_video(video, read_cell(path).kind, force=force)
+            shared.check_video(video, read_cell(path).kind, force=force)
             write_video(path, video)
             click.echo(f"video: {video}", err=True)
         result = replay_run(path, read_journal(path / "journal.jsonl"), load_skills(), mission_file)
         comparison = ", all as recorded" if result.is_equal else f" as recorded, then {result.difference}"
         click.echo(f"{result.decisions} decisions{comparison} ({path})", err=True)
     if as_json:
-        print_json({"run": str(path), "same": result.is_equal, **result.as_json()})
+        shared.print_json({"run": str(path), "same": result.is_equal, **result.as_json()})
     return ExitCode.SUCCESS if result.is_equal else ExitCode.FAILURE
 
 
 @click.command(name="report")
 @click.argument("run", metavar="RUN")
-@options.runs_option
-@options.json_option
+@shared.runs_option
+@shared.json_option
 def report_command(run: str, runs_folder: Path, as_json: bool) -> None:
     """Write the report of a recorded run.
 
     RUN is a run directory or `latest`. Prints the path of the report. Every run writes its report when it
     ends; this command writes the report again, or for the first time if the run was killed.
     """
-    with keep_stdout_clean():
+    with shared.keep_stdout_clean():
         # The imports take half a second, for which `--help` must not wait.
         from executive.record.run_directory import find_run
         from executive.view.report import write_report
 
         file = write_report(find_run(run, runs_folder))
-    print_result({"report": str(file), "bytes": file.stat().st_size}, str(file), as_json=as_json)
+    shared.print_result({"report": str(file), "bytes": file.stat().st_size}, str(file), as_json=as_json)

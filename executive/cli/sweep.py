@@ -9,24 +9,23 @@ from typing import Any
 
 import click
 
-from executive.cli import options
-from executive.cli.streams import keep_stdout_clean, print_json, print_result
+from executive.cli import shared
 from executive.errors import ExitCode
 
 
 @click.command(name="sweep")
 @click.argument("mission", metavar="MISSION", required=False)
-@options.variations_option
+@shared.variations_option
 @click.option(
-    "--resume", type=options.PATH, metavar="SWEEP",
+    "--resume", type=shared.PATH, metavar="SWEEP",
     help="Execute the missing runs of an interrupted sweep, given by its folder or its file results.sqlite.",
 )  # fmt: skip
-@options.add_sweep_options
+@shared.add_sweep_options
 @click.option(
     "--require", metavar="EXPR",
     help='Exit with code 1 if the runs do not meet EXPR, such as "success>=0.99 and p95(robot_time_s)<20".',
 )  # fmt: skip
-@click.option("--junit", type=options.FILE, help="Write a report in the JUnit XML format to this file.")
+@click.option("--junit", type=shared.FILE, help="Write a report in the JUnit XML format to this file.")
 @click.pass_context
 def sweep_command(
     ctx: click.Context, mission: str | None, seeds: range | None, variations: dict[str, tuple[str, ...]],
@@ -42,20 +41,19 @@ def sweep_command(
     quits immediately.
     """
     names = ("mission", "seeds", "variations", "overrides", "save_images", "cell", "scene")
-    has_settings = resume is not None and options.is_any_given(ctx, *names)
+    has_settings = resume is not None and shared.is_any_given(ctx, *names)
     lacks_input = resume is None and (mission is None or seeds is None)
-    options.check_usage(
+    shared.check_usage(
         (lacks_input, "give a MISSION and --seeds, or --resume SWEEP"),
         (has_settings, "--resume takes mission, seeds and settings from the sweep; omit them"),
     )
-    options.check_disjoint(overrides, "--vary", variations)
-    with keep_stdout_clean():
+    shared.check_disjoint(overrides, "--vary", variations)
+    with shared.keep_stdout_clean():
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.campaign import sweep_reports
         from executive.campaign.jobs import JobOptions
         from executive.campaign.sweep import create_sweep, make_settings, open_sweep, read_results, run_sweep
         from executive.cell.json_values import to_json
-        from executive.cli.progress import print_halt, print_report, show_progress
 
         conditions = sweep_reports.parse_requirement(require) if require else ()
         if resume is not None:
@@ -67,10 +65,10 @@ def sweep_command(
             database = create_sweep(settings, runs_folder)
         with closing(database):
             click.echo(f"results: {database.path}", err=True)
-            with show_progress(database.settings.mission) as progress:
-                run_sweep(database, JobOptions(workers, progress, print_halt), cluster)
+            with shared.show_progress(database.settings.mission) as progress:
+                run_sweep(database, JobOptions(workers, progress, shared.print_halt), cluster)
             results = read_results(database)
-        print_report(sweep_reports.render_summary(results))
+        shared.print_report(sweep_reports.render_summary(results))
         page = sweep_reports.write_page(database.path.parent, [results])
         click.echo(f"page: {page}", err=True)
         if junit is not None:
@@ -79,7 +77,7 @@ def sweep_command(
         for message in unmet_conditions:
             click.echo(message, err=True)
     if as_json:
-        print_json(to_json({
+        shared.print_json(to_json({
             "settings": results.settings, "results": str(database.path), "page": str(page),
             "planned_run_count": results.planned_run_count, "is_incomplete": results.is_incomplete,
             "variants": results.summaries, "unmet_conditions": unmet_conditions, "runs": results.runs,
@@ -89,15 +87,15 @@ def sweep_command(
 
 @click.command(name="compare")
 @click.argument("missions", metavar="A [B]", nargs=-1)
-@options.make_overrides_option("--set-a", "overrides_a", help="Like --set, but only for A; repeatable.")
-@options.make_overrides_option("--set-b", "overrides_b", help="Like --set, but only for B; repeatable.")
+@shared.make_overrides_option("--set-a", "overrides_a", help="Like --set, but only for A; repeatable.")
+@shared.make_overrides_option("--set-b", "overrides_b", help="Like --set, but only for B; repeatable.")
 @click.option("--cell-a", default="", metavar="CELL", help="Like --cell, but only for A.")
 @click.option("--cell-b", default="", metavar="CELL", help="Like --cell, but only for B.")
 @click.option(
-    "--resume", type=options.FOLDER, metavar="FOLDER",
+    "--resume", type=shared.FOLDER, metavar="FOLDER",
     help="Execute the missing runs of the interrupted comparison in this folder.",
 )  # fmt: skip
-@options.add_sweep_options
+@shared.add_sweep_options
 @click.pass_context
 def compare_command(
     ctx: click.Context, missions: tuple[str, ...], seeds: range | None, overrides_a: dict[str, str],
@@ -116,49 +114,47 @@ def compare_command(
         "missions", "seeds", "overrides", "overrides_a", "overrides_b", "cell", "cell_a", "cell_b",
         "save_images", "scene",
     )  # fmt: skip
-    has_settings = resume is not None and options.is_any_given(ctx, *names)
+    has_settings = resume is not None and shared.is_any_given(ctx, *names)
     lacks_input = resume is None and (len(missions) not in (1, 2) or seeds is None)
-    options.check_usage(
+    shared.check_usage(
         (lacks_input, "give one or two missions and --seeds, or --resume FOLDER"),
         (has_settings, "--resume takes missions, seeds and settings from the comparison; omit them"),
         (cell and (cell_a or cell_b), "--cell is for A and B; omit it, or omit --cell-a and --cell-b"),
     )
-    options.check_disjoint(overrides, "--set-a or --set-b", {**overrides_a, **overrides_b})
-    with keep_stdout_clean():
+    shared.check_disjoint(overrides, "--set-a or --set-b", {**overrides_a, **overrides_b})
+    with shared.keep_stdout_clean():
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.campaign import sweep, sweep_reports
         from executive.campaign.jobs import JobOptions
         from executive.campaign.sweep_summary import SweepResults, compute_differences, pair_runs
         from executive.cell.json_values import to_json
-        from executive.cli.progress import print_halt, print_report, show_progress
 
         if resume is not None:
             databases = sweep.open_comparison(resume)
         else:
             assert seeds is not None
-            settings_a = sweep.make_settings(
-                missions[0], seeds, {**overrides, **overrides_a}, {}, scene, save_images, cell_a or cell
-            )
-            settings_b = sweep.make_settings(
-                missions[-1], seeds, {**overrides, **overrides_b}, {}, scene, save_images, cell_b or cell
-            )
-            databases = sweep.create_comparison([settings_a, settings_b], runs_folder)
+            sides = ((missions[0], overrides_a, cell_a), (missions[-1], overrides_b, cell_b))
+            settings = [
+                sweep.make_settings(name, seeds, overrides | own, {}, scene, save_images, own_cell or cell)
+                for name, own, own_cell in sides
+            ]
+            databases = sweep.create_comparison(settings, runs_folder)
         results: list[SweepResults] = []
         for side, database in zip("AB", databases, strict=True):
             with closing(database):
                 if not any(result.is_incomplete for result in results):
-                    with show_progress(f"{side}: {database.settings.mission}") as progress:
-                        sweep.run_sweep(database, JobOptions(workers, progress, print_halt), cluster)
+                    with shared.show_progress(f"{side}: {database.settings.mission}") as progress:
+                        sweep.run_sweep(database, JobOptions(workers, progress, shared.print_halt), cluster)
                 results.append(sweep.read_results(database, side))
         pairs = pair_runs(results[0].runs, results[1].runs)
         differences = compute_differences(pairs)
         changed_pairs = [pair for pair in pairs if pair.is_changed]
         sweep_reports.write_missing_reports(changed_pairs)
         page = sweep_reports.write_page(databases[0].path.parents[1], results, differences, changed_pairs)
-        print_report(sweep_reports.render_differences(differences, changed_pairs, len(pairs)))
+        shared.print_report(sweep_reports.render_differences(differences, changed_pairs, len(pairs)))
         click.echo(f"page: {page}", err=True)
     if as_json:
-        print_json(to_json({
+        shared.print_json(to_json({
             "settings": [result.settings for result in results],
             "results": [str(database.path) for database in databases], "page": str(page),
             "pair_count": len(pairs), "differences": differences, "changed_pairs": changed_pairs,
@@ -175,20 +171,20 @@ def parse_fault_numbers(text: str) -> tuple[int, ...]:
 
 
 @click.command(name="faults")
-@options.mission_argument
-@options.oracle_option
-@click.option("--pairs", type=options.COUNT, help="Inject this number of random pairs of faults.")
+@shared.mission_argument
+@shared.oracle_option
+@click.option("--pairs", type=shared.COUNT, help="Inject this number of random pairs of faults.")
 @click.option(
     "--fault", "fault_numbers", type=parse_fault_numbers, metavar="N[+M]",
     help="Inject only the fault N of --list, or N and M together, and record the run.",
 )  # fmt: skip
 @click.option("--list", "list_only", is_flag=True, help="Print the faults without injecting them.")
-@options.workers_option
-@options.seed_option
-@options.overrides_option
-@options.cell_option
-@options.runs_option
-@options.json_option
+@shared.workers_option
+@shared.seed_option
+@shared.overrides_option
+@shared.cell_option
+@shared.runs_option
+@shared.json_option
 def faults_command(
     mission: str, oracle: bool, pairs: int | None, fault_numbers: tuple[int, ...] | None,
     list_only: bool, workers: int, seed: int, overrides: dict[str, str], cell: str, runs_folder: Path,
@@ -203,16 +199,17 @@ def faults_command(
     does not end correctly, or has a ledger that differs from the world.
     """
     has_conflict = sum((pairs is not None, fault_numbers is not None, list_only)) > 1
-    options.check_usage((has_conflict, "--pairs, --fault and --list exclude each other; give one of them"))
-    with keep_stdout_clean():
+    shared.check_usage((has_conflict, "--pairs, --fault and --list exclude each other; give one of them"))
+    with shared.keep_stdout_clean():
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.campaign import faults as fault_campaign
         from executive.campaign.jobs import JobOptions, load_mission_under_test
-        from executive.cli.progress import print_halt, show_progress
 
         mission_under_test = load_mission_under_test(mission, overrides, oracle, seed, cell)
-        with show_progress("faults", quiet=as_json or list_only or fault_numbers is not None) as progress:
-            campaign = fault_campaign.Campaign(mission_under_test, JobOptions(workers, progress, print_halt))
+        is_quiet = as_json or list_only or fault_numbers is not None
+        with shared.show_progress("faults", quiet=is_quiet) as progress:
+            job_options = JobOptions(workers, progress, shared.print_halt)
+            campaign = fault_campaign.Campaign(mission_under_test, job_options)
             output: Any
             exit_code = 0
             if list_only:
@@ -234,5 +231,5 @@ def faults_command(
                 text = "\n".join(fault_campaign.list_result_lines(campaign))
                 has_problems = any(trial.problems for trial in campaign.trials)
                 exit_code = int(has_problems) if campaign.is_complete else ExitCode.HALTED
-    print_result(output, text, as_json=as_json)
+    shared.print_result(output, text, as_json=as_json)
     return exit_code

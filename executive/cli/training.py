@@ -8,8 +8,7 @@ from typing import Any
 
 import click
 
-from executive.cli import options
-from executive.cli.streams import keep_stdout_clean, print_json
+from executive.cli import shared
 from executive.errors import InputError
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -18,14 +17,14 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 @click.command(name="dataset")
 @click.argument("cells", metavar="CELL...", nargs=-1, required=True)
-@click.option("--out", type=options.FOLDER, required=True, help="Folder of the dataset.")
-@click.option("--images", type=options.COUNT, default=1000, help="Number of images.")
-@options.seed_option
+@click.option("--out", type=shared.FOLDER, required=True, help="Folder of the dataset.")
+@click.option("--images", type=shared.COUNT, default=1000, help="Number of images.")
+@shared.seed_option
 @click.option(
     "--format", "dataset_format", type=click.Choice(["coco", "yolo"]), default="coco",
     help="Format of the dataset: COCO or YOLO, as exported by Roboflow.",
 )  # fmt: skip
-@options.workers_option
+@shared.workers_option
 @click.option("--valid", type=click.FloatRange(0, 1), default=0.1, help="Fraction of images for validation.")
 def dataset_command(
     cells: tuple[str, ...], out: Path, images: int, seed: int, dataset_format: str, workers: int, valid: float
@@ -34,14 +33,13 @@ def dataset_command(
 
     The images show random scenes of each CELL (a cell file or the name of a shipped cell) in turn.
     """
-    with keep_stdout_clean():
+    with shared.keep_stdout_clean():
         # The imports take a second, for which `--help` and wrong options must not wait.
         from executive.campaign.evaluation import load_cells
-        from executive.cli.progress import show_progress
         from executive.training.rendering import generate_dataset
 
         configs = list(load_cells(cells).values())
-        with show_progress("rendering") as progress:
+        with shared.show_progress("rendering") as progress:
             generate_dataset(
                 configs, out, image_count=images, seed=seed, layout=dataset_format, worker_count=workers,
                 valid_fraction=valid, progress=progress,
@@ -51,20 +49,20 @@ def dataset_command(
 
 @click.command(name="train")
 @click.option(
-    "--dataset", type=options.FOLDER, required=True,
+    "--dataset", type=shared.FOLDER, required=True,
     help="COCO or YOLO dataset, from `executive dataset` or an export of an annotation tool.",
 )  # fmt: skip
-@click.option("--out", type=options.FOLDER, required=True, help="Folder for model, checkpoints and metrics.")
+@click.option("--out", type=shared.FOLDER, required=True, help="Folder for model, checkpoints and metrics.")
 @click.option(
-    "--from", "model", type=options.FILE, metavar="MODEL",
+    "--from", "model", type=shared.FILE, metavar="MODEL",
     help="Model file (.onnx or .pth) to fine-tune; by default, training starts from random weights.",
 )  # fmt: skip
 @click.option(
     "--rate", type=click.FloatRange(min=0, min_open=True),
     help="Learning rate; by default 1e-4 if --from is a model for the same classes, else 3e-4.",
 )  # fmt: skip
-@click.option("--epochs", type=options.COUNT, default=20, help="Number of passes over the dataset.")
-@options.seed_option
+@click.option("--epochs", type=shared.COUNT, default=20, help="Number of passes over the dataset.")
+@shared.seed_option
 def train_command(
     dataset: Path, out: Path, model: Path | None, rate: float | None, epochs: int, seed: int
 ) -> None:
@@ -77,15 +75,14 @@ def train_command(
         values = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
         click.echo(f"epoch {epoch} of {epochs}: {values}", err=True)
 
-    with keep_stdout_clean():
+    with shared.keep_stdout_clean():
         # The imports take a second, for which `--help` and wrong options must not wait.
-        from executive.cli.progress import show_progress
         from executive.training.train import load_dataset, train
 
         splits = load_dataset(dataset)
         for images in splits.values():
             click.echo(images.summary, err=True)
-        with show_progress("training") as progress:
+        with shared.show_progress("training") as progress:
             train(
                 splits, out, start_model=model, learning_rate=rate, epochs=epochs, seed=seed,
                 report_epoch=print_epoch, report_batch=progress,
@@ -107,17 +104,17 @@ def train_command(
     "--detector", "detector_name", metavar="NAME",
     help="Name of the detector in --cell; by default the first detector.",
 )  # fmt: skip
-@click.option("--dataset", type=options.FOLDER, help="COCO or YOLO dataset instead of rendered scenes.")
+@click.option("--dataset", type=shared.FOLDER, help="COCO or YOLO dataset instead of rendered scenes.")
 @click.option(
-    "--weights", type=options.FILE, metavar="ONNX",
+    "--weights", type=shared.FILE, metavar="ONNX",
     help="Exported RF-DETR model (ONNX) to evaluate instead of the detector of a cell.",
 )  # fmt: skip
 @click.option(
-    "--labels", type=options.FILE,
+    "--labels", type=shared.FILE,
     help="Class names of --weights, one per line; by default NAME.labels.txt or labels.txt beside NAME.onnx.",
 )  # fmt: skip
-@click.option("--images", type=options.COUNT, default=200, help="Number of scenes to render per cell.")
-@options.seed_option
+@click.option("--images", type=shared.COUNT, default=200, help="Number of scenes to render per cell.")
+@shared.seed_option
 @click.option(
     "--threshold", type=click.FloatRange(0, 1),
     help="Minimum confidence of a detection; by default the threshold of the detector.",
@@ -130,19 +127,19 @@ def train_command(
     "--view", type=click.Choice(["table", "full"]), default="table",
     help="Region of the frame in which objects are detected.",
 )  # fmt: skip
-@options.scene_option
-@options.overrides_option
+@shared.scene_option
+@shared.overrides_option
 @click.option(
-    "--out", type=options.FILE,
+    "--out", type=shared.FILE,
     help="File for the error rates that runs read; by default CELL.measured.json beside the cell file.",
 )  # fmt: skip
-@options.workers_option
+@shared.workers_option
 @click.option(
     "--force", is_flag=True,
     help="Store a measurement with precision or recall below 0.5, or with fewer than 30 objects of a class.",
 )  # fmt: skip
-@click.option("--sheet", type=options.FILE, metavar="FILE.png", help="Image file for the worst mistakes.")
-@options.json_option
+@click.option("--sheet", type=shared.FILE, metavar="FILE.png", help="Image file for the worst mistakes.")
+@shared.json_option
 def evaluate_command(
     cells: tuple[str, ...], detector_name: str | None, dataset: Path | None, weights: Path | None,
     labels: Path | None, images: int, seed: int, threshold: float | None, varied: bool, view: str,
@@ -158,7 +155,7 @@ def evaluate_command(
     """
     unknown_key = next((key for key in overrides if not key.startswith("cell.")), "")
     has_image_suffix = sheet is None or sheet.suffix.lower() in IMAGE_SUFFIXES
-    options.check_usage(
+    shared.check_usage(
         (detector_name and weights, "--detector and --weights exclude each other; give one of them"),
         (detector_name and dataset and not cells, f"--detector {detector_name} needs --cell"),
         (labels and not weights, "--labels needs a model file; name it with --weights"),
@@ -175,14 +172,12 @@ def evaluate_command(
     # Only a measurement under the conditions of a run predicts the error rates in runs.
     has_run_conditions = threshold is None and view == "table" and not (weights or varied or scene)
     is_stored = bool(cells) and has_run_conditions and (out is not None or not overrides)
-    with keep_stdout_clean():
+    with shared.keep_stdout_clean():
         # The imports take a second, for which `--help` and wrong options must not wait.
         from executive.campaign import evaluation
-        from executive.cli.progress import print_report, show_progress
         from executive.training.dataset import save_image
         from executive.training.evaluate import draw_sheet
         from executive.training.samples import LabelledDataset
-        from executive.view.detector_results import list_metrics
 
         worst_mistakes: list[Any] = []
         samples = LabelledDataset(dataset) if dataset else None
@@ -198,8 +193,8 @@ def evaluate_command(
             cell_name = detector.cell.cell if detector.cell else ""
             name = " on ".join(filter(None, (cell_name, str(dataset or ""))))
             start_time = time.monotonic()
-            result = evaluation.measure_detector(detector, settings, worst_mistakes, show_progress)
-            print_report(list_metrics(name, detector.name, result))
+            result = evaluation.measure_detector(detector, settings, worst_mistakes, shared.show_progress)
+            shared.print_report(evaluation.list_metrics(name, detector.name, result))
             kind = detector.configs[detector.name].kind
             results[name] = {"detector": detector.name, "kind": kind, **result.to_dict()}
             if not is_stored or detector.cell is None:
@@ -218,7 +213,7 @@ def evaluate_command(
             click.echo(f"{sheet}: the {len(worst_mistakes)} worst mistakes", err=True)
     if as_json:
         files = {"scene": scene and str(scene), "weights": weights and str(weights)}
-        print_json({"seed": seed, "varied": varied, **files, "measured": results})
+        shared.print_json({"seed": seed, "varied": varied, **files, "measured": results})
     if weaknesses:
         advice = "check the labels, measure more images, or store the measurement with --force"
         raise InputError(f"{'; '.join(weaknesses)}; {advice}")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import as_completed
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -23,7 +22,7 @@ from executive.cell.config import CellConfig
 from executive.cell.devices import TrueObject
 from executive.cell.frame import Box
 from executive.cell.objects import UNKNOWN_LABEL
-from executive.drivers.sim import arrangements
+from executive.drivers.sim import arrangements, models
 from executive.drivers.sim.camera import (
     CELL_LIGHT,
     Image,
@@ -33,25 +32,14 @@ from executive.drivers.sim.camera import (
     get_camera_pose,
     render,
 )
-from executive.drivers.sim.models import (
-    compute_bounding_box,
-    compute_silhouette_area,
-    find_model_errors,
-    load_mesh,
-)
 from executive.drivers.sim.scene import DECLARED_SCENE, SceneConfig, build_world, spawn_objects
 from executive.drivers.sim.world import WOOD_TEXTURE
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, intersect_plane, project
 from executive.physics.model_files import find_arm_model_errors
 from executive.processes import WorkerPool
-from executive.training.dataset import (
-    DatasetEntry,
-    LabelledImage,
-    build_image_path,
-    save_image,
-    write_annotations,
-)
+from executive.training import dataset
+from executive.training.dataset import DatasetEntry, LabelledImage
 
 ResultT = TypeVar("ResultT")
 ReportProgress = Callable[[int, int], None]
@@ -99,12 +87,12 @@ def generate_dataset(
         found = "; ".join(f"{cell.cell} has {', '.join(cell.objects)}" for cell in cells)
         raise InputError(f"the cells of one dataset must have the same classes in the same order; {found}")
     for cell in cells:
-        for key, message in (*find_model_errors(cell), *find_arm_model_errors(cell.arm)):
+        for key, message in (*models.find_model_errors(cell), *find_arm_model_errors(cell.arm)):
             raise InputError(f"{cell.cell}: {'.'.join(map(str, key))}: {message}")
     train_count = image_count - round(image_count * valid_fraction)
     render_block = partial(_render_dataset_images, cells, out, layout, seed, train_count)
     entries = _render_blocks(render_block, image_count, worker_count, progress)
-    write_annotations(out, layout, entries, classes)
+    dataset.write_annotations(out, layout, entries, classes)
 
 
 def render_run_frames(
@@ -128,50 +116,48 @@ def render_run_frames(
 
 
 def _render_blocks(
-    render_block: Callable[[range], dict[int, ResultT]], count: int, workers: int, progress: ReportProgress
+    render_block: Callable[[range], list[ResultT]], count: int, workers: int, progress: ReportProgress
 ) -> list[ResultT]:
     """Return the results of `render_block` for images 0 to `count` - 1, in order, from worker processes."""
-    image_numbers = range(count)
-    results: dict[int, ResultT] = {}
-    blocks = [image_numbers[start : start + BLOCK_SIZE] for start in image_numbers[::BLOCK_SIZE]]
+    numbers = range(count)
+    results: list[ResultT] = []
     with WorkerPool(workers) as pool:
-        for task in as_completed([pool.submit(render_block, block) for block in blocks]):
-            results.update(task.result())
+        for block in pool.map(render_block, [numbers[i : i + BLOCK_SIZE] for i in numbers[::BLOCK_SIZE]]):
+            results += block
             progress(len(results), count)
-    return [results[number] for number in image_numbers]
+    return results
 
 
 def _render_images(
     cells: Sequence[CellConfig], scene: SceneConfig | None, seed: int, image_numbers: range
-) -> dict[int, LabelledImage]:
-    """Return labelled images of random scenes by number; without `scene`, the scenes vary more."""
+) -> list[LabelledImage]:
+    """Return labelled images of random scenes; without `scene`, the scenes vary more."""
     cv2.setNumThreads(1)
-    images = {}
+    images = []
     with contextlib.ExitStack() as stack:
         renderers = [stack.enter_context(contextlib.closing(SceneRenderer(cell, scene))) for cell in cells]
         for number in image_numbers:
             image_seed = int(np.random.SeedSequence([seed, number]).generate_state(1, np.uint64)[0])
-            images[number] = renderers[number % len(cells)].render_image(image_seed, number)
+            images.append(renderers[number % len(cells)].render_image(image_seed, number))
     return images
 
 
 def _render_dataset_images(
     cells: Sequence[CellConfig], out: Path, layout: str, seed: int, train_count: int, image_numbers: range
-) -> dict[int, DatasetEntry]:
-    """Render and save images in a worker process; return their dataset entries by image number."""
-    entries = {}
-    for number, image in _render_images(cells, None, seed, image_numbers).items():
+) -> list[DatasetEntry]:
+    """Render and save images in a worker process; return their dataset entries."""
+    entries = []
+    for number, image in zip(image_numbers, _render_images(cells, None, seed, image_numbers), strict=True):
         split = "train" if number < train_count else "valid"
         file = f"{image.file}.jpg"
-        save_image(build_image_path(out, layout, split, file), image.image)
+        dataset.save_image(dataset.build_image_path(out, layout, split, file), image.image)
         # The ground truth for evaluations is stored as JSON.
         truth = {**image.truth, "matrix": image.truth["matrix"].tolist()}
         for name, digits in (("positions", 6), ("centres", 6), ("visible_fraction", 4)):
             truth[name] = truth[name].round(digits).tolist()
         size = (IMAGE_SIZE, IMAGE_SIZE)
-        entries[number] = DatasetEntry(
-            split, file, size, image.labels, image.boxes, image.ignored_boxes, truth
-        )
+        entry = DatasetEntry(split, file, size, image.labels, image.boxes, image.ignored_boxes, truth)
+        entries.append(entry)
     return entries
 
 
@@ -317,51 +303,47 @@ class SceneRenderer:
             origin: Position in the camera image at which the boxes have the coordinates (0, 0) [pixel].
             scale: Factor from pixels of the camera image to pixels of the boxes.
         """
-        labels = []
-        boxes: list[Box] = []
+        labelled_objects = []
         ignored_boxes: list[Box] = []
-        fractions = []
-        positions = []
-        centres = []
         heavily_occluded_count = 0
         for body, scene_object in objects.items():
             mask = rendered.segmentation == body
             if scene_object.label == UNKNOWN_LABEL or not mask.any():
                 continue
-            mesh = load_mesh(arrangements.get_model(scene_object))
+            mesh = models.load_mesh(arrangements.get_model(scene_object))
             vertices = scene_object.X_WO.apply(mesh.vertices)
             pixels = project(rendered.matrix, rendered.X_WC, vertices)
-            fraction = min(1.0, float(mask.sum()) / max(compute_silhouette_area(mesh, pixels), 1.0))
+            fraction = min(1.0, float(mask.sum()) / max(models.compute_silhouette_area(mesh, pixels), 1.0))
             if fraction < MIN_VISIBLE_FRACTION:
                 continue
-            corners = np.array(compute_bounding_box(pixels)).reshape(2, 2)
+            corners = np.array(models.compute_bounding_box(pixels)).reshape(2, 2)
             visible_corners = corners.clip(rendered.region[:2], rendered.region[2:])
             left, top, right, bottom = ((visible_corners - origin) * scale).ravel().tolist()
+            box = (left, top, right, bottom)
             is_heavily_occluded = fraction < MIN_LABELLED_VISIBLE_FRACTION
             heavily_occluded_count += is_heavily_occluded
             if is_heavily_occluded or _measure_contrast(rendered.image, mask) < min_contrast:
-                ignored_boxes.append((left, top, right, bottom))
+                ignored_boxes.append(box)
                 continue
             centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-            labels.append(scene_object.label)
-            boxes.append((left, top, right, bottom))
-            fractions.append(fraction)
             pixel = corners.mean(axis=0)
-            positions.append(intersect_plane(rendered.matrix, rendered.X_WC, pixel, float(centre[2])))
-            centres.append(centre)
+            position = intersect_plane(rendered.matrix, rendered.X_WC, pixel, float(centre[2]))
+            labelled_objects.append((scene_object.label, box, fraction, position, centre))
         if heavily_occluded_count > max(1, len(objects) * MAX_HEAVILY_OCCLUDED_FRACTION):
             return None
+        columns = zip(*labelled_objects, strict=True) if labelled_objects else [()] * 5
+        labels, boxes, fractions, positions, centres = columns
         truth = {
             "camera": self._camera_name,
             "part": rendered.region,
             "matrix": rendered.matrix,
             "X_WC": rendered.X_WC.to_rounded_list(9),
-            "labels": tuple(labels),
+            "labels": labels,
             "positions": np.array(positions).reshape(-1, 3),
             "centres": np.array(centres).reshape(-1, 3),
             "visible_fraction": np.array(fractions),
         }
-        return LabelledImage("", rendered.image, tuple(labels), tuple(boxes), tuple(ignored_boxes), truth)
+        return LabelledImage("", rendered.image, labels, boxes, tuple(ignored_boxes), truth)
 
 
 def _measure_contrast(image: Image, mask: NDArray[np.bool_]) -> float:

@@ -16,18 +16,8 @@ from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 from executive.errors import MAX_QUOTATION_LENGTH, InputError
 from executive.geometry import Array
 from executive.text.yaml_files import has_outside_link
-from executive.training.dataset import (
-    MAX_LABEL_FILE_SIZE,
-    DatasetEntry,
-    LabelledImage,
-    find_label_file,
-    find_splits,
-    parse_file,
-    read_class_file,
-    read_image,
-    read_image_header,
-    read_text,
-)
+from executive.training import dataset
+from executive.training.dataset import DatasetEntry, LabelledImage
 
 MAX_COCO_FILE_SIZE = 500_000_000
 """Maximum size of a COCO file [byte]; the largest annotation file of COCO 2017 has 470 MB."""
@@ -124,7 +114,7 @@ class LabelledDataset:
 
     def __init__(self, folder: Path, split: str = "") -> None:
         self.folder = folder
-        splits = find_splits(folder)
+        splits = dataset.find_splits(folder)
         split = split or next(iter(splits), "")
         self._name = f"{folder}, split {split}" if split else f"{folder}"
         if split not in splits:
@@ -167,9 +157,8 @@ class LabelledDataset:
             InputError: An image cannot be read.
         """
         for path, entry in self.annotations.items():
-            yield LabelledImage(
-                path.name, read_image(path), entry.labels, entry.boxes, entry.ignored_boxes, entry.truth
-            )
+            image = dataset.read_image(path)
+            yield LabelledImage(path.name, image, entry.labels, entry.boxes, entry.ignored_boxes, entry.truth)
 
     @property
     def object_counts(self) -> Counter[str]:
@@ -206,7 +195,7 @@ class LabelledDataset:
     def _read_coco(self) -> list[str]:
         """Read the annotations in a COCO file, and return the classes."""
         file = self._source.file
-        content = parse_file(file, MAX_COCO_FILE_SIZE, _CocoFile.model_validate_json)
+        content = dataset.parse_file(file, MAX_COCO_FILE_SIZE, _CocoFile.model_validate_json)
         class_names = {category.id: category.name for category in content.categories}
         objects: dict[int, list[_CocoObject]] = {image.id: [] for image in content.images}
         if len(class_names) < len(content.categories) or len(objects) < len(content.images):
@@ -237,13 +226,13 @@ class LabelledDataset:
         # The import takes half a second, for which the refusal of wrong inputs must not wait.
         from supervision.dataset.formats.yolo import yolo_annotations_to_detections
 
-        content = read_class_file(self._source.file)
+        content = dataset.read_class_file(self._source.file)
         names = dict(enumerate(content.names)) if isinstance(content.names, list) else content.names
         labels_of_images: dict[Path, tuple[Path | None, list[list[str]]]] = {}
         for path in sorted(set(self._source.images)):
-            file = find_label_file(path)
+            file = dataset.find_label_file(path)
             self.notes["images without a label file"] += file is None
-            text = read_text(file, MAX_LABEL_FILE_SIZE) if file else ""
+            text = dataset.read_text(file, dataset.MAX_LABEL_FILE_SIZE) if file else ""
             labels_of_images[path] = file, [words for line in text.splitlines() if (words := line.split())]
         all_rows = [words for _, rows in labels_of_images.values() for words in rows]
         if content.kpt_shape is None and _may_have_keypoints(all_rows):
@@ -279,7 +268,7 @@ class LabelledDataset:
             raise InputError(f"{path} is not a file in {root}, or is a link to another folder")
         if len(labels) > MAX_OBJECT_COUNT:
             raise InputError(f"{path} has more than {MAX_OBJECT_COUNT} objects; divide the image")
-        size, _ = read_image_header(path)
+        size, _ = dataset.read_image_header(path)
         stated_size = stated_size[0] or size[0], stated_size[1] or size[1]
         if size != stated_size == size[::-1]:
             raise InputError(f"{path} has {size[0]} x {size[1]} pixels: it was turned after the export")
@@ -358,4 +347,4 @@ def read_image_properties(file: Path) -> dict[str, Any]:
     The result is {} if the file does not exist.
     """
     parse = TypeAdapter(dict[str, Any]).validate_json
-    return parse_file(file, MAX_COCO_FILE_SIZE, parse) if file.is_file() else {}
+    return dataset.parse_file(file, MAX_COCO_FILE_SIZE, parse) if file.is_file() else {}

@@ -12,21 +12,9 @@ from jinja2 import Environment, StrictUndefined
 
 from executive.errors import InputError
 from executive.perception.detectors.rfdetr import read_labels
-from executive.training.dataset import (
-    DatasetEntry,
-    build_image_path,
-    read_image,
-    read_image_header,
-    save_image,
-    write_annotations,
-)
-from executive.training.evaluate import (
-    MODEL_NAME,
-    EvaluatedDetector,
-    evaluate,
-    find_label_file,
-    make_model_config,
-)
+from executive.training import dataset, evaluate
+from executive.training.dataset import DatasetEntry
+from executive.training.evaluate import MODEL_NAME, EvaluatedDetector
 from executive.training.metrics import Evaluation
 from executive.training.samples import LabelledDataset
 
@@ -91,9 +79,9 @@ def train(
         )  # fmt: skip
     model = out / "model.onnx"
     export_onnx(out / "checkpoint_best_total.pth", len(labels), model)
-    config = make_model_config(model, out / "labels.txt")
+    config = evaluate.make_model_config(model, out / "labels.txt")
     with contextlib.closing(EvaluatedDetector({MODEL_NAME: config}, MODEL_NAME, base=Path())) as detector:
-        accuracy = evaluate(detector, splits["valid"], threshold=CARD_THRESHOLD)
+        accuracy = evaluate.evaluate(detector, splits["valid"], threshold=CARD_THRESHOLD)
     card = render_card(
         title=f"Small RF-DETR trained on {splits['train'].folder.name}",
         summary=f"Detects {', '.join(labels)} in square images.",
@@ -114,7 +102,7 @@ def train(
 def choose_learning_rate(start_model: Path | None, labels: list[str]) -> float:
     """Return the default learning rate for training `start_model` on the classes `labels`."""
     if start_model is not None:
-        file = find_label_file(start_model)
+        file = evaluate.find_label_file(start_model)
         if file.is_file() and list(read_labels(file)) == labels:
             return FINE_TUNING_LEARNING_RATE
     return NEW_MODEL_LEARNING_RATE
@@ -126,27 +114,28 @@ def load_dataset(folder: Path) -> dict[str, LabelledDataset]:
     Raises:
         InputError: A split is missing, empty or damaged.
     """
-    dataset = {split: LabelledDataset(folder, split) for split in ("train", "valid")}
-    dataset["valid"].match_classes(dataset["train"].classes, "the split train")
-    return dataset
+    splits = {split: LabelledDataset(folder, split) for split in ("train", "valid")}
+    splits["valid"].match_classes(splits["train"].classes, "the split train")
+    return splits
 
 
-def write_coco_dataset(dataset: Mapping[str, LabelledDataset], folder: Path) -> list[str]:
+def write_coco_dataset(splits: Mapping[str, LabelledDataset], folder: Path) -> list[str]:
     """Write splits as a COCO dataset with the boxes and pixels that an evaluation sees; return the classes.
 
     The COCO files contain absolute paths of the images that RF-DETR decodes like `read_image`. Other images
     are converted, for instance because RF-DETR ignores the EXIF orientation.
     """
     entries = []
-    classes = list(dict.fromkeys([*dataset["train"].classes, *dataset["valid"].object_counts]))
-    for split, images in dataset.items():
+    classes = list(dict.fromkeys([*splits["train"].classes, *splits["valid"].object_counts]))
+    for split, images in splits.items():
         for index, (path, entry) in enumerate(images.annotations.items()):
-            _, is_plain = read_image_header(path)
-            file = path.absolute() if is_plain else build_image_path(folder, "coco", split, f"{index}.png")
+            _, is_plain = dataset.read_image_header(path)
+            file = path.absolute()
             if not is_plain:
-                save_image(file, read_image(path))
+                file = dataset.build_image_path(folder, "coco", split, f"{index}.png")
+                dataset.save_image(file, dataset.read_image(path))
             entries.append(DatasetEntry(split, str(file), entry.size, entry.labels, entry.boxes))
-    write_annotations(folder, "coco", entries, classes)
+    dataset.write_annotations(folder, "coco", entries, classes)
     return classes
 
 

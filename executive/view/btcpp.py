@@ -29,7 +29,7 @@ from executive.tree.specification import (
     Value,
     VariableName,
 )
-from executive.view.text import replace_invalid_xml_characters
+from executive.view.drawing import replace_invalid_xml_characters
 
 _REGISTERED_NAMES = frozenset(Path(__file__).with_name("btcpp_names.txt").read_text("utf-8").split())
 """Names that BehaviorTree.CPP 4.10 registers or reserves."""
@@ -64,18 +64,17 @@ class _Exporter:
         values: dict[str, Value] = {name: param.value for name, param in self._mission.params.items()}
         assert self._mission.tree is not None
         body = _replace_params(self._mission.tree, values)
-        self._add_tree(root, self._main_id, self._mission.description, body)
+        main = SubElement(root, "BehaviorTree", ID=self._main_id, _description=self._mission.description)
+        self._add_node(main, body)
         # The export of a subtree may append further subtrees.
         for subtree in self._used_subtrees:
             visible_names = () if subtree.library else values.keys() - subtree.arguments
             body = _replace_params(subtree.body, {name: values[name] for name in visible_names})
-            self._add_tree(root, self._tree_ids[subtree.name], subtree.doc, body)
+            tree_id = self._tree_ids[subtree.name]
+            self._add_node(SubElement(root, "BehaviorTree", ID=tree_id, _description=subtree.doc), body)
         models = sorted(self._models.values(), key=lambda model: (model.tag, model.attrib["ID"]))
         SubElement(root, "TreeNodesModel").extend(models)
         return root
-
-    def _add_tree(self, root: Element, tree_id: str, doc: str, body: Node) -> None:
-        self._add_node(SubElement(root, "BehaviorTree", ID=tree_id, _description=doc), body)
 
     def _add_node(self, parent: Element, node: Node) -> None:
         match node:

@@ -1,10 +1,12 @@
 """Live page: view of a run in browsers, with which a user watches and controls the run.
 
 The page is served by another process, `live_server`, which gets messages and returns commands of browsers.
+`PageState` is the state of the page in that process.
 """
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import json
 import pickle
@@ -15,12 +17,15 @@ import subprocess
 import tempfile
 import threading
 import time
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
+from typing import cast
 
 import numpy as np
 
+from executive import events
 from executive.cell.devices import Shape, Visuals
 from executive.cell.frame import Frame, FrameCaptured
 from executive.errors import InputError
@@ -29,9 +34,11 @@ from executive.geometry import Pose
 from executive.mission.outline import make_outline
 from executive.plugins import DISTRIBUTION
 from executive.processes import build_command
+from executive.record.picture_recorder import encode_jpeg
 from executive.record.result import Result
+from executive.record.timeline import STATUS_TEXTS, Timeline
 from executive.run.run import Run
-from executive.view.svg import NodeResult, make_svg
+from executive.view.drawing import NodeResult, make_svg
 
 LOOPBACK = "127.0.0.1"
 """Network address at which the page is served."""
@@ -48,6 +55,15 @@ MAX_QUEUED_MESSAGES = 32
 REQUIRED_PACKAGES = ("aiohttp", "viser")
 """Optional dependencies of the project that the live page needs."""
 
+OCCLUSION_DARKENING = 0.45
+"""Fraction by which the brightness of pixels that the arm occludes is reduced: 0 not at all, 1 to black."""
+
+ENDED_STATUSES = ("SUCCESS", "FAILURE", "INVALID")
+"""Statuses of ended nodes; the page shows how often each node ended with each of them."""
+SCENE_KEYS = ("shapes", "body_poses")
+"""Fields of `PageChange` that belong to the scene, which `SceneProxy` serves."""
+JsonObject = dict[str, object]
+"""Values of a JSON object, by key."""
 BodyPoses = Mapping[str, Sequence[float]]
 """Poses of all bodies by name: position [m] and quaternion (w, x, y, z), `(7,)`."""
 
@@ -137,7 +153,6 @@ class LivePage:
         self._queue: queue.SimpleQueue[tuple[str, int] | Message | None] = queue.SimpleQueue()
         self._run: Run | None = None
         self._visuals: Visuals | None = None
-        self._has_server_ended = False
         self._browser_count = 0
         self._next_pose_time = 0.0
         self._pose_period = POSE_PERIOD
@@ -232,7 +247,7 @@ class LivePage:
 
     def _enqueue(self, message: Message) -> None:
         """Queue a message for the server, unless the server has ended."""
-        if not self._has_server_ended:
+        if self._server.poll() is None:
             self._queue.put(message)
 
     @contextlib.contextmanager
@@ -257,7 +272,6 @@ class LivePage:
                 pipe.flush()
                 if not is_last_batch:
                     time.sleep(BATCH_PERIOD)
-        self._has_server_ended = True
 
     def _read_commands(self) -> None:
         """Run the commands that the server writes to stdout, until the server ends."""
@@ -266,7 +280,6 @@ class LivePage:
             with self._catch_errors():
                 self._run_command(PageCommand(**json.loads(line)))
         self._browser_count = 0
-        self._has_server_ended = True
 
     def _run_command(self, command: PageCommand) -> None:
         """Run a command of a browser; most command names are the names of methods of `RunControl`."""
@@ -287,3 +300,82 @@ def encode_poses(poses: Mapping[str, Pose]) -> BodyPoses:
     return {
         name: (*X_WB.position.tolist(), *np.roll(X_WB.quaternion, 1).tolist()) for name, X_WB in poses.items()
     }
+
+
+class PageState:
+    """State of the live page, updated by the messages of a run.
+
+    Attributes:
+        values: All values for `page.js` by key: nodes by path, items by name, and other values.
+    """
+
+    def __init__(self) -> None:
+        self.values: JsonObject = {"is_paused": False, "has_ended": False, "nodes": {}, "items": {}}
+        self._changes: JsonObject = {}
+        self._timeline = Timeline(has_history=False)
+
+    def apply(self, message: Message) -> None:
+        """Update the state of the page for a message of the run."""
+        match message:
+            case events.TimedEvent():
+                self._timeline(message)
+                self._set_values(clock=message.clock)
+                self._apply_event(message.event)
+            case SearchedFrame():
+                self._set_values(look=_encode_searched_frame(message))
+            case PageChange():
+                changes = vars(message).items()
+                values = {key: value for key, value in changes if value is not None and key not in SCENE_KEYS}
+                self._set_values(**values)
+
+    def take_changes(self) -> JsonObject:
+        """Return the values that changed since the last call, by key."""
+        changes = self._changes
+        self._changes = {}
+        return changes
+
+    def _apply_event(self, event: events.Event) -> None:
+        match event:
+            case events.NodeStarted(node) | events.NodeEnded(node):
+                activation = self._timeline.activation_by_path[node]
+                end_counts = self._timeline.end_counts.get(node, Counter())
+                counts = {STATUS_TEXTS[status]: end_counts[status] for status in ENDED_STATUSES}
+                entry = {"status": activation.status.lower(), "failure": activation.failure}
+                self._set_entry("nodes", node, {**counts, **entry, "item": activation.item})
+            case events.ItemChanged():
+                self._set_entry("items", event.item, vars(event))
+            case events.TargetSelected():
+                self._set_values(decision=vars(event))
+            case events.RunStarted():
+                self._set_values(run={"mission": event.mission, "seed": event.seed})
+            case events.OperatorAsked():
+                self._set_values(choices=event.choices)
+            case events.RequestGiven():
+                self._set_values(choices=None)
+            case events.RunEnded():
+                self._set_values(choices=None, has_ended=True)
+
+    def _set_values(self, **values: object) -> None:
+        self.values |= values
+        self._changes |= values
+
+    def _set_entry(self, key: str, name: str, value: JsonObject) -> None:
+        for values in (self.values, self._changes):
+            entries = cast("JsonObject", values.setdefault(key, {}))
+            entries[name] = value
+
+
+def _encode_searched_frame(searched_frame: SearchedFrame) -> JsonObject:
+    """Return the detections in a frame and its image as JPEG, darkened where the arm occludes the scene."""
+    frame = searched_frame.frame
+    image = frame.image.copy()
+    if frame.visible is not None:
+        occluded = ~frame.visible
+        image[occluded] = (image[occluded] * (1 - OCCLUSION_DARKENING)).astype(np.uint8)
+    height, width, _ = image.shape
+    return {
+        "source": "data:image/jpeg;base64," + base64.b64encode(encode_jpeg(image)).decode(),
+        "width": width, "height": height, "frame": frame.id, "camera": frame.camera,
+        "detector": searched_frame.search_event.detector, "stamp": frame.stamp,
+        "detections": list(map(vars, searched_frame.search_event.confident)),
+    }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Server of the live page, in a process of its own: page state, 3-D scene, access, files and messages.
+"""Server of the live page, in a process of its own: 3-D scene, access, files and messages.
 
 The server reads messages of the run from stdin, and writes commands of browsers to stdout. It listens on the
 loopback address. Every request must come from the page itself and contain the secret token in the page
@@ -8,7 +8,6 @@ address, so that no other page can read or control the run.
 from __future__ import annotations
 
 import asyncio
-import base64
 import contextlib
 import json
 import os
@@ -18,123 +17,31 @@ import socket
 import sys
 import tempfile
 import threading
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import Any
 
 import aiohttp
 import numpy as np
 from aiohttp import WSMsgType, web
 from aiohttp.typedefs import Handler
 
-from executive import events
 from executive.cell.devices import Shape
-from executive.record.picture_recorder import encode_jpeg
-from executive.record.timeline import STATUS_TEXTS, Timeline
-from executive.view.live_page import LOOPBACK, Message, PageChange, PageCommand, SearchedFrame
-
-if TYPE_CHECKING:
-    from executive.view.live_scene import LiveScene
-
-OCCLUSION_DARKENING = 0.45
-"""Fraction by which the brightness of pixels that the arm occludes is reduced: 0 not at all, 1 to black."""
-
-ENDED_STATUSES = ("SUCCESS", "FAILURE", "INVALID")
-"""Statuses of ended nodes; the page shows how often each node ended with each of them."""
-SCENE_KEYS = ("shapes", "body_poses")
-"""Fields of `PageChange` that belong to the scene, which `SceneProxy` serves."""
-
-JsonObject = dict[str, object]
-"""Values of a JSON object, by key."""
-
-
-class PageState:
-    """State of the live page, updated by the messages of a run.
-
-    Attributes:
-        values: All values for `page.js` by key: nodes by path, items by name, and other values.
-    """
-
-    def __init__(self) -> None:
-        self.values: JsonObject = {"is_paused": False, "has_ended": False, "nodes": {}, "items": {}}
-        self._changes: JsonObject = {}
-        self._timeline = Timeline(has_history=False)
-
-    def apply(self, message: Message) -> None:
-        """Update the state of the page for a message of the run."""
-        match message:
-            case events.TimedEvent():
-                self._timeline(message)
-                self._set_values(clock=message.clock)
-                self._apply_event(message.event)
-            case SearchedFrame():
-                self._set_values(look=_encode_searched_frame(message))
-            case PageChange():
-                changes = vars(message).items()
-                values = {key: value for key, value in changes if value is not None and key not in SCENE_KEYS}
-                self._set_values(**values)
-
-    def take_changes(self) -> JsonObject:
-        """Return the values that changed since the last call, by key."""
-        changes = self._changes
-        self._changes = {}
-        return changes
-
-    def _apply_event(self, event: events.Event) -> None:
-        match event:
-            case events.NodeStarted(node) | events.NodeEnded(node):
-                activation = self._timeline.activation_by_path[node]
-                end_counts = self._timeline.end_counts.get(node, Counter())
-                counts = {STATUS_TEXTS[status]: end_counts[status] for status in ENDED_STATUSES}
-                entry = {"status": activation.status.lower(), "failure": activation.failure}
-                self._set_entry("nodes", node, {**counts, **entry, "item": activation.item})
-            case events.ItemChanged():
-                self._set_entry("items", event.item, vars(event))
-            case events.TargetSelected():
-                self._set_values(decision=vars(event))
-            case events.RunStarted():
-                self._set_values(run={"mission": event.mission, "seed": event.seed})
-            case events.OperatorAsked():
-                self._set_values(choices=event.choices)
-            case events.RequestGiven():
-                self._set_values(choices=None)
-            case events.RunEnded():
-                self._set_values(choices=None, has_ended=True)
-
-    def _set_values(self, **values: object) -> None:
-        self.values |= values
-        self._changes |= values
-
-    def _set_entry(self, key: str, name: str, value: JsonObject) -> None:
-        for values in (self.values, self._changes):
-            entries = cast("JsonObject", values.setdefault(key, {}))
-            entries[name] = value
-
-
-def _encode_searched_frame(searched_frame: SearchedFrame) -> JsonObject:
-    """Return the detections in a frame and its image as JPEG, darkened where the arm occludes the scene."""
-    frame = searched_frame.frame
-    image = frame.image.copy()
-    if frame.visible is not None:
-        occluded = ~frame.visible
-        image[occluded] = (image[occluded] * (1 - OCCLUSION_DARKENING)).astype(np.uint8)
-    height, width, _ = image.shape
-    return {
-        "source": "data:image/jpeg;base64," + base64.b64encode(encode_jpeg(image)).decode(),
-        "width": width, "height": height, "frame": frame.id, "camera": frame.camera,
-        "detector": searched_frame.search_event.detector, "stamp": frame.stamp,
-        "detections": list(map(vars, searched_frame.search_event.confident)),
-    }  # fmt: skip
-
+from executive.view.live_page import LOOPBACK, Message, PageChange, PageCommand, PageState
 
 SCENE_CONTENT_POLICY = (
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' data: blob:; "
     "connect-src 'self' data: blob:; frame-ancestors 'self'"
 )
 """Content security policy of the page of viser, which must not load anything from other servers."""
+CAMERA_POSITION = (1.35, -0.68, 0.95)
+"""Initial position of the virtual camera in the world frame [m]."""
+CAMERA_TARGET = (0.33, 0.0, 0.2)
+"""Point at which the virtual camera looks at first, in the world frame [m]."""
+BACKGROUND = (243, 245, 248)
+"""Colour of the background, RGB, 0 to 255."""
 MAX_SCENE_MESSAGE_SIZE = 64 * 1024 * 1024
 """Maximum size of a message of the scene, which may contain a mesh [bytes]."""
 
@@ -195,16 +102,90 @@ class SceneProxy:
         async with self._start_lock:
             if self._scene is None:
                 # The start takes 1.5 s (imports and meshes), which would block other requests.
-                self._scene = await asyncio.to_thread(_start_scene_server, self._socket_path, shapes)
+                self._scene = await asyncio.to_thread(LiveScene, self._socket_path, shapes)
                 self._scene.set_body_poses(self._body_poses)
         return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path=str(self._socket_path)))
 
 
-def _start_scene_server(socket_path: Path, shapes: Sequence[Shape]) -> LiveScene:
-    # The import of viser and trimesh takes 1 s, and only the first browser needs them.
-    from executive.view.live_scene import LiveScene
+class LiveScene:
+    """Viser server that shows fixed shapes and shapes on moving bodies.
 
-    return LiveScene(socket_path, shapes)
+    The server opens only the Unix socket `socket_path`, because viser has no access control.
+    """
+
+    def __init__(self, socket_path: Path, shapes: Sequence[Shape]) -> None:
+        # The imports of this class take 1 s, and only the first browser needs them.
+        import viser
+
+        _listen_on_unix_socket(socket_path)
+        self._server = viser.ViserServer(host=LOOPBACK, port=0, verbose=False)
+        self._bodies: dict[str, viser.FrameHandle] = {}
+        scene = self._server.scene
+        scene.set_up_direction("+z")
+        scene.world_axes.visible = False
+        # Browsers without a graphics card draw shadows and reflections slowly.
+        scene.configure_default_lights(cast_shadow=False)
+        scene.configure_environment_map(None)
+        scene.add_light_ambient("/light", intensity=1.6)
+        scene.set_background_image(np.full((1, 1, 3), BACKGROUND, np.uint8))
+        self._server.initial_camera.position = CAMERA_POSITION
+        self._server.initial_camera.look_at = CAMERA_TARGET
+        self._server.gui.configure_theme(control_width="small", show_logo=False, show_share_button=False)
+        # The page has its own buttons instead of the control panel of viser.
+        self._server.gui.main_panel.minimize()
+        for number, shape in enumerate(shapes):
+            if shape.body and shape.body not in self._bodies:
+                self._bodies[shape.body] = scene.add_frame(_make_scene_path(shape.body), show_axes=False)
+            parent = _make_scene_path(shape.body) if shape.body else "/fixed"
+            self._add_shape(f"{parent}/{number}", shape)
+
+    def set_body_poses(self, poses: Mapping[str, Sequence[float]]) -> None:
+        """Set poses of bodies by name: position [m], quaternion (w, x, y, z); hide bodies without a pose."""
+        with self._server.atomic():
+            for name, frame in self._bodies.items():
+                pose = poses.get(name)
+                if frame.visible != (pose is not None):
+                    frame.visible = pose is not None
+                if pose is not None:
+                    frame.position = np.array(pose[:3])
+                    frame.wxyz = np.array(pose[3:])
+
+    def _add_shape(self, path: str, shape: Shape) -> None:
+        """Add a shape to the scene at `path`; the path without its last part is the path of the parent."""
+        scene = self._server.scene
+        radius = shape.size[0] / 2
+        quaternion = np.roll(shape.X_BS.quaternion, 1)  # (x, y, z, w) becomes (w, x, y, z).
+        options: dict[str, Any] = {
+            "color": shape.colour, "position": shape.X_BS.position, "wxyz": quaternion,
+        }  # fmt: skip
+        if shape.kind == "box":
+            scene.add_box(path, dimensions=shape.size, **options)
+        elif shape.kind == "cylinder":
+            scene.add_cylinder(path, radius=radius, height=shape.size[2], **options)
+        elif shape.kind == "sphere":
+            scene.add_icosphere(path, radius=radius, **options)
+        else:
+            import trimesh  # See `__init__`.
+
+            mesh = trimesh.load_mesh(shape.file, process=False, skip_materials=True)
+            vertices = np.asarray(mesh.vertices) * shape.size
+            scene.add_mesh_simple(path, vertices, np.asarray(mesh.faces), **options)
+
+
+def _listen_on_unix_socket(socket_path: Path) -> None:
+    """Make viser, which has no option for a Unix socket, listen on a Unix socket in this process."""
+    import websockets.asyncio.server  # See `LiveScene`.
+
+    original_serve = websockets.asyncio.server.serve
+
+    def serve_on_socket(handler: Any, _host: Any, _port: Any, **options: Any) -> Any:
+        return original_serve(handler, unix=True, path=str(socket_path), **options)
+
+    websockets.asyncio.server.serve = serve_on_socket  # type: ignore[assignment, misc]
+
+
+def _make_scene_path(body: str) -> str:
+    return "/bodies/" + body.replace(" ", "_").replace("/", "_")
 
 
 async def _forward(source: Connection, target: Connection) -> None:
@@ -290,12 +271,6 @@ class Server:
             for browser in list(self._browsers):
                 with contextlib.suppress(ConnectionError):
                     await browser.send_str(text)
-
-    async def send_periodically(self) -> None:
-        """Send the changes of the page once per `MESSAGE_PERIOD`, until the task is cancelled."""
-        while True:
-            await asyncio.sleep(MESSAGE_PERIOD)
-            await self.send_changes()
 
     async def close(self) -> None:
         """Send the last changes, and close all connections."""
@@ -418,10 +393,11 @@ async def _serve(
     runner = web.AppRunner(server.app, access_log=None)
     await runner.setup()
     await web.SockSite(runner, listener).start()
-    sender = asyncio.create_task(server.send_periodically())
     threading.Thread(target=read_batches, daemon=True).start()
-    await input_ended.wait()
-    sender.cancel()
+    while not input_ended.is_set():
+        await server.send_changes()
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(input_ended.wait(), MESSAGE_PERIOD)
     await server.close()
 
 

@@ -30,9 +30,9 @@ from executive.record.result import is_resumable, list_requests, read_result
 from executive.record.run_directory import RunDirectory, find_recorded_options, read_tree, write_atomically
 from executive.record.timeline import Activation, Timeline, find_last_failure, format_counts, group_by_node
 from executive.text.yaml_files import get_shipped_folder
-from executive.view.svg import NodeResult, make_svg
+from executive.view import drawing
+from executive.view.drawing import NodeResult
 from executive.view.terminal import describe_place_on_table, format_repeat_command
-from executive.view.text import estimate_text_width, render_template, wrap_and_truncate
 
 LOOK = "look"
 """Activity: detection of the next item while the tool is empty."""
@@ -157,7 +157,7 @@ def render_report(data: ReportData) -> str:
     reason = "" if outcome is None or outcome.reason.upper() == data.status else outcome.reason
     warning = "" if result is None else result.disagreement
     skill_colours = cycle(colour for colour in PALETTE if colour not in ACTIVITY_COLOURS.values())
-    return render_template(
+    return drawing.render_template(
         "report.html",
         data=data,
         result=result,
@@ -170,7 +170,7 @@ def render_report(data: ReportData) -> str:
         describe_place_on_table=describe_place_on_table,
         colours={name: ACTIVITY_COLOURS.get(name) or next(skill_colours) for name in data.activities},
         total_times={item: sum(row.values()) for item, row in data.times_by_item.items()},
-        tree=Markup(make_svg(data.nodes, data.start.mission, _make_node_results(data))),
+        tree=Markup(drawing.make_svg(data.nodes, data.start.mission, _make_node_results(data))),
         timeline=Markup(draw_lanes(data.timeline, data.nodes)),
         params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
     )
@@ -354,11 +354,11 @@ def draw_lanes(timeline: Timeline, nodes: Sequence[OutlineNode]) -> str:
     axis_x = _NAME_MARGIN
     for node in nodes:
         if groups := groups_by_path.get(node.path):
-            name = "".join(wrap_and_truncate(node.name, _MAX_NAME_LENGTH))
+            name = "".join(drawing.wrap_and_truncate(node.name, _MAX_NAME_LENGTH))
             name_x = _LEVEL_INDENT * node.depth
-            axis_x = max(axis_x, name_x + estimate_text_width(name, _NAME_SIZE) + _NAME_MARGIN)
+            axis_x = max(axis_x, name_x + drawing.estimate_text_width(name, _NAME_SIZE) + _NAME_MARGIN)
             lanes.append((node, name, name_x, [_make_bar(node, group) for group in groups]))
-    return render_template(
+    return drawing.render_template(
         "timeline.svg",
         axis_x=axis_x,
         axis_length=axis_length,

@@ -28,7 +28,7 @@ from executive.record.result import Result
 from executive.record.timeline import STATUS_TEXTS, Timeline
 from executive.run.operator import RunControl
 from executive.run.run import Run
-from executive.view.text import draw_line_prefixes, select_active_nodes
+from executive.view.drawing import draw_line_prefixes, select_active_nodes
 
 REDRAWS_PER_SECOND = 10
 """Frequency at which the view is drawn [1/s]."""

@@ -30,7 +30,7 @@ from coverage import CoverageData
 ROOT = Path(__file__).parents[2]
 
 EXCLUDED_FOLDERS = (
-    "executive/cli/init",
+    "executive/cli/setup",
     "executive/view/live",
     "executive/training",
 )

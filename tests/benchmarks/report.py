@@ -23,16 +23,17 @@ from rich.table import Table
 from executive.campaign.evaluation import load_cells
 from executive.campaign.jobs import MissionUnderTest, load_mission_under_test
 from executive.cell.json_values import to_json
-from executive.cli.options import (
+from executive.cli.shared import (
     json_option,
+    keep_stdout_clean,
     mission_argument,
     oracle_option,
     overrides_option,
+    print_json,
     runs_option,
     seed_option,
     workers_option,
 )
-from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import ExecutiveError
 from executive.events import TimedEvent
 from executive.record.recorded_run import RecordOptions, record_run

@@ -19,9 +19,10 @@ from typing import Any
 
 import pytest
 
-from executive.campaign.cluster_bundle import (
+from executive.campaign.cluster import (
     FILES_KEY,
     PACKAGES_FOLDER,
+    BundlePlugin,
     check_environment,
     describe_environment,
     make_bundle,
@@ -101,9 +102,6 @@ def test_an_absolute_path_to_a_file_is_refused(project: Path) -> None:
 
 @pytest.mark.slow
 def test_a_worker_runs_a_skill_of_another_package_on_another_cell(project: Path, tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    from executive.campaign.cluster import BundlePlugin
-
     stand = tmp_path / "stand.yaml"
     stand.write_text("base: overhead.yaml\ncell: stand\nkind: fake\n")
     jobs = list_sweep_jobs(tmp_path / "runs", str(stand))
@@ -149,7 +147,6 @@ def wait_for(log: Any, pattern: str) -> str:
 @pytest.fixture
 def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
     """Address of a scheduler, and its two workers; without a nanny, a killed worker stays dead."""
-    pytest.importorskip("distributed")
     scheduler = start_dask(tmp_path, "scheduler", "--host", "127.0.0.1", "--port", "0")
     processes = [scheduler]
     try:
@@ -195,7 +192,6 @@ def test_a_killed_worker_costs_only_time(
 
 @pytest.mark.slow
 def test_a_scheduler_without_workers_and_none_at_all_are_explained(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
     scheduler = start_dask(tmp_path, "scheduler", "--host", "127.0.0.1", "--port", "0")
     try:
         address = wait_for(scheduler.stderr, r"Scheduler at:\s*(tcp://\S+)")

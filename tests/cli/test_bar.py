@@ -9,7 +9,7 @@ from at_terminal import COLOUR, call
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.cli.progress import show_progress
+from executive.cli.shared import show_progress
 
 FAKE = ("--set", "cell.kind=fake")
 

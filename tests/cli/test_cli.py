@@ -99,7 +99,7 @@ def test_quiet_shows_a_run_with_rejected_objects_and_one_that_the_audit_contradi
 def test_what_libraries_print_does_not_reach_standard_output():
     code = """
 import ctypes, os
-from executive.cli.streams import print_json, keep_stdout_clean
+from executive.cli.shared import print_json, keep_stdout_clean
 libc = ctypes.CDLL(None)
 with keep_stdout_clean():
     os.write(1, b"unbuffered\\n")

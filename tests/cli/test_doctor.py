@@ -12,9 +12,9 @@ from click.testing import CliRunner
 
 from executive import plugins
 from executive.behaviours import load_skills
-from executive.cli import doctor
-from executive.cli.doctor import CheckResult
+from executive.cli import setup
 from executive.cli.main import main
+from executive.cli.setup import CheckResult
 from executive.errors import InputError
 from executive.plugins import DISTRIBUTION
 
@@ -27,7 +27,7 @@ def find_statuses(results: Iterator[CheckResult]) -> dict[str, str]:
 def test_environment_variables_are_named_without_their_values(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setenv("ROBOFLOW_API_KEY", "SECRET1234567890")
-    python, display = doctor.check_system()
+    python, display = setup.check_system()
     assert (python.status, python.subject) == ("ok", "python")
     assert (display.status, display.message) == ("note", "DISPLAY is not set; it is only for --gui")
 
@@ -47,7 +47,7 @@ def test_missing_packages_are_problems_and_missing_extras_are_notes(
     names = {"": ("pybullet", "av"), "view": ("viser", "aiohttp"), "cluster": ("dask",), "train": ("torch",)}
     monkeypatch.setattr(plugins, "find_version", lambda name: "" if name in missing else "1.0")
     monkeypatch.setattr(plugins, "list_requirements", names.__getitem__)
-    results = list(doctor.check_packages())
+    results = list(setup.check_packages())
     assert find_statuses(iter(results)) == status_by_subject
     assert all(any(name in result.message for name in missing) for result in results)
 
@@ -55,7 +55,7 @@ def test_missing_packages_are_problems_and_missing_extras_are_notes(
 def test_two_packages_that_provide_cv2_are_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
     packages = {"cv2": ["opencv-python-headless", "opencv-python"]}
     monkeypatch.setattr("importlib.metadata.packages_distributions", lambda: packages)
-    assert find_statuses(doctor.check_packages())["opencv"] == "problem"
+    assert find_statuses(setup.check_packages())["opencv"] == "problem"
 
 
 @pytest.mark.parametrize("group", ["drivers", "detectors"])
@@ -64,17 +64,17 @@ def test_a_plugin_that_cannot_be_loaded_is_an_error(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
-    (plugins,) = doctor.check_plugins()
+    (plugins,) = setup.check_plugins()
     assert plugins == ("ok", "plugins", f"{len(load_skills())} skills")
     Path("pyproject.toml").write_text(f'[project.entry-points."executive.{group}"]\nbench = "no:Bench"\n')
     with pytest.raises(InputError, match='"bench"'):
-        list(doctor.check_plugins())
+        list(setup.check_plugins())
 
 
 @pytest.mark.parametrize("status", ["note", "problem"])
 def test_only_a_problem_makes_the_command_fail(monkeypatch: pytest.MonkeyPatch, status: str) -> None:
     result = CheckResult(status, "packages", "av is missing")
-    monkeypatch.setattr(doctor, "run_checks", lambda: [result])
+    monkeypatch.setattr(setup, "run_checks", lambda: [result])
     text, as_json = (CliRunner().invoke(main, ["doctor", *options]) for options in ((), ("--json",)))
     assert text.exit_code == as_json.exit_code == (status == "problem")
     assert text.stdout.split(maxsplit=2) == [status, "packages", "av is missing\n"]
@@ -87,7 +87,7 @@ def test_all_checks_run_although_one_fails(monkeypatch: pytest.MonkeyPatch) -> N
 
     monkeypatch.setattr("executive.behaviours.load_skills", fail)
     monkeypatch.setitem(sys.modules, "executive.perception.detectors.roboflow.inference_process", None)
-    statuses = find_statuses(doctor.run_checks())
+    statuses = find_statuses(setup.run_checks())
     assert {name: statuses[name] for name in ("system", "plugins", "simulator")} == {
         "system": "problem", "plugins": "problem", "simulator": "ok"
     }  # fmt: skip

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from executive.cli.init import (
+from executive.cli.main import main
+from executive.cli.setup import (
     FOLDERS,
     PACKAGE,
     TEMPLATE,
@@ -19,7 +20,6 @@ from executive.cli.init import (
     make_package_name,
     write_project,
 )
-from executive.cli.main import main
 from executive.errors import InputError
 
 FILES = [

@@ -19,7 +19,7 @@ from click.testing import CliRunner
 
 from executive.behaviours import load_skills
 from executive.cli.main import main
-from executive.cli.streams import keep_stdout_clean
+from executive.cli.shared import keep_stdout_clean
 from executive.mission.load import CheckerFinder, load_mission
 from executive.skill import Skill
 from executive.station.check import load_checker

@@ -21,8 +21,7 @@ from events import (
 
 from executive.events import Event, OperatorAsked, RequestGiven, TargetSelected
 from executive.geometry import Pose
-from executive.view.live_page import SearchedFrame, encode_poses
-from executive.view.live_server import PageState
+from executive.view.live_page import PageState, SearchedFrame, encode_poses
 
 
 @pytest.mark.parametrize(

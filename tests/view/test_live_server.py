@@ -14,11 +14,10 @@ from aiohttp import web
 from aiohttp.test_utils import make_mocked_request
 from events import at, run_started
 
-from executive.view.live_page import PageChange, PageCommand
+from executive.view.live_page import PageChange, PageCommand, PageState
 from executive.view.live_server import (
     CONTENT_POLICY,
     SECURITY_HEADERS,
-    PageState,
     SceneProxy,
     Server,
     find_access_error,

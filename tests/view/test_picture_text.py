@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.view.text import replace_invalid_xml_characters, wrap_and_truncate
+from executive.view.drawing import replace_invalid_xml_characters, wrap_and_truncate
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from executive.tree.retry import Catch, Retry, TryCatch
 from executive.tree.sequences import Sequence
 from executive.tree.specification import Reason
 from executive.tree.tree_node import SkillLeaf
-from executive.view.text import draw_text, fold_subtrees
+from executive.view.drawing import draw_text, fold_subtrees
 from tests.node_behaviours import build, specify
 
 CELL: Any = SimpleNamespace()

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 
 from executive.mission.outline import Connection, OutlineNode
 from executive.tree.node import ControlNode, load_control_nodes
-from executive.view.svg import NodeBox, NodeResult, make_group_id, make_svg, place_boxes
+from executive.view.drawing import NodeBox, NodeResult, make_group_id, make_svg, place_boxes
 
 RETRY = "up to 3 attempts, on Grasp.missed, Grasp.blocked"
 SVG = "{http://www.w3.org/2000/svg}"

@@ -15,7 +15,7 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 from executive.cli.main import main
-from executive.cli.options import check_video
+from executive.cli.shared import check_video
 from executive.errors import InputError
 from executive.record.journal import read_journal
 

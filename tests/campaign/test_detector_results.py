@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from executive.cli.progress import print_report
+from executive.campaign.evaluation import list_metrics
+from executive.cli.shared import print_report
 from executive.training.metrics import (
     ClassMetrics,
     CountedRate,
@@ -14,7 +15,6 @@ from executive.training.metrics import (
     Evaluation,
     MeasuredErrorRates,
 )
-from executive.view.detector_results import list_metrics
 
 MEASURED = Evaluation(
     threshold=0.5, images=300, objects=900, precision=0.991, recall=0.98, map50=0.995, map50_95=0.8,
