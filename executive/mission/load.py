@@ -14,7 +14,7 @@ from executive.behaviours import Skills
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.objects import Quotas
 from executive.errors import InputError
-from executive.mission import check_flow, check_nodes, check_skills, check_variables
+from executive.mission import check_nodes, check_skills, check_variables
 from executive.mission.analysis import CheckContext, UnhandledFailure, find_unhandled_failures
 from executive.mission.cell_file import CellFile, read_cell
 from executive.mission.expand import assign_paths, expand
@@ -55,13 +55,13 @@ CHECKS: tuple[Check, ...] = (
     check_variables.find_unread_variables,
     check_variables.find_unwritten_returns,
     check_variables.check_port_types,
-    check_flow.check_tool_states,
-    check_flow.check_tool_at_end,
-    check_flow.find_unreachable,
+    check_nodes.check_tool_states,
+    check_nodes.check_tool_at_end,
+    check_nodes.find_unreachable,
     check_nodes.run_node_checks,
-    check_flow.find_shared_resources,
-    check_flow.find_shared_variables,
-    check_flow.find_read_races,
+    check_nodes.find_shared_resources,
+    check_nodes.find_shared_variables,
+    check_nodes.find_read_races,
 )
 """All checks; a check ignores the errors that another check reports, and their consequences."""
 

@@ -10,9 +10,8 @@ from pathlib import Path, PurePath
 from executive.errors import RecordLost
 from executive.events import RunEnded
 from executive.mission.load import LoadedMission
-from executive.record.diagnosis import Diagnosis, FailureNode
 from executive.record.picture_recorder import find_picture
-from executive.record.result import is_resumable
+from executive.record.result import Diagnosis, FailureNode, is_resumable
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline import Look, Timeline, get_skill_name
 from executive.tree.node import Advice, ControlNode, PropagatedFailure, load_control_nodes

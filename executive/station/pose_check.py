@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig
 from executive.cell.devices import CameraImage
 from executive.geometry import Array
-from executive.motion.arms import build_kinematics
+from executive.motion.joints import build_kinematics
 from executive.physics.cell_world import CellWorld
 from executive.physics.collision import ClearanceChecker
 from executive.station.camera import CellCamera, Robot

@@ -28,10 +28,8 @@ from executive.cell.objects import Quotas
 from executive.cell.protocols import Behaviours, Cell, Clock, Operator, Routes
 from executive.events import Emit, TargetSelected
 from executive.ledger.tracker import Tracker
-from executive.motion.arms import build_planning_kinematics
-from executive.motion.joints import Kinematics
-from executive.motion.planner import Planner
-from executive.motion.straight_paths import plan_straight_motion
+from executive.motion.joints import Kinematics, build_planning_kinematics
+from executive.motion.planner import Planner, plan_straight_motion
 from executive.perception.detectors.cell_detector import CellDetector, build_cell_detectors
 from executive.perception.detectors.detector_registry import KindMaker, make_installed_kind
 from executive.perception.detectors.simulated import TruthDetector

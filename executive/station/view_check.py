@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from executive.cell.config import CellConfig
 from executive.cell.frame import Box
 from executive.geometry import Array, Pose
-from executive.motion.arms import build_kinematics
+from executive.motion.joints import build_kinematics
 from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, project
 from executive.text.validate import KeyPath
 

@@ -13,7 +13,7 @@ from executive.cell.objects import BIN_THICKNESS, Obstacle
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Event, MotionPlanned
 from executive.geometry import Array
-from executive.motion.straight_paths import JOINT_SPEED
+from executive.motion.planner import JOINT_SPEED
 from executive.testing.fake_cell import FakeCell, load_empty_cell
 
 LATENCY = load_empty_cell().motion.planning_time

@@ -11,7 +11,7 @@ import pytest
 from executive.drivers.sim.kind import SIM_CELL_KIND
 
 from executive.cell.config import CellConfig
-from executive.motion.arms import build_kinematics
+from executive.motion.joints import build_kinematics
 from executive.station.pose_check import find_pose_errors
 from executive.testing.fake_cell import FakeCell
 from tests.motion.joint_states import reach
