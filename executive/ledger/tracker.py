@@ -397,9 +397,8 @@ class Tracker:
         Such an observation is near another observation or a known object, or it is outside of the workspace.
         """
         kept = [entry for entry in observations if entry.detection.label not in self.unknown_labels]
-        targets = [
-            each for each in self.find_objects_on_table() if each.label not in ("", *self.unknown_labels)
-        ]
+        other_labels = ("", *self.unknown_labels)
+        targets = [each for each in self.find_objects_on_table() if each.label not in other_labels]
         for entry in (entry for entry in observations if entry not in kept):
             is_separate = self._is_separate(entry.position, (*targets, *kept))
             if is_separate and self._coverage.is_in_workspace(entry.position):

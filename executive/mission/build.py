@@ -62,9 +62,8 @@ class TreeBuilder:
 
     def build_node(self, node: Node) -> TreeNode:
         """Return the behaviour for a node of the mission, with the behaviours of all nodes below it."""
-        context = NodeContext(
-            node.path, self.cell.clock, self.cell.ledger, self.blackboard, node.label, self.emit
-        )
+        cell = self.cell
+        context = NodeContext(node.path, cell.clock, cell.ledger, self.blackboard, node.label, self.emit)
         match node:
             case SkillNode():
                 return self._build_skill_leaf(context, node)

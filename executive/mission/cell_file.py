@@ -339,9 +339,8 @@ def _resolve_model_files(
     def resolve(path: str, *key_path: str) -> str:
         folder = folders.get(file.find_span(key_path).source, folders[file.source])
         if is_outside_path(path):
-            errors.append(
-                file.make_error(key_path, "outside", f'"{path}" must be a relative path without ".."')
-            )
+            message = f'"{path}" must be a relative path without ".."'
+            errors.append(file.make_error(key_path, "outside", message))
         elif path and os.path.isfile(folder / path):
             if has_outside_link(folder, path):
                 message = f'"{path}" is a link to a file outside {folder}'

@@ -138,7 +138,10 @@ def find_non_conditions(context: CheckContext, parent: ControlNode) -> Iterator[
         for node in list_nodes(value) if key.requires_conditions else ():
             if problem := _find_problem(context, node):
                 message = f"{problem}, but {parent.type_name}.{key.name} needs a condition"
-                yield make_error(node.span, "no-condition", message, _make_hint(context))
+                conditions = [name for name, skill in context.skills.items() if skill.is_condition]
+                words = [word for word, one in context.node_classes.items() if one.is_condition]
+                hint = f"Conditions: {', '.join(conditions)}; they are combined by {', '.join(words)}."
+                yield make_error(node.span, "no-condition", message, hint)
 
 
 def _find_problem(context: CheckContext, node: Node) -> str:
@@ -154,13 +157,6 @@ def _find_problem(context: CheckContext, node: Node) -> str:
         case ControlNode() if not node.is_condition:
             return "a list runs as a sequence" if node.is_list else f"{node.type_name} is no condition"
     return ""
-
-
-def _make_hint(context: CheckContext) -> str:
-    """Return a hint with all conditions and the control nodes that combine conditions."""
-    conditions = [name for name, skill in context.skills.items() if skill.is_condition]
-    combining = [word for word, node_class in context.node_classes.items() if node_class.is_condition]
-    return f"Conditions: {', '.join(conditions)}; they are combined by {', '.join(combining)}."
 
 
 def check_labels(context: CheckContext) -> Iterator[Finding]:
@@ -188,8 +184,9 @@ def check_labels(context: CheckContext) -> Iterator[Finding]:
 def check_failure_names(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every failure name that is unknown, ambiguous, or impossible in the body."""
     analysis = context.flow_analysis
-    for node in analysis.nodes.values():
-        for name, keyword, body in _find_names_with_bodies(node):
+    nodes = [node for node in analysis.nodes.values() if isinstance(node, ControlNode)]
+    for node, name in [(owner, name) for owner in nodes for name in _find_failure_names(owner)]:
+        for body in node.list_children("do"):
             flow = analysis.flows.get(body.path)
             if flow is None:
                 continue
@@ -197,23 +194,13 @@ def check_failure_names(context: CheckContext) -> Iterator[Finding]:
             if unknown_reason := _find_unknown_reason(context, name, body):
                 yield unknown_reason
             elif not matching:
-                yield _make_impossible_error(context, name, keyword, body)
+                yield _make_impossible_error(context, name, node.keyword, body)
             elif len(sources := _find_named_nodes(analysis, name, matching)) > 1:
-                places = " and ".join(
-                    f"{source.span.describe_place(name.span.source)}:{source.span.col}" for source in sources
-                )
+                spans = [source.span for source in sources]
+                places = " and ".join(f"{one.describe_place(name.span.source)}:{one.col}" for one in spans)
                 message = f"{name} is ambiguous: more than one node in the body can fail so, in {places}"
                 hint = f"Give each node, or its use, a label with as:, and write label.{name.reason}."
                 yield make_error(name.span, "ambiguous", message, hint)
-
-
-def _find_names_with_bodies(node: Node) -> Iterator[tuple[Reason, str, Node]]:
-    """Yield every failure name of a node, the keyword of the node, and the child that may fail."""
-    if not isinstance(node, ControlNode):
-        return
-    for name in _find_failure_names(node):
-        for body in node.list_children("do"):
-            yield name, node.keyword, body
 
 
 def _find_failure_names(owner: ControlNode | KeySection) -> Iterator[Reason]:

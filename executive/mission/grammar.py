@@ -295,10 +295,10 @@ def is_empty(node: YamlNode) -> bool:
 
 
 def read_settings(
-    node: YamlNode, owner: str, findings: list[Finding], example_key: str = "name"
+    node: YamlNode | None, owner: str, findings: list[Finding], example_key: str = "name"
 ) -> dict[str, Setting]:
     """Return the settings below `owner`, a skill or a key; the hint of an error shows `example_key`."""
-    if is_empty(node):
+    if node is None or is_empty(node):
         return {}
     if not isinstance(node, YamlMapping):
         message = f"the value of {owner} must be a mapping of names to values, not {node.description}"

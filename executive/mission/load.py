@@ -263,7 +263,10 @@ def load_mission(
     checker = None
     classes_by_detector = {}
     if cell is not None and config is not None:
-        findings += _warn_about_calibration(cell, config)
+        for name, camera in config.cameras.items():
+            for key, message in find_calibration_doubts(camera):
+                span = cell.find_span(("cameras", name, "calibration", key))
+                findings.append(make_warning(span, "calibration", message))
     if cell is not None and config is not None and find_checker is not None:
         try:
             checker = find_checker(config.kind)
@@ -290,7 +293,9 @@ def load_mission(
     if config is None or cell is None or has_errors:
         raise MissionError(sort_findings(findings, files.source.path))
     if checker is not None:
-        findings += _warn_about_unmeasured_detectors(cell)
+        folders = (cell.path.parent, get_shipped_folder() / "cells")
+        for keys, message in find_unmeasured_detectors(config, cell.path.parent, folders):
+            findings.append(make_warning(cell.find_span(keys, at_key=True), "not-measured", message))
     return LoadedMission(
         mission, tree, config, files.source.text, mission_path, cell.path, files.libraries,
         find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
@@ -305,19 +310,3 @@ def _make_predefined_lists(mission: Mission, config: CellConfig) -> dict[str, Se
         "bins": list(config.bins),
         "classes": list(map(str, mission.routes)),
     }
-
-
-def _warn_about_calibration(cell: CellFile, config: CellConfig) -> Iterator[Finding]:
-    """Yield a warning for each entry of a calibration that does not fit the images of its camera."""
-    for name, camera in config.cameras.items():
-        for key, message in find_calibration_doubts(camera):
-            span = cell.find_span(("cameras", name, "calibration", key))
-            yield make_warning(span, "calibration", message)
-
-
-def _warn_about_unmeasured_detectors(cell: CellFile) -> Iterator[Finding]:
-    """Yield a warning for each detector of the cell whose error rates were not measured."""
-    assert cell.config is not None
-    folders = (cell.path.parent, get_shipped_folder() / "cells")
-    for keys, message in find_unmeasured_detectors(cell.config, cell.path.parent, folders):
-        yield make_warning(cell.find_span(keys, at_key=True), "not-measured", message)

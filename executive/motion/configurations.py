@@ -260,9 +260,8 @@ class CartesianLine:
         The chain rule in the module docstring is solved for `v`, then for `a`, then for `j`.
         """
         distances = _CHECKED_FRACTIONS * length
-        q_s, q_ss, q_sss = (
-            np.abs(self._compute_derivatives(distances, order)).max(axis=0) for order in (1, 2, 3)
-        )
+        derivatives = [self._compute_derivatives(distances, order) for order in (1, 2, 3)]
+        q_s, q_ss, q_sss = (np.abs(values).max(axis=0) for values in derivatives)
         max_speeds = (
             limits.velocity / (q_s + _MIN_DIVISOR),
             # Speed that the tool reaches with its maximum acceleration on the whole line.

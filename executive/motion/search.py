@@ -106,9 +106,8 @@ class MotionSearch:
         """Plan and yield motions, the best first; motions that stop at via points are last."""
         if isinstance(self._end, Goal):
             length = self._end.slow_length or self._straight_part_length
-            all_candidates = find_candidates(
-                self._kinematics, self._limits, self.problem.start, self._end, length
-            )
+            start = self.problem.start
+            all_candidates = find_candidates(self._kinematics, self._limits, start, self._end, length)
         else:
             all_candidates = iter([Candidate(0.0, JointState.at_rest(self._end), None, None)])
         remaining_candidates = islice(all_candidates, MAX_CANDIDATES)

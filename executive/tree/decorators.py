@@ -45,9 +45,8 @@ class Invert(ControlNode):
             """Tick the body."""
             status = self.await_child(self.node.do)
             if status is Status.SUCCESS:
-                return self.fail_with_reason(
-                    "inverted", f"{self.behaviour_by_child[self.node.do].name} succeeded"
-                )
+                name = self.behaviour_by_child[self.node.do].name
+                return self.fail_with_reason("inverted", f"{name} succeeded")
             return Status.SUCCESS if status is Status.FAILURE else status
 
 
@@ -170,7 +169,6 @@ class Timeout(ControlNode):
             # 1 ns covers the rounding errors of a clock that sums control periods.
             if status is Status.RUNNING and self.clock.now >= self._deadline - 1e-9:
                 self.halt_children([self.node.do])
-                return self.fail_with_reason(
-                    "timeout", f"the body did not end within {self.node.seconds:g} s"
-                )
+                message = f"the body did not end within {self.node.seconds:g} s"
+                return self.fail_with_reason("timeout", message)
             return status

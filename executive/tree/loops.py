@@ -250,13 +250,11 @@ class Repeat(ControlNode):
 
         def _find_reached_limit(self) -> str:
             """Return the first limit that a counter has reached, as a text: `placed: 4`; "" if none."""
-            limits = (
-                f"{name}: {limit:g}" for name, limit in self.node.limits if self._read_counter(name) >= limit
-            )
-            return next(limits, "")
-
-        def _read_counter(self, name: str) -> float:
-            return self.clock.now if name == "elapsed" else self.ledger.count_items(name)
+            for name, limit in self.node.limits:
+                count = self.clock.now if name == "elapsed" else self.ledger.count_items(name)
+                if count >= limit:
+                    return f"{name}: {limit:g}"
+            return ""
 
 
 class ForEach(ControlNode):

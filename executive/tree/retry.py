@@ -305,10 +305,9 @@ class TryCatch(ControlNode):
                 if handler is not None:
                     self.report_choice("catch", failure)
                     failure = yield from self.run_child(handler)
-            failure_of_finally = (
-                (yield from self.run_child(self.node.finally_)) if self.node.finally_ else None
-            )
-            return failure or failure_of_finally
+            if self.node.finally_ and (later_failure := (yield from self.run_child(self.node.finally_))):
+                failure = failure or later_failure
+            return failure
 
 
 def _append_finally(finally_child: Node, flow: Flow, get_flow: FlowFunction) -> Flow:

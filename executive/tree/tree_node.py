@@ -326,9 +326,8 @@ class SkillLeaf(TreeNode):
         self._run: SkillRun | None = None
         self._item = ""
         # A required port names the item on which the skill acts; an optional port limits the selection.
-        self._item_ports = tuple(
-            name for name, port in skill.ports.items() if port.refers_to == "item" and port.default is ...
-        )
+        required_ports = [port for port in skill.ports.values() if port.default is ...]
+        self._item_ports = [port.name for port in required_ports if port.refers_to == "item"]
 
     @property
     def detail(self) -> str:
