@@ -282,7 +282,12 @@ def load_mission(
             compute_mass = None if cell_findings else checker.compute_mass
             findings += check_skills.check_loads(cell, config, mission, compute_mass)
             findings += check_skills.check_slots(cell, config, mission)
-    expansion = expand(mission, skills, _make_predefined_lists(mission, config) if config else {})
+    predefined_lists: dict[str, Sequence[str]] = {}
+    if config is not None:
+        scan_poses = next(iter(config.cameras.values())).scan_poses
+        labels = list(map(str, mission.routes))
+        predefined_lists = {"poses": scan_poses, "bins": list(config.bins), "classes": labels}
+    expansion = expand(mission, skills, predefined_lists)
     mission = replace(mission, quotas=expansion.quotas)
     tree = assign_paths(expansion.tree or InvalidNode(span=files.source.make_span()))
     context = CheckContext(
@@ -301,12 +306,3 @@ def load_mission(
         find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
         dict(overrides or {}), skills, replacing_cell if isinstance(replacing_cell, str) else "",
     )  # fmt: skip
-
-
-def _make_predefined_lists(mission: Mission, config: CellConfig) -> dict[str, Sequence[str]]:
-    """Return the predefined lists whose names are known before the run."""
-    return {
-        "poses": next(iter(config.cameras.values())).scan_poses,
-        "bins": list(config.bins),
-        "classes": list(map(str, mission.routes)),
-    }

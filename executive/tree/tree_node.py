@@ -358,7 +358,12 @@ class SkillLeaf(TreeNode):
             raise self._end_with_fault(message) from error
         else:
             if has_succeeded:
-                self._succeed(run.read_outputs())
+                values = run.read_outputs()
+                outputs = {port: values[port] for port in self.wiring.outputs}
+                self.blackboard.update({self.wiring.outputs[port]: value for port, value in outputs.items()})
+                self._item = self._find_item(outputs) or self._item
+                texts = {port: to_json_or_type_name(value) for port, value in outputs.items()}
+                self._end(Status.SUCCESS, outputs=texts)
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
         """Set the status; close the generator of a running skill, so that its `finally` runs.
@@ -409,12 +414,6 @@ class SkillLeaf(TreeNode):
                 return value.item
         items = (values.get(port) for port in self._item_ports)
         return next((item for item in items if isinstance(item, str) and item), "")
-
-    def _succeed(self, port_values: Mapping[str, object]) -> None:
-        outputs = {port: port_values[port] for port in self.wiring.outputs}
-        self.blackboard.update({self.wiring.outputs[port]: value for port, value in outputs.items()})
-        self._item = self._find_item(outputs) or self._item
-        self._end(Status.SUCCESS, outputs={port: to_json_or_type_name(outputs[port]) for port in outputs})
 
     def _end_with_fault(self, message: str) -> Fault:
         """End the node, and return the fault, which the caller raises."""
