@@ -1,9 +1,10 @@
-"""Loading of a mission: reading and checking of the mission file, its libraries and its cell file."""
+"""Loading of a mission: reading and checking of its files, and construction of its behaviour tree."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from itertools import islice
 from pathlib import Path
 from typing import Protocol, cast
@@ -13,16 +14,20 @@ from pydantic import JsonValue
 from executive.behaviours import Skills
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.objects import Quotas
+from executive.cell.protocols import Cell
 from executive.errors import InputError
+from executive.events import Emit
 from executive.mission import check_nodes, check_skills, check_variables
 from executive.mission.analysis import CheckContext, UnhandledFailure, find_unhandled_failures
 from executive.mission.cell_file import CellFile, read_cell
 from executive.mission.expand import assign_paths, expand
+from executive.mission.grammar import SEQUENCE_KEYWORD
 from executive.mission.mission_file import Mission, Subtree, parse_library, parse_mission
 from executive.mission.node_parser import NodeParser
+from executive.mission.ports import convert_setting, find_literals, find_wires
 from executive.perception.camera_model import find_calibration_doubts
 from executive.perception.detectors.envelope import find_unmeasured_detectors
-from executive.skill import Skill
+from executive.skill import Direction, Param, Port, Skill
 from executive.text.findings import Finding, MissionError, Source, make_warning, sort_findings
 from executive.text.validate import KeyPath
 from executive.text.yaml_files import (
@@ -33,8 +38,10 @@ from executive.text.yaml_files import (
     parse_yaml,
     read_source,
 )
-from executive.tree.node import ControlNodes, load_control_nodes
-from executive.tree.specification import Constant, InvalidNode, LocatedName, Node
+from executive.tree.blackboard import Blackboard, NodeContext, Wiring
+from executive.tree.node import ControlNode, ControlNodes, load_control_nodes
+from executive.tree.specification import Constant, InvalidNode, LocatedName, Node, SkillNode, SubtreeNode
+from executive.tree.tree_node import SkillLeaf, TreeNode
 
 Check = Callable[[CheckContext], Iterator[Finding]]
 """Function that yields the findings of one check."""
@@ -306,3 +313,81 @@ def load_mission(
         find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
         dict(overrides or {}), skills, replacing_cell if isinstance(replacing_cell, str) else "",
     )  # fmt: skip
+
+
+def build_tree(
+    loaded: LoadedMission,
+    skills: Mapping[str, type[Skill]],
+    cell: Cell,
+    blackboard: Blackboard,
+    emit: Emit,
+    substitutes: Mapping[str, type[Skill]] | None = None,
+) -> TreeNode:
+    """Return the root of a new behaviour tree; every node of the tree has a unique, readable `path`.
+
+    `skills` contains the installed skills by name. `substitutes` contains skills that run in place of the
+    mission's skills, by pattern of node paths. In a pattern, `*` matches any characters, including `/`. The
+    first matching pattern applies.
+
+    Raises:
+        InputError: A pattern matches no skill node.
+    """
+    builder = TreeBuilder({**loaded.skills, **skills}, cell, blackboard, emit, substitutes or {})
+    root = builder.build_node(loaded.tree)
+    paths = [node.path for node in root.iterate() if isinstance(node, SkillLeaf)]
+    for pattern in builder.substitutes:
+        if not any(fnmatchcase(path, pattern) for path in paths):
+            raise InputError(f'no skill node matches "{pattern}"; the skill nodes are: {", ".join(paths)}')
+    return root
+
+
+@dataclass(frozen=True)
+class TreeBuilder:
+    """Builder of the behaviour tree of one mission.
+
+    Attributes:
+        substitutes: Skills that run in place of the mission's skills, by pattern of node paths.
+    """
+
+    skills: Mapping[str, type[Skill]]
+    cell: Cell
+    blackboard: Blackboard
+    emit: Emit
+    substitutes: Mapping[str, type[Skill]]
+    node_classes: ControlNodes = field(default_factory=load_control_nodes)
+
+    def build_node(self, node: Node) -> TreeNode:
+        """Return the behaviour for a node of the mission, with the behaviours of all nodes below it."""
+        cell = self.cell
+        context = NodeContext(node.path, cell.clock, cell.ledger, self.blackboard, node.label, self.emit)
+        match node:
+            case SkillNode():
+                return self._build_skill_leaf(context, node)
+            case ControlNode():
+                return node.Behaviour(context, node, self.build_node)
+            case SubtreeNode(body=Node() as subtree_root):
+                body = self.build_node(subtree_root)
+                # A node has one label, so the label of the `use` belongs to a sequence around the subtree.
+                root = body
+                if node.label:
+                    sequence = self.node_classes[SEQUENCE_KEYWORD].make({}, do=(subtree_root,))
+                    root = sequence.Behaviour(context, sequence, lambda _: body)
+                root.subtree_names = (node.name, *root.subtree_names)
+                return root
+        raise AssertionError(f"a checked mission contains no {type(node).__name__}")
+
+    def _build_skill_leaf(self, context: NodeContext, node: SkillNode) -> TreeNode:
+        skill = self.skills[node.skill]
+        declarations: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
+        input_wires = list(find_wires(node, skill, Direction.IN))
+        wiring = Wiring(
+            constants={
+                name: convert_setting(value.value, declarations[name]) for name, value in find_literals(node)
+            },
+            inputs={wire.port.name: wire.variable for wire in input_wires},
+            fields={wire.port.name: wire.field for wire in input_wires if wire.field},
+            outputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.OUT)},
+        )
+        patterns = (pattern for pattern in self.substitutes if fnmatchcase(node.path, pattern))
+        executed_skill = next((self.substitutes[pattern] for pattern in patterns), skill)
+        return SkillLeaf(context, node.skill, executed_skill, wiring, self.cell)

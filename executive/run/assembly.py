@@ -14,8 +14,7 @@ from executive.cell.devices import Rebuildable, check_driver_options
 from executive.cell.protocols import Cell, Operator
 from executive.errors import Fault, InputError
 from executive.events import Observer, RequestGiven, RunEnded, RunResumed, RunStarted
-from executive.mission.build import build_tree
-from executive.mission.load import LoadedMission
+from executive.mission.load import LoadedMission, build_tree
 from executive.plugins import list_versions
 from executive.run.operator import ScriptedOperator, TerminalOperator
 from executive.run.replay import InputLog, Interruption, Replay
