@@ -82,11 +82,11 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
                 yield make_warning(wire.span, "unread", message, hint)
         if not isinstance(node, SubtreeNode):
             continue
-        for setting in node.returns.values():
-            name = setting.value.name if isinstance(setting.value, Reference) else ""
+        for value in node.returns.values():
+            name = value.name if isinstance(value, Reference) else ""
             if name in node.written_variables and name not in read_variables:
                 message = f"the subtree returns ${name}, which no node reads"
-                yield make_warning(setting.value.span, "unread", message)
+                yield make_warning(value.span, "unread", message)
 
 
 def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:

@@ -260,28 +260,28 @@ class _Expander:
         """Return the variable of the caller for each name in `returns` of the subtree."""
         returned_names = subtree.returns or ()
         variables: dict[str, str] = {name: name for name in returned_names}
-        for name, setting in use.returns.items():
+        for name, value in use.returns.items():
             if name not in returned_names:
                 hint = suggest_choice(name, returned_names, "Returned variables")
                 message = f'the subtree "{subtree.name}" does not return "{name}"'
-                self._add_error(setting.name_span, "unknown-return", message, hint)
-            elif isinstance(setting.value, Reference) and not setting.value.field:
-                variables[name] = setting.value.name
-            elif not isinstance(setting.value, InvalidValue):
+                self._add_error(name.span, "unknown-return", message, hint)
+            elif isinstance(value, Reference) and not value.field:
+                variables[name] = value.name
+            elif not isinstance(value, InvalidValue):
                 message = f"returns.{name} must be a variable, for example $mine"
-                self._add_error(setting.value.span, "wrong-type", message)
+                self._add_error(value.span, "wrong-type", message)
         return variables
 
     def _collect_arguments(self, use: SubtreeNode, subtree: Subtree) -> dict[str, Value]:
         """Return the value of every argument of the subtree; a missing value is an `InvalidValue`."""
-        for name, setting in use.arguments.items():
+        for name in use.arguments:
             if name not in subtree.arguments:
                 hint = suggest_choice(name, subtree.arguments, "Arguments of the subtree")
                 message = f'the subtree "{subtree.name}" has no argument "{name}"'
-                self._add_error(setting.name_span, "unknown-argument", message, hint)
+                self._add_error(name.span, "unknown-argument", message, hint)
         values: dict[str, Value] = {}
         for name, default in subtree.arguments.items():
-            value = use.arguments[name].value if name in use.arguments else default
+            value = use.arguments.get(name, default)
             values[name] = value or InvalidValue(use.span)
             if value is None:
                 message = f'the subtree "{subtree.name}" needs the argument "{name}"'

@@ -23,7 +23,6 @@ from executive.tree.specification import (
     LocatedName,
     Reason,
     Reference,
-    Setting,
     Value,
 )
 
@@ -296,7 +295,7 @@ def is_empty(node: YamlNode) -> bool:
 
 def read_settings(
     node: YamlNode | None, owner: str, findings: list[Finding], example_key: str = "name"
-) -> dict[str, Setting]:
+) -> dict[LocatedName, Value]:
     """Return the settings below `owner`, a skill or a key; the hint of an error shows `example_key`."""
     if node is None or is_empty(node):
         return {}
@@ -305,8 +304,8 @@ def read_settings(
         hint = f"Write {owner}: {{{example_key}: {node.text}}}." if isinstance(node, YamlScalar) else ""
         findings.append(make_error(node.span, "wrong-type", message, hint))
         return {}
-    entries = ((entry.key, entry.value) for entry in node.entries)
-    return {key.text: Setting(key.span, read_value(value, findings)) for key, value in entries}
+    entries = ((LocatedName(entry.key.text, entry.key.span), entry.value) for entry in node.entries)
+    return {name: read_value(value, findings) for name, value in entries}
 
 
 def read_value(node: YamlNode, findings: list[Finding]) -> Value:

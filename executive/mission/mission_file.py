@@ -244,7 +244,7 @@ def _read_quotas(reader: MappingReader) -> dict[QuotaKey, Value]:
             reader.add_error(node.span, "empty-list", f"the quota of {bin} names no class")
         else:
             labels = read_settings(node, "quotas", reader.findings).items()
-            quotas |= {(bin, LocatedName(label, limit.name_span)): limit.value for label, limit in labels}
+            quotas |= {(bin, label): limit for label, limit in labels}
     return quotas
 
 

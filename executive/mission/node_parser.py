@@ -29,6 +29,7 @@ from executive.tree.specification import (
     Constant,
     InvalidNode,
     InvalidValue,
+    LocatedName,
     Node,
     Reason,
     Reference,
@@ -184,7 +185,7 @@ class NodeParser:
         class_key = grammar.BEHAVIOUR_CLASS
         span = entry.key.span
         settings = read_settings(entry.value, keyword, self.findings, class_key)
-        path = settings.pop(class_key).value if class_key in settings else None
+        path = settings.pop(LocatedName(class_key), None)
         if isinstance(path, Constant) and isinstance(path.value, str):
             try:
                 skill = load_behaviour(path.value)

@@ -17,7 +17,7 @@ from executive.skill import Direction, Param, Port, Skill
 from executive.text.findings import Span, describe_validation_error, describe_value, suggest_word
 from executive.tree.keys import Elements, Key, is_union
 from executive.tree.node import ControlNode
-from executive.tree.specification import Constant, Node, Reference, SkillNode, VariableName
+from executive.tree.specification import Constant, LocatedName, Node, Reference, SkillNode, VariableName
 
 _DESCRIPTIONS = {
     str: "a text",
@@ -240,8 +240,7 @@ def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Seq
     declarations: list[Param | Port] = [*(param for param in params if param.accepts_variable), *ports]
     wires: list[Wire] = []
     for declaration in declarations:
-        setting = node.settings.get(declaration.name)
-        value = setting.value if setting else None
+        value = node.settings.get(LocatedName(declaration.name))
         if isinstance(value, Reference):
             wires.append(Wire(node, declaration, value.name, value.span, True, value.field))
         # `check_settings` reports a constant for an output.
@@ -269,8 +268,8 @@ def find_node_wires(node: Node, skills: Mapping[str, type[Skill]], direction: Di
 
 def find_literals(node: SkillNode) -> Sequence[tuple[str, Constant]]:
     """Return the name and the constant of every param and port that has a constant."""
-    values = [(name, setting.value) for name, setting in node.settings.items()]
-    return [(name, value) for name, value in values if isinstance(value, Constant)]
+    settings = node.settings.items()
+    return [(str(name), value) for name, value in settings if isinstance(value, Constant)]
 
 
 def find_written_variables(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
