@@ -23,7 +23,7 @@ from executive.text.findings import (
 )
 from executive.tree.flow import UNKNOWN_NAME, Flow, FlowState, PossibleFailure, PossibleToolState
 from executive.tree.keys import PREDEFINED_LISTS, KeySection, KeyValue, list_nodes
-from executive.tree.node import ControlNode, NodeFinding
+from executive.tree.node import ControlNode
 from executive.tree.specification import Constant, Node, Reason, Reference, SkillNode, SubtreeNode
 
 
@@ -85,8 +85,7 @@ def run_node_checks(context: CheckContext) -> Iterator[Finding]:
             yield from non_conditions
             continue
         analysis = CheckerAnalysis(context, node.path in halted_paths, node.path in concurrent_paths)
-        for node_finding in node.check(analysis):
-            yield _convert_node_finding(node, node_finding)
+        yield from node.check(analysis)
 
 
 def _find_paths_below(
@@ -95,19 +94,6 @@ def _find_paths_below(
     """Return the paths of all nodes in and below the selected children of all control nodes."""
     roots = [child for node in context.control_nodes for child in select_children(node)]
     return {node.path for root in roots for node in root.walk()}
-
-
-def _convert_node_finding(node: ControlNode, node_finding: NodeFinding) -> Finding:
-    """Return the finding at the position of the key, reason or child that it names, or else of `node`."""
-    span = node.span
-    message = node_finding.message
-    if isinstance(node_finding.place, Reason | Node):
-        span = node_finding.place.span
-    elif isinstance(value := node.settings.get(str(node_finding.place)), Constant):
-        span = value.span
-        message = message + value.origin_note
-    make_finding = make_warning if node_finding.is_warning else make_error
-    return make_finding(span, node_finding.code, message, node_finding.hint)
 
 
 @dataclass

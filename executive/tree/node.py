@@ -16,30 +16,11 @@ from typing import ClassVar, Protocol, TypeAlias
 from executive.errors import InputError
 from executive.plugins import PluginEntry, list_entries
 from executive.skill import Skill
+from executive.text.findings import Finding
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.keys import KeyOwner
 from executive.tree.specification import Node, Reason
 from executive.tree.tree_node import NodeBehaviour as NodeBehaviour
-
-
-@dataclass(frozen=True)
-class NodeFinding:
-    """A mistake in the mission that a control node finds.
-
-    Attributes:
-        place: Place of the mistake: a key of the node, a reason under a key, or a child; "" for the node
-            itself.
-        code: Code of the finding, such as `endless`.
-        message: Description of the mistake, one sentence.
-        hint: Description of a remedy, or "".
-        is_warning: True if the mission can run nevertheless.
-    """
-
-    place: str | Reason | Node
-    code: str
-    message: str
-    hint: str = ""
-    is_warning: bool = False
 
 
 class NodeAnalysis(Protocol):
@@ -169,7 +150,7 @@ class ControlNode(KeyOwner, Node):
         """Return the outcomes that are possible from a state; `get_flow` returns the outcomes of a child."""
         raise NotImplementedError
 
-    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[Finding]:
         """Yield mistakes in the use of this control node in the mission."""
         yield from ()
 
