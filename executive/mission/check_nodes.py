@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations, permutations
 
 from pydantic import TypeAdapter
@@ -11,7 +10,7 @@ from pydantic import TypeAdapter
 from executive.mission import grammar
 from executive.mission.analysis import CheckContext, FlowAnalysis
 from executive.mission.ports import ValueProblem, Wire, convert_constant
-from executive.skill import EMPTY, HOLDING, Direction, Skill, list_condition_violations
+from executive.skill import EMPTY, HOLDING, Direction, list_condition_violations
 from executive.text.findings import (
     Finding,
     Span,
@@ -23,7 +22,7 @@ from executive.text.findings import (
 )
 from executive.tree.flow import UNKNOWN_NAME, Flow, FlowState, PossibleFailure, PossibleToolState
 from executive.tree.keys import PREDEFINED_LISTS, KeySection, KeyValue, list_nodes
-from executive.tree.node import ControlNode
+from executive.tree.node import ControlNode, NodeAnalysis
 from executive.tree.specification import Constant, Node, Reason, Reference, SkillNode, SubtreeNode
 
 
@@ -78,14 +77,20 @@ def run_node_checks(context: CheckContext) -> Iterator[Finding]:
 
     For a control node without such errors, yield the findings of its method `check`.
     """
+
+    def compute_flow(child: Node, entry: FlowState, is_first_tick: bool) -> Flow:
+        return FlowAnalysis(child, context.skills, entry, is_first_tick=is_first_tick).root_flow
+
+    flows = context.flow_analysis.flows
     halted_paths = _find_paths_below(context, lambda node: node.children_halted_by_sibling)
     concurrent_paths = _find_paths_below(context, lambda node: node.concurrent_children)
     for node in context.control_nodes:
         if non_conditions := list(find_non_conditions(context, node)):
             yield from non_conditions
             continue
-        analysis = CheckerAnalysis(context, node.path in halted_paths, node.path in concurrent_paths)
-        yield from node.check(analysis)
+        is_halted = node.path in halted_paths
+        is_concurrent = node.path in concurrent_paths
+        yield from node.check(NodeAnalysis(flows, context.skills, compute_flow, is_halted, is_concurrent))
 
 
 def _find_paths_below(
@@ -94,28 +99,6 @@ def _find_paths_below(
     """Return the paths of all nodes in and below the selected children of all control nodes."""
     roots = [child for node in context.control_nodes for child in select_children(node)]
     return {node.path for root in roots for node in root.walk()}
-
-
-@dataclass
-class CheckerAnalysis:
-    """Implementation of `NodeAnalysis` for one control node."""
-
-    context: CheckContext
-    is_halted_by_sibling: bool
-    is_concurrent: bool
-
-    def get_flow(self, child: Node) -> Flow | None:
-        """Return the possible outcomes of a child; None if the child never runs."""
-        return self.context.flow_analysis.flows.get(child.path)
-
-    def compute_flow(self, child: Node, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
-        """Return the possible outcomes of a child that starts in `entry`; optionally, of its first tick."""
-        return FlowAnalysis(child, self.context.skills, entry, is_first_tick=is_first_tick).root_flow
-
-    def list_skills(self, node: Node) -> Mapping[str, type[Skill] | None]:
-        """Return the class of each skill in and below a node, by name; None if not installed."""
-        names = [node.skill for node in node.walk() if isinstance(node, SkillNode)]
-        return {name: self.context.skills.get(name) for name in names}
 
 
 def find_non_conditions(context: CheckContext, parent: ControlNode) -> Iterator[Finding]:

@@ -8,10 +8,10 @@ class `Behaviour` runs the node: `start` and `step`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import ClassVar, Protocol, TypeAlias
+from typing import ClassVar, TypeAlias
 
 from executive.errors import InputError
 from executive.plugins import PluginEntry, list_entries
@@ -19,32 +19,37 @@ from executive.skill import Skill
 from executive.text.findings import Finding
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.keys import KeyOwner
-from executive.tree.specification import Node, Reason
+from executive.tree.specification import Node, Reason, SkillNode
 from executive.tree.tree_node import NodeBehaviour as NodeBehaviour
 
 
-class NodeAnalysis(Protocol):
+@dataclass(frozen=True)
+class NodeAnalysis:
     """Static analysis of a control node in a mission and of the children of the node.
 
     Attributes:
+        flows: Possible outcomes of each node that may run, by path.
+        skills: Installed skills by name.
+        compute_flow: Returns the possible outcomes of a child that starts in a state; if the last argument is
+            True, only outcomes in the first tick of the child are possible.
         is_halted_by_sibling: True if the node is halted when a concurrent node ends.
         is_concurrent: True if another node may run at the same time.
     """
 
+    flows: Mapping[str, Flow]
+    skills: Mapping[str, type[Skill]]
+    compute_flow: Callable[[Node, FlowState, bool], Flow]
     is_halted_by_sibling: bool
     is_concurrent: bool
 
     def get_flow(self, child: Node) -> Flow | None:
         """Return the possible outcomes of a child; None if the child never runs."""
-
-    def compute_flow(self, child: Node, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
-        """Return the possible outcomes of a child that starts in a state.
-
-        If `is_first_tick` is True, only outcomes in the first tick of the child are possible.
-        """
+        return self.flows.get(child.path)
 
     def list_skills(self, node: Node) -> Mapping[str, type[Skill] | None]:
         """Return the class of each skill in and below a node, by name; None if not installed."""
+        names = [node.skill for node in node.walk() if isinstance(node, SkillNode)]
+        return {name: self.skills.get(name) for name in names}
 
 
 @dataclass(frozen=True)

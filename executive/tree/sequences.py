@@ -136,7 +136,7 @@ class OrderedNode(ControlNode):
 
     def _may_continue_at_once(self, child: Node, analysis: NodeAnalysis) -> bool:
         """Return True if a child may end with `continue_status` in its first tick."""
-        flow = analysis.compute_flow(child, UNKNOWN_STATE, is_first_tick=True)
+        flow = analysis.compute_flow(child, UNKNOWN_STATE, True)
         return self._compute_next_entry(flow) is not None
 
     @property
@@ -340,7 +340,7 @@ class Guard(ControlNode):
         fails.
         """
         is_empty = body_end.tool_states is not None and body_end.find_tool_state(HOLDING) is None
-        return is_empty and analysis.compute_flow(self.holds, body_end).success is None
+        return is_empty and analysis.compute_flow(self.holds, body_end, False).success is None
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return why the guard passed on a failure of its body."""
