@@ -285,7 +285,7 @@ def _explain_tool_state(flow: FlowAnalysis, tool: PossibleToolState, span: Span)
 
 def find_shared_resources(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every two concurrent branches that use the same part of the cell."""
-    for branches in _list_concurrent_branches(context):
+    for branches in (node.concurrent_children for node in context.control_nodes):
         users_by_branch = [_find_resource_users(context, branch) for branch in branches]
         for users, later_users in combinations(users_by_branch, 2):
             # One error reports all parts of the cell that the same two skills share.
@@ -306,7 +306,7 @@ def find_shared_resources(context: CheckContext) -> Iterator[Finding]:
 
 def find_shared_variables(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every two concurrent branches that write the same variable."""
-    for branches in _list_concurrent_branches(context):
+    for branches in (node.concurrent_children for node in context.control_nodes):
         writes_by_branch = [_find_first_writes(context, branch) for branch in branches]
         for writes, later_writes in combinations(writes_by_branch, 2):
             for variable, later_wire in later_writes.items():
@@ -321,7 +321,7 @@ def find_shared_variables(context: CheckContext) -> Iterator[Finding]:
 
 def find_read_races(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every input whose variable a concurrent branch may write."""
-    for branches in _list_concurrent_branches(context):
+    for branches in (node.concurrent_children for node in context.control_nodes):
         reads = [list(_find_reads(context, branch)) for branch in branches]
         writes = [_find_first_writes(context, branch) for branch in branches]
         for reading_index, writing_index in permutations(range(len(branches)), 2):
@@ -339,13 +339,6 @@ def find_read_races(context: CheckContext) -> Iterator[Finding]:
                         "may write it, in another branch of the same parallel"
                     )
                     yield make_error(read.span, "shared-variable", message, write.rename_hint)
-
-
-def _list_concurrent_branches(context: CheckContext) -> Iterator[Sequence[Node]]:
-    """Yield the concurrent children of each control node that has concurrent children."""
-    for node in context.control_nodes:
-        if node.concurrent_children:
-            yield node.concurrent_children
 
 
 def _find_first_leaf(node: Node) -> Node:

@@ -16,15 +16,7 @@ from pydantic.fields import FieldInfo
 
 from executive.text.findings import Finding, Span, make_error, suggest_choice
 from executive.text.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence, list_scalars
-from executive.tree.specification import (
-    Child,
-    Constant,
-    InvalidValue,
-    LocatedName,
-    Reason,
-    Reference,
-    Value,
-)
+from executive.tree.specification import Child, Constant, InvalidValue, LocatedName, Reason, Reference, Value
 
 NAME_EXPRESSION = "[A-Za-z_][A-Za-z0-9_]*"
 """Regular expression of the names of params, arguments, variables and subtrees."""

@@ -10,7 +10,7 @@ from py_trees.common import Status
 from executive.skill import Seconds
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.keys import key
-from executive.tree.node import Advice, ControlNode, Counterpart, PropagatedFailure
+from executive.tree.node import ControlNode, Counterpart, PropagatedFailure
 from executive.tree.specification import Child, Node
 from executive.tree.tree_node import NodeBehaviour
 
@@ -141,10 +141,10 @@ class Timeout(ControlNode):
         """Return the duration of the body and the limit."""
         return f"handles no failures; {failure.duration:.2f} of {self.seconds:g} s had passed"
 
-    def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
+    def advise(self, failure: PropagatedFailure) -> Iterator[tuple[str, Node]]:
         """Yield the advice to increase the limit after a timeout."""
         if failure.child is None:
-            yield Advice(f"allow more than {self.seconds:g} s")
+            yield f"allow more than {self.seconds:g} s", self
 
     @property
     def counterpart(self) -> Counterpart | None:

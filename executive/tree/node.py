@@ -82,19 +82,6 @@ class PropagatedFailure:
 
 
 @dataclass(frozen=True)
-class Advice:
-    """A change of the mission after which a failure would not end the run.
-
-    Attributes:
-        text: Description of the change without the line number, which the diagnosis adds.
-        child: Node that the author should change; None for the node itself.
-    """
-
-    text: str
-    child: Node | None = None
-
-
-@dataclass(frozen=True)
 class Counterpart:
     """Node type that BehaviorTree.CPP 4 registers, with the semantics of a control node.
 
@@ -186,8 +173,11 @@ class ControlNode(KeyOwner, Node):
         """Return the number of the failed attempt and the maximum number; None if the node never retries."""
         return None
 
-    def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
-        """Yield changes of the mission after which this node would handle a failure."""
+    def advise(self, failure: PropagatedFailure) -> Iterator[tuple[str, Node]]:
+        """Yield changes of the mission after which this node would handle a failure.
+
+        Each change is a text without the line number, and the node that the author should change.
+        """
         yield from ()
 
     def list_contingencies(self) -> Iterator[tuple[str, Node]]:

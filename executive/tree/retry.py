@@ -11,7 +11,7 @@ from executive.text.findings import Finding, make_warning
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.keys import KeySection, Reasons, key
 from executive.tree.loops import GeneratorBehaviour, NodeRun
-from executive.tree.node import Advice, ControlNode, Counterpart, NodeAnalysis, PropagatedFailure
+from executive.tree.node import ControlNode, Counterpart, NodeAnalysis, PropagatedFailure
 from executive.tree.specification import Child, Constant, Node, Reason, format_reasons
 
 _GIVE_UP = "give up: the recovery failed"
@@ -136,13 +136,13 @@ class Retry(ControlNode):
         # The node passed on the failure of the last attempt without handling it.
         return handled_count + 1, self.attempts
 
-    def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
+    def advise(self, failure: PropagatedFailure) -> Iterator[tuple[str, Node]]:
         """Yield the advice to handle a failure in the recovery, or to allow more attempts."""
         attempt, attempts = self.count_attempts(failure)
         if failure.last_choice == _GIVE_UP:
-            yield Advice(f"handle {failure.last_handled_name} in the recovery", child=self.recover)
+            yield f"handle {failure.last_handled_name} in the recovery", self.recover or self
         elif attempt == attempts and (not self.on or failure.matches(self.on)):
-            yield Advice(f"allow more than {attempts} attempt{'s' if attempts > 1 else ''}")
+            yield f"allow more than {attempts} attempt{'s' if attempts > 1 else ''}", self
 
     def list_contingencies(self) -> Iterator[tuple[str, Node]]:
         """Yield the key `recover` and the node at this key, if the node has a recovery."""
@@ -281,10 +281,10 @@ class TryCatch(ControlNode):
         reasons = [reason for handler in self.catch for reason in handler.on]
         return f"catches only {format_reasons(reasons)}" if reasons else "has no catch"
 
-    def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
+    def advise(self, failure: PropagatedFailure) -> Iterator[tuple[str, Node]]:
         """Yield the advice to add a handler for a failure of the body."""
         if failure.child is self.do:
-            yield Advice("catch this failure in the try")
+            yield "catch this failure in the try", self
 
     def list_contingencies(self) -> Iterator[tuple[str, Node]]:
         """Yield the handlers with names such as `catch on Grasp.missed`, then `finally`."""
