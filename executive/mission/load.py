@@ -103,11 +103,7 @@ class MissionFiles:
 
 
 def read_mission(
-    path: Path,
-    overrides: Mapping[str, str],
-    skills: Skills,
-    node_classes: ControlNodes,
-    replacing_cell: str | CellFile = "",
+    path: Path, overrides: Mapping[str, str], skills: Skills, replacing_cell: str | CellFile = ""
 ) -> MissionFiles:
     """Return the content of a mission file, its libraries, and its cell file or the cell that replaces it.
 
@@ -119,7 +115,7 @@ def read_mission(
     root, findings = parse_yaml(source)
     if root is None:
         raise MissionError(sort_findings(findings, source.path))
-    parser = NodeParser(findings, skills, node_classes)
+    parser = NodeParser(findings, skills, load_control_nodes())
     mission = parse_mission(root, overrides, parser)
     subtrees = dict(mission.subtrees)
     texts = {str(file): _add_library(file, path.parent, parser, subtrees) for file in mission.libraries}
@@ -260,8 +256,7 @@ def load_mission(
         InputError: The mission or the cell does not exist.
     """
     mission_path = find_mission(path)
-    node_classes = load_control_nodes()
-    files = read_mission(mission_path, overrides or {}, skills, node_classes, replacing_cell)
+    files = read_mission(mission_path, overrides or {}, skills, replacing_cell)
     mission = files.mission
     cell = files.cell
     findings = list(files.findings)
@@ -297,9 +292,9 @@ def load_mission(
     expansion = expand(mission, skills, predefined_lists)
     mission = replace(mission, quotas=expansion.quotas)
     tree = assign_paths(expansion.tree or InvalidNode(span=files.source.make_span()))
-    context = CheckContext(
-        mission, tree, expansion.unused_subtrees, skills, node_classes, config, classes_by_detector
-    )
+    unused_subtrees = expansion.unused_subtrees
+    node_classes = load_control_nodes()
+    context = CheckContext(mission, tree, unused_subtrees, skills, node_classes, config, classes_by_detector)
     findings += (*expansion.findings, *run_checks(context))
     has_errors = expansion.tree is None or any(finding.severity == "error" for finding in findings)
     if config is None or cell is None or has_errors:

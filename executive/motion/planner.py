@@ -77,7 +77,7 @@ class Planner:
         start = np.asarray(q_start, dtype=float)
         end = goal if isinstance(goal, Goal) else np.asarray(goal, dtype=float)
         task_before_contact = _treat_target_as_obstacle(task)
-        search = MotionSearch(self._config, self.kinematics, self.limits, start, end, task_before_contact)
+        search = MotionSearch(self._config, self.kinematics, start, end, task_before_contact)
         errors: list[str] = []
         for motion in search.plan_motions():
             try:
