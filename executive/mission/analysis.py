@@ -130,7 +130,7 @@ class CheckContext:
     mission: Mission
     tree: Node
     unused_subtrees: tuple[Node, ...]
-    skills: Mapping[str, type[Skill]]
+    skills: Skills
     node_classes: ControlNodes
     cell: CellConfig | None
     classes_by_detector: Mapping[str, tuple[str, ...] | None]

@@ -308,9 +308,8 @@ def _find_wrong_looks(file: CellFile, config: CellConfig) -> Iterator[Finding]:
             message = f'the cell has no class "{name}"; it has: {", ".join(config.objects)}'
             yield file.make_error(key_path, "unknown-class", message)
         elif look.looks_like:
-            message = (
-                f"{name} looks like {look.looks_like}, so no detector reports {name}; name another class"
-            )
+            problem = f"{name} looks like {look.looks_like}, so no detector reports {name}"
+            message = f"{problem}; name another class"
             yield file.make_error(key_path, "wrong-value", message)
         elif None in (section.mass, look.mass) or _get_size(section) != _get_size(look):
             message = f"{label} looks like {name}, so both need a mass, and equal height, radius and ring"

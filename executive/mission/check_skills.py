@@ -119,15 +119,12 @@ def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:
         detected = section.looks_like  # The detector reports this class for objects of the class `label`.
         if detected not in objects:
             continue
+        problem = f"{label} looks like {detected}"
         if label in routes and detected not in routes:
-            message = (
-                f"{label} looks like {detected}, which has no route, so no object of either class is selected"
-            )
+            message = f"{problem}, which has no route, so no object of either class is selected"
             yield make_error(spans[label], "unweighed", message, f"Add a route for {detected}.")
         elif detected in routes and routes.get(label) != routes[detected] and not is_weighed:
-            message = (
-                f"{label} looks like {detected}, their routes differ, and no node weighs the held object"
-            )
+            message = f"{problem}, their routes differ, and no node weighs the held object"
             hint = f"Before the transport, insert {' or '.join(weighing_skills)}."
             yield make_error(spans.get(label, spans[detected]), "unweighed", message, hint)
 

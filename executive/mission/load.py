@@ -27,7 +27,7 @@ from executive.mission.node_parser import NodeParser
 from executive.mission.ports import convert_setting, find_literals, find_wires
 from executive.perception.camera_model import find_calibration_doubts
 from executive.perception.detectors.envelope import find_unmeasured_detectors
-from executive.skill import Direction, Param, Port, Skill
+from executive.skill import Direction, Param, Port
 from executive.text.findings import Finding, MissionError, Source, make_warning, sort_findings
 from executive.text.validate import KeyPath
 from executive.text.yaml_files import (
@@ -212,7 +212,7 @@ class LoadedMission:
     unhandled_failures: tuple[UnhandledFailure, ...]
     warnings: tuple[Finding, ...]
     overrides: Mapping[str, str]
-    skills: Mapping[str, type[Skill]]
+    skills: Skills
     replacing_cell: str
 
     @property
@@ -236,7 +236,7 @@ class LoadedMission:
 
 def load_mission(
     path: str | Path,
-    skills: Mapping[str, type[Skill]],
+    skills: Skills,
     overrides: Mapping[str, str] | None = None,
     find_checker: CheckerFinder | None = None,
     replacing_cell: str | CellFile = "",
@@ -312,11 +312,11 @@ def load_mission(
 
 def build_tree(
     loaded: LoadedMission,
-    skills: Mapping[str, type[Skill]],
+    skills: Skills,
     cell: Cell,
     blackboard: Blackboard,
     emit: Emit,
-    substitutes: Mapping[str, type[Skill]] | None = None,
+    substitutes: Skills | None = None,
 ) -> TreeNode:
     """Return the root of a new behaviour tree; every node of the tree has a unique, readable `path`.
 
@@ -344,11 +344,11 @@ class TreeBuilder:
         substitutes: Skills that run in place of the mission's skills, by pattern of node paths.
     """
 
-    skills: Mapping[str, type[Skill]]
+    skills: Skills
     cell: Cell
     blackboard: Blackboard
     emit: Emit
-    substitutes: Mapping[str, type[Skill]]
+    substitutes: Skills
     node_classes: ControlNodes = field(default_factory=load_control_nodes)
 
     def build_node(self, node: Node) -> TreeNode:
@@ -374,11 +374,10 @@ class TreeBuilder:
     def _build_skill_leaf(self, context: NodeContext, node: SkillNode) -> TreeNode:
         skill = self.skills[node.skill]
         declarations: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
+        literals = find_literals(node)
         input_wires = list(find_wires(node, skill, Direction.IN))
         wiring = Wiring(
-            constants={
-                name: convert_setting(value.value, declarations[name]) for name, value in find_literals(node)
-            },
+            constants={name: convert_setting(one.value, declarations[name]) for name, one in literals},
             inputs={wire.port.name: wire.variable for wire in input_wires},
             fields={wire.port.name: wire.field for wire in input_wires if wire.field},
             outputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.OUT)},

@@ -199,9 +199,8 @@ class NodeParser:
             self.behaviours[name] = skill
             return SkillNode.model_construct(span=span, label=label, skill=name, settings=settings)
         if isinstance(path, Constant | Reference):
-            message = (
-                f"{keyword}.{class_key} must be an import path, for example py_trees.behaviours:TickCounter"
-            )
+            example = "for example py_trees.behaviours:TickCounter"
+            message = f"{keyword}.{class_key} must be an import path, {example}"
             self.add_error(path.span, "wrong-type", message)
         elif path is None and (is_empty(entry.value) or isinstance(entry.value, YamlMapping)):
             self.add_error(span, "missing-key", f'{keyword} needs the key "{class_key}"')

@@ -5,13 +5,13 @@ from __future__ import annotations
 import functools
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, NoReturn, Union, cast, get_args, get_origin, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from executive.behaviours import find_mission_type
+from executive.behaviours import Skills, find_mission_type
 from executive.cell.objects import KnownItem, RefersTo
 from executive.skill import Direction, Param, Port, Skill
 from executive.text.findings import Span, describe_validation_error, describe_value, suggest_word
@@ -253,7 +253,7 @@ def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Seq
     return wires
 
 
-def find_node_wires(node: Node, skills: Mapping[str, type[Skill]], direction: Direction) -> Sequence[Wire]:
+def find_node_wires(node: Node, skills: Skills, direction: Direction) -> Sequence[Wire]:
     """Return the connections of a skill or control node; none for a skill that is not installed."""
     if isinstance(node, SkillNode):
         return find_wires(node, skills[node.skill], direction) if node.skill in skills else ()
@@ -272,6 +272,6 @@ def find_literals(node: SkillNode) -> Sequence[tuple[str, Constant]]:
     return [(str(name), value) for name, value in settings if isinstance(value, Constant)]
 
 
-def find_written_variables(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
+def find_written_variables(root: Node, skills: Skills) -> set[str]:
     """Return the variables that the nodes of a tree may write."""
     return {wire.variable for node in root.walk() for wire in find_node_wires(node, skills, Direction.OUT)}

@@ -143,7 +143,7 @@ def make_settings_schema(name: str, skill: type[Skill]) -> Schema:
     return {"title": name, **_document_skill(skill), "allOf": [mapping]}
 
 
-def make_name_schemas(skills: Mapping[str, type[Skill]]) -> list[Schema]:
+def make_name_schemas(skills: Skills) -> list[Schema]:
     """Return the schemas of skills that may be written as a name only: they require no setting."""
     return [
         {"const": name, "title": name, **_document_skill(skill), **NO_ITEM_SUGGESTION}

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 from typing import ClassVar, TypeAlias
 
+from executive.behaviours import Skills
 from executive.errors import InputError
 from executive.plugins import PluginEntry, list_entries
 from executive.skill import Skill
@@ -37,7 +38,7 @@ class NodeAnalysis:
     """
 
     flows: Mapping[str, Flow]
-    skills: Mapping[str, type[Skill]]
+    skills: Skills
     compute_flow: Callable[[Node, FlowState, bool], Flow]
     is_halted_by_sibling: bool
     is_concurrent: bool
