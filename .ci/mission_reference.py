@@ -102,7 +102,7 @@ def _mission_files() -> Iterator[str]:
         for name, field in model.get_keys().items():
             default = _default(... if field.is_required() else "")
             value = VALUES_IN_WORDS.get(name) or _value(properties[name])
-            rows.append([f"`{name}`", value, default, field.description or ""])
+            rows.append([f"`{name}`", value, default, properties[name].get("description", "")])
         yield _table(KEYS, rows)
 
 

@@ -64,8 +64,8 @@ def interpolate_max_joint_6_angle(min_link_distance: float) -> float:
 class Iiwa14:
     """Kinematics of an iiwa 14; implements `executive.motion.joints.Kinematics`.
 
-    The constructor implements `executive.motion.arms.KinematicsFactory`: `min_link_distance` is the distance
-    between links 5 and 7, which limits joint 6.
+    The constructor implements `executive.motion.joints.KinematicsFactory`: `min_link_distance` is the
+    distance between links 5 and 7, which limits joint 6.
     """
 
     def __init__(self, arm: ArmFile, tool_length: float, min_link_distance: float | None = None) -> None:

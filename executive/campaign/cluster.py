@@ -37,7 +37,7 @@ from executive.campaign.results import RunRecord
 from executive.cell.devices import DRIVER_GROUP
 from executive.cell.tools import TOOL_GROUP
 from executive.errors import InputError, explain_os_errors
-from executive.motion.arms import IK_SOLVER_GROUP
+from executive.motion.joints import IK_SOLVER_GROUP
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.detectors.envelope import MEASUREMENT_SUFFIX
 from executive.processes import WorkerPool

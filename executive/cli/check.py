@@ -129,8 +129,7 @@ def tree_command(
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.behaviours import load_skills
         from executive.events import discard_event
-        from executive.mission.build import build_tree
-        from executive.mission.load import load_mission
+        from executive.mission.load import build_tree, load_mission
         from executive.mission.outline import make_outline
         from executive.record.run_directory import format_tree
         from executive.tree.blackboard import Blackboard

@@ -63,10 +63,9 @@ def run_command(
         from executive.behaviours import load_skills
         from executive.cell.json_values import to_json
         from executive.mission.load import load_mission
-        from executive.record.diagnosis import format_diagnosis
         from executive.record.journal import find_run_start, read_journal
         from executive.record.recorded_run import GuardedView, RecordOptions, record_run
-        from executive.record.result import find_exit_code
+        from executive.record.result import find_exit_code, format_diagnosis
         from executive.record.run_directory import find_recorded_options, find_run, read_cell
         from executive.run.assembly import RunOptions
         from executive.station.check import load_checker

@@ -108,7 +108,7 @@ def check_plugins() -> Iterator[CheckResult]:
     from executive.behaviours import load_skills
     from executive.cell.devices import DRIVER_GROUP
     from executive.cell.tools import load_tool_models
-    from executive.motion.arms import IK_SOLVER_GROUP
+    from executive.motion.joints import IK_SOLVER_GROUP
     from executive.perception.detectors.detector_registry import find_detector_kinds
     from executive.plugins import list_entries
 

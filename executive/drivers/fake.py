@@ -22,8 +22,8 @@ from executive.cell.tools import ToolModel
 from executive.drivers.world_log import LogFile
 from executive.errors import InputError
 from executive.geometry import GRAVITY, Array, Pose
-from executive.motion.arms import build_planning_kinematics
 from executive.motion.configurations import find_configuration_pairs
+from executive.motion.joints import build_planning_kinematics
 from executive.perception.camera_model import compute_calibration
 from executive.text.validate import KeyPath
 

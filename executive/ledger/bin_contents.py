@@ -119,14 +119,13 @@ class BinContents:
             for observed, name in bin_names.items()
             if observed.is_confident and name and self.bins[name].contains(observed.position, BIN_THICKNESS)
         )
+        rates = detections.error_rates
         for record in self.records.filter_by_state(State.DROPPED):
             for bin_name in self.routes.get(record.label, ()):
                 label = record.detected_label
                 has_additional_object = visible_counts[label, bin_name] > self.count_placed(label, bin_name)
                 if has_additional_object or self.is_floor_visible(bin_name, detections):
-                    update_bin_log_odds(
-                        record, bin_name, detections.error_rates, has_additional_object=has_additional_object
-                    )
+                    update_bin_log_odds(record, bin_name, rates, has_additional_object=has_additional_object)
                 if record.bin_log_odds[bin_name] >= -math.log(self.config.max_miss_probability):
                     record.reason = ""
                     record.mark_as_detected_in_bin(detections.frame)

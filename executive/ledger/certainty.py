@@ -33,6 +33,10 @@ MAX_CLASS_ERROR_FOR_MEASUREMENT = 0.2
 """Maximum class error of an item that the tool may touch to determine the class by a measurement."""
 MIN_UNCERTAIN_LOOKS_TO_REJECT = 10
 """Minimum number of looks in a row with only doubtful detections of a rejected item."""
+MIN_EMPTY_PROBES = 3
+"""Minimum number of descents that touched only the table (`ItemRecord.empty_probe_count`) at a phantom."""
+FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
+"""Final states of items that exist; other items end as PHANTOM."""
 
 
 @dataclass(frozen=True)
@@ -143,6 +147,55 @@ class Certainty:
         record.last_contradiction = measurement.contradiction
         return False
 
+    def find_final_state(
+        self, record: ItemRecord, *, skip_reason: str, is_completed: bool, has_confirmed_item: bool
+    ) -> tuple[State, str] | None:
+        """Return the final state of an item and the reason, or None if the current state is final.
+
+        The first rule that applies determines the state:
+
+        1. An item in the tool is rejected.
+        2. An item is rejected if all its detections are doubtful and all later images of its place show it.
+        3. An item whose probability of existence is below 0.5 is a phantom.
+        4. An item that the tool never touched in at least `MIN_EMPTY_PROBES` descents to the table is a
+           phantom, if a measurement of the tool has confirmed the class of another item.
+        5. A dropped item that the tool may have moved while the journal was incomplete is rejected.
+        6. An item is lost if it was dropped, or if its position on the table is now empty.
+        7. An item that is already rejected stays rejected.
+        8. An item whose class has no route, or no bin below its quota, is skipped.
+        9. If the mission was completed, an item with sufficient evidence (`is_certain`), no failed attempt
+           and no evidence against its class is skipped, because a quota was reached or the operator quit.
+        10. Any other item is rejected.
+
+        Args:
+            record: The item.
+            skip_reason: Reason why the mission does not sort objects of the item's class, or "".
+            is_completed: True if the behaviour tree succeeded.
+            has_confirmed_item: True if a measurement of the tool has confirmed the class of any item.
+        """
+        belief = record.belief
+        if record.state is State.HELD:
+            return State.REJECTED, "still in the tool when the run ended"
+        if record.state not in (*ON_TABLE, State.DROPPED):
+            return None
+        if record.state is State.SEEN and not belief.look_count and belief.miss_probability == 1.0:
+            return State.REJECTED, REASON_UNCERTAIN
+        if not belief.is_probable:
+            return State.PHANTOM, REASON_NOT_FOUND
+        if record.empty_probe_count >= MIN_EMPTY_PROBES and has_confirmed_item and not record.had_contact:
+            count = record.empty_probe_count
+            return State.PHANTOM, f"the tool found only the table at its position, {count} times"
+        if record.state is State.DROPPED or self.is_position_empty(record):
+            return State.LOST, "known to exist, not found again"
+        if record.state is State.REJECTED:
+            return None
+        if skip_reason:
+            return State.SKIPPED, skip_reason
+        had_problem = record.failed_pick_count or record.last_contradiction
+        if is_completed and self.is_certain(record) and not had_problem:
+            return State.SKIPPED, "the mission was completed without it"
+        return State.REJECTED, "the run ended before its turn"
+
     def _needs_other_viewpoint(self, record: ItemRecord) -> bool:
         """Return True if only looks from a second viewpoint can prove the class of an item."""
         belief = record.belief
@@ -152,68 +205,6 @@ class Certainty:
             and len(belief.last_label_by_viewpoint) == 1
             and record.label not in self.distinct_labels
         )
-
-
-MIN_EMPTY_PROBES = 3
-"""Minimum number of descents that touched only the table (`ItemRecord.empty_probe_count`) at a phantom."""
-FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
-"""Final states of items that exist; other items end as PHANTOM."""
-
-
-def find_final_state(
-    record: ItemRecord,
-    certainty: Certainty,
-    *,
-    skip_reason: str,
-    is_completed: bool,
-    has_confirmed_item: bool,
-) -> tuple[State, str] | None:
-    """Return the final state of an item and the reason, or None if the current state is final.
-
-    The first rule that applies determines the state:
-
-    1. An item in the tool is rejected.
-    2. An item is rejected if all its detections are doubtful and all later images of its place show it.
-    3. An item whose probability of existence is below 0.5 is a phantom.
-    4. An item that the tool never touched in at least `MIN_EMPTY_PROBES` descents to the table is a phantom,
-       if a measurement of the tool has confirmed the class of another item.
-    5. A dropped item that the tool may have moved while the journal was incomplete is rejected.
-    6. An item is lost if it was dropped, or if its position on the table is now empty.
-    7. An item that is already rejected stays rejected.
-    8. An item whose class has no route, or no bin below its quota, is skipped.
-    9. If the mission was completed, an item with sufficient evidence (`certainty`), no failed attempt and no
-       evidence against its class is skipped, because a quota was reached or the operator quit.
-    10. Any other item is rejected.
-
-    Args:
-        record: The item.
-        certainty: Criteria for an item with sufficient evidence.
-        skip_reason: Reason why the mission does not sort objects of the item's class, or "".
-        is_completed: True if the behaviour tree succeeded.
-        has_confirmed_item: True if a measurement of the tool has confirmed the class of any item.
-    """
-    belief = record.belief
-    if record.state is State.HELD:
-        return State.REJECTED, "still in the tool when the run ended"
-    if record.state not in (*ON_TABLE, State.DROPPED):
-        return None
-    if record.state is State.SEEN and not belief.look_count and belief.miss_probability == 1.0:
-        return State.REJECTED, REASON_UNCERTAIN
-    if not belief.is_probable:
-        return State.PHANTOM, REASON_NOT_FOUND
-    if record.empty_probe_count >= MIN_EMPTY_PROBES and has_confirmed_item and not record.had_contact:
-        count = record.empty_probe_count
-        return State.PHANTOM, f"the tool found only the table at its position, {count} times"
-    if record.state is State.DROPPED or certainty.is_position_empty(record):
-        return State.LOST, "known to exist, not found again"
-    if record.state is State.REJECTED:
-        return None
-    if skip_reason:
-        return State.SKIPPED, skip_reason
-    had_problem = record.failed_pick_count or record.last_contradiction
-    if is_completed and certainty.is_certain(record) and not had_problem:
-        return State.SKIPPED, "the mission was completed without it"
-    return State.REJECTED, "the run ended before its turn"
 
 
 def discard_moved_items(records: Collection[ItemRecord], dropped: Collection[ItemRecord]) -> list[ItemRecord]:

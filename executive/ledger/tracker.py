@@ -18,7 +18,7 @@ from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
 from executive.ledger.bin_contents import BinContents, find_probable_bin
-from executive.ledger.certainty import FINAL_STATES, Certainty, discard_moved_items, find_final_state
+from executive.ledger.certainty import FINAL_STATES, Certainty, discard_moved_items
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, ItemRecord, ItemRecords, State
 from executive.ledger.look import AMBIGUITY_FACTOR, LookUpdate, make_look_event
@@ -229,8 +229,8 @@ class Tracker:
         dropped_items = [record for record in dropped if not record.was_taken_away]
         for record in self._records.all:
             self._settle_undeclared(record)
-            final_state = find_final_state(
-                record, self._certainty, skip_reason=self._explain_skipped_item(record),
+            final_state = self._certainty.find_final_state(
+                record, skip_reason=self._explain_skipped_item(record),
                 is_completed=completed, has_confirmed_item=has_confirmed_item,
             )  # fmt: skip
             if bin := find_probable_bin(record):
@@ -397,9 +397,8 @@ class Tracker:
         Such an observation is near another observation or a known object, or it is outside of the workspace.
         """
         kept = [entry for entry in observations if entry.detection.label not in self.unknown_labels]
-        targets = [
-            each for each in self.find_objects_on_table() if each.label not in ("", *self.unknown_labels)
-        ]
+        other_labels = ("", *self.unknown_labels)
+        targets = [each for each in self.find_objects_on_table() if each.label not in other_labels]
         for entry in (entry for entry in observations if entry not in kept):
             is_separate = self._is_separate(entry.position, (*targets, *kept))
             if is_separate and self._coverage.is_in_workspace(entry.position):

@@ -65,26 +65,22 @@ class FlowAnalysis:
             case ControlNode():
                 return node.compute_flow(self._analyse, state)
             case SkillNode():
-                return self._compute_skill_flow(node, state)
+                skill = self.find_skill_or_most_similar(node.skill)
+                if skill is None:
+                    return Flow.make_unknown(node.path, node.skill)
+                outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
+                return compute_skill_flow(node, skill, outputs, state, self._is_first_tick)
             case SubtreeNode(body=Node() as body):
-                return self._compute_subtree_flow(node, body, state)
+                flow = self._analyse(body, state)
+                # In a loop, one use may start in several states.
+                end_states = (self.body_end_states.get(node.path), flow.success)
+                self.body_end_states[node.path] = join_states(end_states)
+                # `find_unwritten_returns` reports unwritten returned variables, so they count as written.
+                success = flow.success and flow.success.with_variables(node.written_variables)
+                return replace(flow, success=success)
         for child in node.children:
             self._analyse(child, UNKNOWN_STATE)
         return Flow.make_unknown(node.path)
-
-    def _compute_skill_flow(self, node: SkillNode, state: FlowState) -> Flow:
-        skill = self.find_skill_or_most_similar(node.skill)
-        if skill is None:
-            return Flow.make_unknown(node.path, node.skill)
-        outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
-        return compute_skill_flow(node, skill, outputs, state, self._is_first_tick)
-
-    def _compute_subtree_flow(self, node: SubtreeNode, body: Node, state: FlowState) -> Flow:
-        flow = self._analyse(body, state)
-        # In a loop, one use may start in several states.
-        self.body_end_states[node.path] = join_states((self.body_end_states.get(node.path), flow.success))
-        # `find_unwritten_returns` reports unwritten returned variables, so they count as written here.
-        return replace(flow, success=flow.success and flow.success.with_variables(node.written_variables))
 
 
 @dataclass(frozen=True)
@@ -134,7 +130,7 @@ class CheckContext:
     mission: Mission
     tree: Node
     unused_subtrees: tuple[Node, ...]
-    skills: Mapping[str, type[Skill]]
+    skills: Skills
     node_classes: ControlNodes
     cell: CellConfig | None
     classes_by_detector: Mapping[str, tuple[str, ...] | None]
@@ -170,7 +166,7 @@ class CheckContext:
 
     def list_wires(self, root: Node, direction: Direction) -> Sequence[Wire]:
         """Return the connections of `root` and of the nodes below it to variables."""
-        return [wire for node in root.walk() for wire in self._wires_by_node[node, direction]]
+        return [wire for node in root.walk() for wire in self.wires[node, direction]]
 
     @cached_property
     def names_in_cell_by_kind(self) -> Mapping[str, list[str]]:
@@ -215,12 +211,9 @@ class CheckContext:
         is_variable = isinstance(value, str) and value in self.written_variables
         return f"For the variable, write ${value}." if is_variable else ""
 
-    def find_wires(self, node: Node, direction: Direction) -> Sequence[Wire]:
-        """Return the connections of a node to variables."""
-        return self._wires_by_node[node, direction]
-
     @cached_property
-    def _wires_by_node(self) -> Mapping[tuple[Node, Direction], Sequence[Wire]]:
+    def wires(self) -> Mapping[tuple[Node, Direction], Sequence[Wire]]:
+        """Connections of each node to variables, by node and direction."""
         written_variables = self.written_variables
         return {
             (node, direction): [

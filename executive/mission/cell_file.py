@@ -18,7 +18,6 @@ from executive.geometry import Array
 from executive.text.findings import Finding, MissionError, Source, Span, make_error, sort_findings
 from executive.text.validate import BASE_KEY, KeyPath, find_span, override_cell, validate
 from executive.text.yaml_files import (
-    YamlEntry,
     YamlMapping,
     YamlNode,
     YamlScalar,
@@ -142,8 +141,12 @@ class _CellFileReader:
         base = self._read_base(reference, (*previous_files, path))
         if base is None:
             return None
-        entries = tuple(_merge_entry(entry, base) for entry in root.entries if entry.key.text != BASE_KEY)
-        return _inherit_entries(replace(root, entries=entries), base)
+        entries = [entry for entry in root.entries if entry.key.text != BASE_KEY]
+        base_detectors = base.get(DETECTORS_KEY)
+        for index, entry in enumerate(entries):
+            if entry.key.text == DETECTORS_KEY:
+                entries[index] = replace(entry, value=_merge_sections(entry.value, base_detectors))
+        return _inherit_entries(replace(root, entries=tuple(entries)), base)
 
     def _read_base(self, reference: YamlScalar, files: tuple[Path, ...]) -> YamlMapping | None:
         """Return the YAML tree of the base of `files[-1]`, or None if the base cannot be read."""
@@ -193,11 +196,7 @@ class _CellFileReader:
         if is_default:
             given = tuple(entry for entry in arm_root.entries if entry.key.text != "limits")
             arm_root = replace(arm_root, entries=given)
-        sections = [
-            replace(entry, value=_merge_section(entry.value, arm_root.get(entry.key.text)))
-            for entry in arm.entries
-        ]
-        complete_arm = _inherit_entries(replace(arm, entries=tuple(sections)), arm_root)
+        complete_arm = _merge_sections(arm, arm_root)
         entries = (replace(one, value=complete_arm) if one.value is arm else one for one in root.entries)
         return replace(root, entries=tuple(entries))
 
@@ -256,24 +255,19 @@ def _flatten(node: YamlNode) -> YamlNode:
     return replace(node, items=tuple(list_scalars(node))) if isinstance(node, YamlSequence) else node
 
 
-def _merge_entry(entry: YamlEntry, base: YamlMapping) -> YamlEntry:
-    """Return an entry of a file; the value of `detectors` becomes the detectors of the file and of the base.
+def _merge_sections(sections: YamlNode, base: YamlNode | None) -> YamlNode:
+    """Return a mapping of sections, completed by sections of the base and by keys of these sections.
 
-    A detector without value removes the base's detector of this name. The detectors of the file come first.
+    A section without value removes the base's section of this name. The sections of the file come first.
     """
-    detectors = entry.value
-    base_detectors = base.get(DETECTORS_KEY)
-    if not (isinstance(detectors, YamlMapping) and isinstance(base_detectors, YamlMapping)):
-        return entry
-    if entry.key.text != DETECTORS_KEY:
-        return entry
+    if not isinstance(sections, YamlMapping) or not isinstance(base, YamlMapping):
+        return sections
     entries = []
-    for detector in detectors.entries:
-        base_detector = base_detectors.get(detector.key.text)
-        if base_detector is None or detector.value.python_value is not None:
-            entries.append(replace(detector, value=_merge_section(detector.value, base_detector)))
-    detectors_of_file = replace(detectors, entries=tuple(entries))
-    return replace(entry, value=_inherit_entries(detectors_of_file, base_detectors, detectors.keys))
+    for entry in sections.entries:
+        base_section = base.get(entry.key.text)
+        if base_section is None or entry.value.python_value is not None:
+            entries.append(replace(entry, value=_merge_section(entry.value, base_section)))
+    return _inherit_entries(replace(sections, entries=tuple(entries)), base, sections.keys)
 
 
 def _merge_section(section: YamlNode, base: YamlNode | None) -> YamlNode:
@@ -314,9 +308,8 @@ def _find_wrong_looks(file: CellFile, config: CellConfig) -> Iterator[Finding]:
             message = f'the cell has no class "{name}"; it has: {", ".join(config.objects)}'
             yield file.make_error(key_path, "unknown-class", message)
         elif look.looks_like:
-            message = (
-                f"{name} looks like {look.looks_like}, so no detector reports {name}; name another class"
-            )
+            problem = f"{name} looks like {look.looks_like}, so no detector reports {name}"
+            message = f"{problem}; name another class"
             yield file.make_error(key_path, "wrong-value", message)
         elif None in (section.mass, look.mass) or _get_size(section) != _get_size(look):
             message = f"{label} looks like {name}, so both need a mass, and equal height, radius and ring"
@@ -339,9 +332,8 @@ def _resolve_model_files(
     def resolve(path: str, *key_path: str) -> str:
         folder = folders.get(file.find_span(key_path).source, folders[file.source])
         if is_outside_path(path):
-            errors.append(
-                file.make_error(key_path, "outside", f'"{path}" must be a relative path without ".."')
-            )
+            message = f'"{path}" must be a relative path without ".."'
+            errors.append(file.make_error(key_path, "outside", message))
         elif path and os.path.isfile(folder / path):
             if has_outside_link(folder, path):
                 message = f'"{path}" is a link to a file outside {folder}'

@@ -1,16 +1,16 @@
-"""Checks of control nodes: constants, conditions, labels, failure names, and findings of the nodes."""
+"""Checks of nodes: constants, conditions, labels, failures, unreachable and concurrent nodes, the tool."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from itertools import combinations, permutations
 
 from pydantic import TypeAdapter
 
 from executive.mission import grammar
 from executive.mission.analysis import CheckContext, FlowAnalysis
-from executive.mission.ports import ValueProblem, convert_constant
-from executive.skill import Skill, list_condition_violations
+from executive.mission.ports import ValueProblem, Wire, convert_constant
+from executive.skill import EMPTY, HOLDING, Direction, list_condition_violations
 from executive.text.findings import (
     Finding,
     Span,
@@ -20,9 +20,9 @@ from executive.text.findings import (
     suggest_choice,
     suggest_word,
 )
-from executive.tree.flow import UNKNOWN_NAME, Flow, FlowState, PossibleFailure
+from executive.tree.flow import UNKNOWN_NAME, Flow, FlowState, PossibleFailure, PossibleToolState
 from executive.tree.keys import PREDEFINED_LISTS, KeySection, KeyValue, list_nodes
-from executive.tree.node import ControlNode, NodeFinding
+from executive.tree.node import ControlNode, NodeAnalysis
 from executive.tree.specification import Constant, Node, Reason, Reference, SkillNode, SubtreeNode
 
 
@@ -77,15 +77,20 @@ def run_node_checks(context: CheckContext) -> Iterator[Finding]:
 
     For a control node without such errors, yield the findings of its method `check`.
     """
+
+    def compute_flow(child: Node, entry: FlowState, is_first_tick: bool) -> Flow:
+        return FlowAnalysis(child, context.skills, entry, is_first_tick=is_first_tick).root_flow
+
+    flows = context.flow_analysis.flows
     halted_paths = _find_paths_below(context, lambda node: node.children_halted_by_sibling)
     concurrent_paths = _find_paths_below(context, lambda node: node.concurrent_children)
     for node in context.control_nodes:
         if non_conditions := list(find_non_conditions(context, node)):
             yield from non_conditions
             continue
-        analysis = CheckerAnalysis(context, node.path in halted_paths, node.path in concurrent_paths)
-        for node_finding in node.check(analysis):
-            yield _convert_node_finding(node, node_finding)
+        is_halted = node.path in halted_paths
+        is_concurrent = node.path in concurrent_paths
+        yield from node.check(NodeAnalysis(flows, context.skills, compute_flow, is_halted, is_concurrent))
 
 
 def _find_paths_below(
@@ -96,48 +101,16 @@ def _find_paths_below(
     return {node.path for root in roots for node in root.walk()}
 
 
-def _convert_node_finding(node: ControlNode, node_finding: NodeFinding) -> Finding:
-    """Return the finding at the position of the key, reason or child that it names, or else of `node`."""
-    span = node.span
-    message = node_finding.message
-    if isinstance(node_finding.place, Reason | Node):
-        span = node_finding.place.span
-    elif isinstance(value := node.settings.get(str(node_finding.place)), Constant):
-        span = value.span
-        message = message + value.origin_note
-    make_finding = make_warning if node_finding.is_warning else make_error
-    return make_finding(span, node_finding.code, message, node_finding.hint)
-
-
-@dataclass
-class CheckerAnalysis:
-    """Implementation of `NodeAnalysis` for one control node."""
-
-    context: CheckContext
-    is_halted_by_sibling: bool
-    is_concurrent: bool
-
-    def get_flow(self, child: Node) -> Flow | None:
-        """Return the possible outcomes of a child; None if the child never runs."""
-        return self.context.flow_analysis.flows.get(child.path)
-
-    def compute_flow(self, child: Node, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
-        """Return the possible outcomes of a child that starts in `entry`; optionally, of its first tick."""
-        return FlowAnalysis(child, self.context.skills, entry, is_first_tick=is_first_tick).root_flow
-
-    def list_skills(self, node: Node) -> Mapping[str, type[Skill] | None]:
-        """Return the class of each skill in and below a node, by name; None if not installed."""
-        names = [node.skill for node in node.walk() if isinstance(node, SkillNode)]
-        return {name: self.context.skills.get(name) for name in names}
-
-
 def find_non_conditions(context: CheckContext, parent: ControlNode) -> Iterator[Finding]:
     """Yield an error for each child that is not a condition although its key allows only conditions."""
     for key, value in parent.list_values():
         for node in list_nodes(value) if key.requires_conditions else ():
             if problem := _find_problem(context, node):
                 message = f"{problem}, but {parent.type_name}.{key.name} needs a condition"
-                yield make_error(node.span, "no-condition", message, _make_hint(context))
+                conditions = [name for name, skill in context.skills.items() if skill.is_condition]
+                words = [word for word, one in context.node_classes.items() if one.is_condition]
+                hint = f"Conditions: {', '.join(conditions)}; they are combined by {', '.join(words)}."
+                yield make_error(node.span, "no-condition", message, hint)
 
 
 def _find_problem(context: CheckContext, node: Node) -> str:
@@ -153,13 +126,6 @@ def _find_problem(context: CheckContext, node: Node) -> str:
         case ControlNode() if not node.is_condition:
             return "a list runs as a sequence" if node.is_list else f"{node.type_name} is no condition"
     return ""
-
-
-def _make_hint(context: CheckContext) -> str:
-    """Return a hint with all conditions and the control nodes that combine conditions."""
-    conditions = [name for name, skill in context.skills.items() if skill.is_condition]
-    combining = [word for word, node_class in context.node_classes.items() if node_class.is_condition]
-    return f"Conditions: {', '.join(conditions)}; they are combined by {', '.join(combining)}."
 
 
 def check_labels(context: CheckContext) -> Iterator[Finding]:
@@ -187,8 +153,9 @@ def check_labels(context: CheckContext) -> Iterator[Finding]:
 def check_failure_names(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every failure name that is unknown, ambiguous, or impossible in the body."""
     analysis = context.flow_analysis
-    for node in analysis.nodes.values():
-        for name, keyword, body in _find_names_with_bodies(node):
+    nodes = [node for node in analysis.nodes.values() if isinstance(node, ControlNode)]
+    for node, name in [(owner, name) for owner in nodes for name in _find_failure_names(owner)]:
+        for body in node.list_children("do"):
             flow = analysis.flows.get(body.path)
             if flow is None:
                 continue
@@ -196,23 +163,13 @@ def check_failure_names(context: CheckContext) -> Iterator[Finding]:
             if unknown_reason := _find_unknown_reason(context, name, body):
                 yield unknown_reason
             elif not matching:
-                yield _make_impossible_error(context, name, keyword, body)
+                yield _make_impossible_error(context, name, node.keyword, body)
             elif len(sources := _find_named_nodes(analysis, name, matching)) > 1:
-                places = " and ".join(
-                    f"{source.span.describe_place(name.span.source)}:{source.span.col}" for source in sources
-                )
+                spans = [source.span for source in sources]
+                places = " and ".join(f"{one.describe_place(name.span.source)}:{one.col}" for one in spans)
                 message = f"{name} is ambiguous: more than one node in the body can fail so, in {places}"
                 hint = f"Give each node, or its use, a label with as:, and write label.{name.reason}."
                 yield make_error(name.span, "ambiguous", message, hint)
-
-
-def _find_names_with_bodies(node: Node) -> Iterator[tuple[Reason, str, Node]]:
-    """Yield every failure name of a node, the keyword of the node, and the child that may fail."""
-    if not isinstance(node, ControlNode):
-        return
-    for name in _find_failure_names(node):
-        for body in node.list_children("do"):
-            yield name, node.keyword, body
 
 
 def _find_failure_names(owner: ControlNode | KeySection) -> Iterator[Reason]:
@@ -276,3 +233,147 @@ def _find_named_nodes(flow: FlowAnalysis, name: Reason, matching: list[PossibleF
     denoted = [flow.nodes[failure.path] for failure in matching if failure.matches([name])]
     nodes_by_span = {node.span: node for node in denoted}
     return sorted(nodes_by_span.values(), key=lambda node: (node.span.line, node.span.col))
+
+
+def find_unreachable(context: CheckContext) -> Iterator[Finding]:
+    """For each node that can run, yield a warning for the first child that can never run."""
+    entry_states = context.flow_analysis.entry_states
+    for node in context.control_nodes:
+        unreachable = [child for child in node.children if child.path not in entry_states]
+        if node.path in entry_states and unreachable and (reason := node.explain_unreachable()):
+            child = unreachable[0]
+            name = "this list" if child.is_list and not child.label else child.path_name
+            yield make_warning(child.span, "unreachable", f"{name} can never run: {reason}")
+
+
+def check_tool_states(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every skill that may start with the opposite of the required tool state."""
+    flow = context.flow_analysis
+    for node, skill in context.find_installed_skills(flow.nodes[path] for path in flow.entry_states):
+        required_state = skill.tool_state[0]
+        entry_state = flow.entry_states[node.path]
+        name, span = context.locate_skill(node)
+        if required_state is EMPTY and (tool := entry_state.find_tool_state(HOLDING)):
+            message = f"{name} needs an empty tool, but the tool may hold an object here"
+            explanation = _explain_tool_state(flow, tool, span)
+            hint = f"{explanation} Put it down on every path from there to this node."
+            yield make_error(span, "tool-state", message, hint)
+        if required_state is HOLDING and (tool := entry_state.find_tool_state(EMPTY)):
+            message = f"{name} needs an object in the tool, but the tool may be empty here"
+            yield make_error(span, "tool-state", message, _explain_tool_state(flow, tool, span))
+
+
+def check_tool_at_end(context: CheckContext) -> Iterator[Finding]:
+    """Yield a warning if the mission may succeed with an object in the tool."""
+    flow = context.flow_analysis
+    span = context.tree.span
+    if flow.root_flow.success and (tool := flow.root_flow.success.find_tool_state(HOLDING)):
+        message = "the mission may succeed with an object in the tool"
+        yield make_warning(span, "tool-state", message, _explain_tool_state(flow, tool, span))
+
+
+def _explain_tool_state(flow: FlowAnalysis, tool: PossibleToolState, span: Span) -> str:
+    """Return a sentence about the node that may have caused a state of the tool, for a message at `span`."""
+    cause = flow.nodes.get(tool.cause)
+    after = f", when {tool.handled_failure} is handled" if tool.handled_failure else ""
+    if cause is None:
+        return f"No object has been grasped before{after}."
+    name = cause.skill if isinstance(cause, SkillNode) else "the node"
+    state = "may hold an object" if tool.state is HOLDING else "may be empty"
+    return f"The tool {state} since {name} in {cause.span.describe_place(span.source)}{after}."
+
+
+def find_shared_resources(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every two concurrent branches that use the same part of the cell."""
+    for branches in (node.concurrent_children for node in context.control_nodes):
+        users_by_branch = [_find_resource_users(context, branch) for branch in branches]
+        for users, later_users in combinations(users_by_branch, 2):
+            # One error reports all parts of the cell that the same two skills share.
+            shared_resources = [resource for resource in later_users if resource in users]
+            conflicts = {(users[name].span, later_users[name].span): name for name in shared_resources}
+            for resource in conflicts.values():
+                user = users[resource]
+                later_user = later_users[resource]
+                name, span = context.locate_skill(later_user)
+                message = (
+                    f"{name} uses the {resource}, and {user.skill} in "
+                    f"{user.span.describe_place(span.source)} "
+                    "may use it at the same time in another branch of this parallel"
+                )
+                hint = "Write a sequence, or put both into one branch."
+                yield make_error(span, "shared-resource", message, hint)
+
+
+def find_shared_variables(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every two concurrent branches that write the same variable."""
+    for branches in (node.concurrent_children for node in context.control_nodes):
+        writes_by_branch = [_find_first_writes(context, branch) for branch in branches]
+        for writes, later_writes in combinations(writes_by_branch, 2):
+            for variable, later_wire in later_writes.items():
+                if wire := writes.get(variable):
+                    place = wire.span.describe_place(later_wire.span.source)
+                    message = (
+                        f"{later_wire.node.type_name} writes ${variable}, and so does {wire.node.type_name} "
+                        f"in {place}, in another branch of the same parallel"
+                    )
+                    yield make_error(later_wire.span, "shared-variable", message, later_wire.rename_hint)
+
+
+def find_read_races(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every input whose variable a concurrent branch may write."""
+    for branches in (node.concurrent_children for node in context.control_nodes):
+        reads = [list(_find_reads(context, branch)) for branch in branches]
+        writes = [_find_first_writes(context, branch) for branch in branches]
+        for reading_index, writing_index in permutations(range(len(branches)), 2):
+            # Branches start in order: the first skill of a branch reads before a later branch writes.
+            is_read_first = reading_index < writing_index
+            safe_node = _find_first_leaf(branches[reading_index]) if is_read_first else None
+            # `find_shared_variables` reports a variable that both branches write.
+            racing_variables = writes[writing_index].keys() - writes[reading_index].keys()
+            for read in reads[reading_index]:
+                if read.node is not safe_node and read.variable in racing_variables:
+                    write = writes[writing_index][read.variable]
+                    place = write.span.describe_place(read.span.source)
+                    message = (
+                        f"{read} reads ${read.variable}, while {write.node.type_name} in {place} "
+                        "may write it, in another branch of the same parallel"
+                    )
+                    yield make_error(read.span, "shared-variable", message, write.rename_hint)
+
+
+def _find_first_leaf(node: Node) -> Node:
+    """Return the first node without children, usually a skill, that the execution of a node reaches."""
+    if isinstance(node, SubtreeNode):
+        return _find_first_leaf(node.body) if node.body else node
+    first_child = node.first_child if isinstance(node, ControlNode) else None
+    return _find_first_leaf(first_child) if first_child else node
+
+
+def _find_reads(context: CheckContext, branch: Node) -> Iterator[Wire]:
+    """Yield the reads below `branch`, except those that `find_unwritten_inputs` reports."""
+    for read in context.list_wires(branch, Direction.IN):
+        state = context.flow_analysis.entry_states.get(read.node.path)
+        if state and not (read.is_required and state.may_be_unwritten(read.variable)):
+            yield read
+
+
+def _find_resource_users(context: CheckContext, branch: Node) -> dict[str, SkillNode]:
+    """Return the first user of each part of the cell below `branch`, by the name of the part."""
+    users: dict[str, SkillNode] = {}
+    cameras = context.cell.cameras.values() if context.cell else ()
+    is_camera_on_wrist = any(camera.mount == "wrist" for camera in cameras)
+    for node, skill in context.find_installed_skills(branch.walk()):
+        for resource in skill.uses:
+            if resource == "camera" and is_camera_on_wrist:
+                # The arm must not move while a camera on the wrist takes an image.
+                users.setdefault("arm", node)
+            users.setdefault(resource, node)
+    return users
+
+
+def _find_first_writes(context: CheckContext, branch: Node) -> dict[str, Wire]:
+    """Return the first write of each variable below `branch`, by variable."""
+    writes: dict[str, Wire] = {}
+    for wire in context.list_wires(branch, Direction.OUT):
+        writes.setdefault(wire.variable, wire)
+    return writes

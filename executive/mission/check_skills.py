@@ -19,7 +19,7 @@ from executive.mission.mission_file import Mission
 from executive.mission.ports import find_literals, find_problem
 from executive.skill import HOLDING, Direction, Param, Port, Skill
 from executive.text.findings import Finding, Span, make_error, make_warning, suggest_choice
-from executive.tree.specification import Constant, Reference, SkillNode
+from executive.tree.specification import Constant, LocatedName, Reference, SkillNode
 
 
 def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
@@ -34,27 +34,28 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every setting of a skill that is unknown, missing, or has an invalid value."""
     for node, skill in context.find_installed_skills(context.nodes):
         declarations: dict[str, Param | Port] = {**skill.params, **skill.ports}
-        for name, setting in node.settings.items():
+        for name, value in node.settings.items():
             if name not in declarations:
                 hint = suggest_choice(name, declarations, f"Params and ports of {node.skill}")
                 if writers := context.list_skills_with_output(name) if skill.is_condition else "":
                     hint = f"A condition writes no output. Skills that write ${name}: {writers}."
                 message = f'{node.skill} has no param or port "{name}"'
-                yield make_error(setting.name_span, "unknown-param", message, hint)
-            elif isinstance(setting.value, Constant):
-                yield from _check_value(context, node, declarations[name], setting.value)
-                yield from find_unknown_names(context, node.skill, declarations[name], setting.value)
-            elif isinstance(setting.value, Reference):
-                yield from _check_reference(context, node.skill, declarations[name], setting.value)
+                yield make_error(name.span, "unknown-param", message, hint)
+            elif isinstance(value, Constant):
+                yield from _check_value(context, node, declarations[name], value)
+                yield from find_unknown_names(context, node.skill, declarations[name], value)
+            elif isinstance(value, Reference):
+                yield from _check_reference(context, node.skill, declarations[name], value)
         for param in skill.params.values():
             if param.is_required and param.name not in node.settings:
                 message = f'{node.skill} needs the param "{param.name}"'
                 hint = param.doc and f"{param.name}: {param.doc}."
                 yield make_error(node.span, "missing-param", message, hint)
-        given = [node.settings[name] for name in skill.one_of if name in node.settings]
+        given = [name for name in node.settings if name in skill.one_of]
+        given.sort(key=skill.one_of.index)
         if skill.one_of and len(given) != 1:
             names = " or ".join(skill.one_of)
-            span = given[1].name_span if given else node.span
+            span = given[1].span if given else node.span
             message = f"{node.skill} needs exactly one of its inputs {names}, not {len(given)}"
             yield make_error(span, "exactly-one", message)
 
@@ -117,15 +118,12 @@ def find_unweighed_classes(context: CheckContext) -> Iterator[Finding]:
         detected = section.looks_like  # The detector reports this class for objects of the class `label`.
         if detected not in objects:
             continue
+        problem = f"{label} looks like {detected}"
         if label in routes and detected not in routes:
-            message = (
-                f"{label} looks like {detected}, which has no route, so no object of either class is selected"
-            )
+            message = f"{problem}, which has no route, so no object of either class is selected"
             yield make_error(spans[label], "unweighed", message, f"Add a route for {detected}.")
         elif detected in routes and routes.get(label) != routes[detected] and not is_weighed:
-            message = (
-                f"{label} looks like {detected}, their routes differ, and no node weighs the held object"
-            )
+            message = f"{problem}, their routes differ, and no node weighs the held object"
             weighing_skills = [name for name, skill in context.skills.items() if _is_weighing(skill)]
             hint = f"Before the transport, insert {' or '.join(weighing_skills)}."
             yield make_error(spans.get(label, spans[detected]), "unweighed", message, hint)
@@ -161,7 +159,7 @@ def _find_used_detectors(context: CheckContext) -> set[str]:
     for node, skill in context.find_installed_skills(context.nodes):
         for param in skill.params.values():
             if param.refers_to == "detector":
-                value = node.settings[param.name].value if param.name in node.settings else param.default
+                value = node.settings.get(LocatedName(param.name), param.default)
                 name = value.value if isinstance(value, Constant) else value
                 if isinstance(name, str):
                     used_names.update([name] if name else names[:1])  # The first detector is the default.

@@ -52,10 +52,9 @@ def find_unwritten_library_inputs(context: CheckContext) -> Iterator[Finding]:
         use = uses[path]
         names = " and ".join(f"${name} (for {input_name})" for name, input_name in sorted(inputs.items()))
         message = f'the subtree "{use.name}" needs variables that may be unwritten at this node: {names}'
-        hints = [
-            f"${name} is written by {_describe_writers(context, name, use.span)}." for name in sorted(inputs)
-        ]
-        yield make_error(use.span, "unwritten", message, " ".join(hints))
+        writers = [(name, _describe_writers(context, name, use.span)) for name in sorted(inputs)]
+        hint = " ".join(f"${name} is written by {skills}." for name, skills in writers)
+        yield make_error(use.span, "unwritten", message, hint)
 
 
 def _find_unwritten_reads(context: CheckContext, in_libraries: bool) -> Iterator[Wire]:
@@ -74,7 +73,7 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
     """Yield a warning for every variable that the mission assigns to an output by name, but no node reads."""
     read_variables = {read.variable for read in context.list_wires(context.tree, Direction.IN)}
     for node in context.tree.walk():
-        for wire in context.find_wires(node, Direction.OUT):
+        for wire in context.wires[node, Direction.OUT]:
             # A control node that overwrites a param is an error, which the expansion reports.
             if wire.is_explicit and wire.variable not in read_variables | set(context.mission.params):
                 message = f"{wire} writes ${wire.variable}, which no node reads"
@@ -83,11 +82,11 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
                 yield make_warning(wire.span, "unread", message, hint)
         if not isinstance(node, SubtreeNode):
             continue
-        for setting in node.returns.values():
-            name = setting.value.name if isinstance(setting.value, Reference) else ""
+        for value in node.returns.values():
+            name = value.name if isinstance(value, Reference) else ""
             if name in node.written_variables and name not in read_variables:
                 message = f"the subtree returns ${name}, which no node reads"
-                yield make_warning(setting.value.span, "unread", message)
+                yield make_warning(value.span, "unread", message)
 
 
 def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
@@ -96,7 +95,7 @@ def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
     skill_wires = {wire.variable: wire for wire in wires if isinstance(wire.node, SkillNode)}
 
     def check_node_and_children(node: Node, loop_wires: Mapping[str, Wire]) -> Iterator[Finding]:
-        for wire in context.find_wires(node, Direction.OUT) if isinstance(node, ControlNode) else ():
+        for wire in context.wires[node, Direction.OUT] if isinstance(node, ControlNode) else ():
             if other := skill_wires.get(wire.variable, loop_wires.get(wire.variable)):
                 name = f"another {other}" if isinstance(other.node, ControlNode) else str(other)
                 place = other.span.describe_place(wire.span.source)
@@ -135,7 +134,7 @@ def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
 
 def _describe_writers(context: CheckContext, variable: str, span: Span) -> str:
     """Return the skills that write a variable, for a message at `span`: `Grasp in line 3`."""
-    wires = [wire for node in context.nodes for wire in context.find_wires(node, Direction.OUT)]
+    wires = [wire for node in context.nodes for wire in context.wires[node, Direction.OUT]]
     nodes = [wire.node for wire in wires if wire.variable == variable and isinstance(wire.node, SkillNode)]
     nodes.sort(key=lambda node: node.span.line)
     writers = dict.fromkeys(f"{node.skill} in {node.span.describe_place(span.source)}" for node in nodes)
@@ -194,7 +193,7 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
 
     def check_node_and_children(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
         all_writers = {**skill_writers, **loop_writers}
-        for wire in context.find_wires(node, Direction.IN):
+        for wire in context.wires[node, Direction.IN]:
             writers = list(_select_field(all_writers.get(wire.variable, ()), wire.field))
             yield from _check_field(str(wire), wire.reference, all_writers.get(wire.variable, ()))
             if isinstance(wire.port, Key):
@@ -203,7 +202,7 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
             for writer in writers:
                 yield from _check_connection(context, wire, wire.port, writer)
                 yield from _check_compared_constants(context, wire, wire.port, writer)
-        for wire in context.find_wires(node, Direction.OUT):
+        for wire in context.wires[node, Direction.OUT]:
             if isinstance(node, ControlNode) and isinstance(wire.port, Key):
                 elements = node.settings.get(wire.port.list_key)
                 list_writers = _find_list_writers(node, elements, all_writers)

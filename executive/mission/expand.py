@@ -172,9 +172,8 @@ class _Expander:
         for wire in find_node_wires(node, self.skills, Direction.OUT):
             # `check_settings` reports an output of a skill that the mission sets to a param or argument.
             if wire.variable in values and (isinstance(node, ControlNode) or not wire.is_explicit):
-                kind = (
-                    "a param of the mission" if wire.variable in self.params else "an argument of the subtree"
-                )
+                is_param = wire.variable in self.params
+                kind = "a param of the mission" if is_param else "an argument of the subtree"
                 message = f"{wire} writes ${wire.variable}, but {wire.variable} is {kind}"
                 yield make_error(wire.span, "shadowed-param", message, wire.rename_hint)
 
@@ -261,28 +260,28 @@ class _Expander:
         """Return the variable of the caller for each name in `returns` of the subtree."""
         returned_names = subtree.returns or ()
         variables: dict[str, str] = {name: name for name in returned_names}
-        for name, setting in use.returns.items():
+        for name, value in use.returns.items():
             if name not in returned_names:
                 hint = suggest_choice(name, returned_names, "Returned variables")
                 message = f'the subtree "{subtree.name}" does not return "{name}"'
-                self._add_error(setting.name_span, "unknown-return", message, hint)
-            elif isinstance(setting.value, Reference) and not setting.value.field:
-                variables[name] = setting.value.name
-            elif not isinstance(setting.value, InvalidValue):
+                self._add_error(name.span, "unknown-return", message, hint)
+            elif isinstance(value, Reference) and not value.field:
+                variables[name] = value.name
+            elif not isinstance(value, InvalidValue):
                 message = f"returns.{name} must be a variable, for example $mine"
-                self._add_error(setting.value.span, "wrong-type", message)
+                self._add_error(value.span, "wrong-type", message)
         return variables
 
     def _collect_arguments(self, use: SubtreeNode, subtree: Subtree) -> dict[str, Value]:
         """Return the value of every argument of the subtree; a missing value is an `InvalidValue`."""
-        for name, setting in use.arguments.items():
+        for name in use.arguments:
             if name not in subtree.arguments:
                 hint = suggest_choice(name, subtree.arguments, "Arguments of the subtree")
                 message = f'the subtree "{subtree.name}" has no argument "{name}"'
-                self._add_error(setting.name_span, "unknown-argument", message, hint)
+                self._add_error(name.span, "unknown-argument", message, hint)
         values: dict[str, Value] = {}
         for name, default in subtree.arguments.items():
-            value = use.arguments[name].value if name in use.arguments else default
+            value = use.arguments.get(name, default)
             values[name] = value or InvalidValue(use.span)
             if value is None:
                 message = f'the subtree "{subtree.name}" needs the argument "{name}"'
@@ -298,12 +297,7 @@ def _prefix_variable(value: Value) -> Value:
     return replace(value, name=_CALLER_PREFIX + value.name) if isinstance(value, Reference) else value
 
 
-def assign_paths(root: Node) -> Node:
-    """Return the tree with the paths of all nodes."""
-    return _assign_path(root, "", "tree")
-
-
-def _assign_path(node: Node, parent_path: str, key_path: str, name: str = "") -> Node:
+def assign_paths(node: Node, parent_path: str = "", key_path: str = "tree", name: str = "") -> Node:
     """Return the node with its path and the paths of its descendants.
 
     `key_path` is the part of the path for the key of the parent that contains the node, or "". `name` is the
@@ -314,7 +308,7 @@ def _assign_path(node: Node, parent_path: str, key_path: str, name: str = "") ->
         case ControlNode():
             return node.replace(path=path, **_assign_key_paths(node, path))
         case SubtreeNode(body=Node() as body):
-            return node.replace(path=path, body=_assign_path(body, path, "do" if node.label else ""))
+            return node.replace(path=path, body=assign_paths(body, path, "do" if node.label else ""))
         case InvalidNode():
             return node.replace(path=path, parts=_assign_list_paths(node.parts, path))
     return node.replace(path=path)
@@ -331,9 +325,8 @@ def _assign_key_paths(owner: KeyOwner, path: str, section_path: str = "") -> dic
         # In the path of a child below `do` of a section, the key `do` is omitted.
         key_path = section_path if section_path and key.name == "do" else _join(section_path, key.name)
         if isinstance(value, Node):
-            values[key.attribute] = _assign_path(
-                value, path, key_path if key.in_path or value.is_list else ""
-            )
+            is_key_in_path = key.in_path or value.is_list
+            values[key.attribute] = assign_paths(value, path, key_path if is_key_in_path else "")
         elif isinstance(value, KeySection):
             values[key.attribute] = value.replace(**_assign_key_paths(value, path, key_path))
         elif isinstance(value, tuple) and key.value_type == Children:
@@ -357,7 +350,7 @@ def _assign_list_paths(nodes: tuple[Node, ...], parent_path: str) -> tuple[Node,
         return name if has_own_name and counts[name] == 1 else f"{index}:{name}"
 
     names = [get_unique_name(index, node) for index, node in enumerate(nodes, 1)]
-    return tuple(_assign_path(node, parent_path, "", name) for node, name in zip(nodes, names, strict=True))
+    return tuple(assign_paths(node, parent_path, "", name) for node, name in zip(nodes, names, strict=True))
 
 
 def _join(*names: str) -> str:

@@ -16,16 +16,7 @@ from pydantic.fields import FieldInfo
 
 from executive.text.findings import Finding, Span, make_error, suggest_choice
 from executive.text.yaml_files import YamlMapping, YamlNode, YamlScalar, YamlSequence, list_scalars
-from executive.tree.specification import (
-    Child,
-    Constant,
-    InvalidValue,
-    LocatedName,
-    Reason,
-    Reference,
-    Setting,
-    Value,
-)
+from executive.tree.specification import Child, Constant, InvalidValue, LocatedName, Reason, Reference, Value
 
 NAME_EXPRESSION = "[A-Za-z_][A-Za-z0-9_]*"
 """Regular expression of the names of params, arguments, variables and subtrees."""
@@ -64,7 +55,10 @@ Limit: TypeAlias = Annotated[int, Field(ge=1)] | ReferenceText
 
 
 class FileKeys(BaseModel):
-    """Base class of the keys of a mapping in a mission or library file; each field declares a key."""
+    """Base class of the keys of a mapping in a mission or library file; each field declares a key.
+
+    The docstrings of the fields are the descriptions in the schema.
+    """
 
     model_config = ConfigDict(extra="forbid", defer_build=True, arbitrary_types_allowed=True)
 
@@ -78,20 +72,17 @@ class FileKeys(BaseModel):
 class NodeKeys(FileKeys):
     """Key at the level of the keyword of every node."""
 
-    label: Annotated[str, Field(pattern=f"^{LABEL_EXPRESSION}$")] = Field(
-        "", alias="as", description="Label of the node, for references in `on`, `until` and `catch`."
-    )
+    label: Annotated[str, Field(pattern=f"^{LABEL_EXPRESSION}$")] = Field("", alias="as")
+    """Label of the node, for references in `on`, `until` and `catch`."""
 
 
 class UseKeys(FileKeys):
     """Keys at the level of `use`."""
 
-    arguments: dict[Name, object] | None = Field(
-        None, alias="with", description="Values of the subtree's arguments."
-    )
-    returns: dict[Name, ReferenceText] | None = Field(
-        None, description="Variable of the caller for each returned one: `pose: $grasp_pose`."
-    )
+    arguments: dict[Name, object] | None = Field(None, alias="with")
+    """Values of the subtree's arguments."""
+    returns: dict[Name, ReferenceText] | None = None
+    """Variable of the caller for each returned one: `pose: $grasp_pose`."""
 
 
 class BehaviourKeys(FileKeys):
@@ -99,9 +90,8 @@ class BehaviourKeys(FileKeys):
 
     model_config = ConfigDict(extra="allow")
 
-    behaviour: Text = Field(
-        alias=BEHAVIOUR_CLASS, description="Import path of the behaviour: `module:Class`."
-    )
+    behaviour: Text = Field(alias=BEHAVIOUR_CLASS)
+    """Import path of the behaviour: `module:Class`."""
 
 
 class ParamKeys(FileKeys):
@@ -111,57 +101,65 @@ class ParamKeys(FileKeys):
         json_schema_extra={"type": ["object", "array", "string", "number", "boolean", "null"]}
     )
 
-    default: object = Field(
-        None, description="Default value; a param without a default must be set with `--set`."
-    )
-    type: Literal["text", "integer", "number", "boolean", "list"] = Field(
-        "text", description="text, integer, number, boolean or list; by default the type of `default`."
-    )
-    min: float = Field(0.0, description="Minimum value.")
-    max: float = Field(0.0, description="Maximum value.")
-    choices: list[object] | ReferenceText = Field([], description="Allowed values.")
-    doc: Text = Field("", description="Meaning of the param, one sentence.")
+    default: object = None
+    """Default value; a param without a default must be set with `--set`."""
+    type: Literal["text", "integer", "number", "boolean", "list"] = "text"
+    """text, integer, number, boolean or list; by default the type of `default`."""
+    min: float = 0.0
+    """Minimum value."""
+    max: float = 0.0
+    """Maximum value."""
+    choices: list[object] | ReferenceText = []
+    """Allowed values."""
+    doc: Text = ""
+    """Meaning of the param, one sentence."""
 
 
 class SubtreeKeys(FileKeys):
     """Keys of a subtree; a node without these keys is a subtree without arguments."""
 
-    doc: Text = Field("", description="Purpose of the subtree, one sentence.")
-    args: dict[Name, object] | list[TitleName] | None = Field(
-        None, description="Arguments of the subtree: a list of names, or names with defaults."
-    )
-    returns: DollarName | list[DollarName] = Field(
-        [], description="Variables that the caller gets; all other variables are then local."
-    )
-    do: Child = Field(description="Root node of the subtree.")
+    doc: Text = ""
+    """Purpose of the subtree, one sentence."""
+    args: dict[Name, object] | list[TitleName] | None = None
+    """Arguments of the subtree: a list of names, or names with defaults."""
+    returns: DollarName | list[DollarName] = []
+    """Variables that the caller gets; all other variables are then local."""
+    do: Child
+    """Root node of the subtree."""
 
 
 class LibraryKeys(FileKeys):
     """Keys of a library file."""
 
-    library: TitleName = Field(description="Name of the library.")
-    description: Text = Field("", description="Content of the library, one sentence.")
-    trees: dict[Name, Child | SubtreeKeys] | None = Field(description="Subtrees by name.")
+    library: TitleName
+    """Name of the library."""
+    description: Text = ""
+    """Content of the library, one sentence."""
+    trees: dict[Name, Child | SubtreeKeys] | None
+    """Subtrees by name."""
 
 
 class MissionKeys(FileKeys):
     """Keys of a mission file."""
 
-    mission: TitleName = Field(description="Name of the mission.")
-    description: Text = Field("", description="Purpose of the mission, one sentence.")
-    cell: Text = Field(description="Cell file: a path relative to this or the shipped folder.")
-    library: Files = Field([], description="Library files: paths relative to this or the shipped folder.")
-    params: dict[Name, ParamKeys] | None = Field(
-        None, description="Constants, read as `$name`; `--set name=value` replaces a value."
-    )
-    routes: dict[str, Files] | None = Field(
-        None, description="Bin, or list of permitted bins, for each class of objects."
-    )
-    quotas: dict[str, Limit | Annotated[dict[str, Limit], Field(min_length=1)]] | None = Field(
-        None, description="Maximum number of objects in a bin, in all or of each class."
-    )
-    tree: Child = Field(description="Root node of the tree.")
-    trees: dict[Name, Child | SubtreeKeys] | None = Field(None, description="Subtrees by name.")
+    mission: TitleName
+    """Name of the mission."""
+    description: Text = ""
+    """Purpose of the mission, one sentence."""
+    cell: Text
+    """Cell file: a path relative to this or the shipped folder."""
+    library: Files = []
+    """Library files: paths relative to this or the shipped folder."""
+    params: dict[Name, ParamKeys] | None = None
+    """Constants, read as `$name`; `--set name=value` replaces a value."""
+    routes: dict[str, Files] | None = None
+    """Bin, or list of permitted bins, for each class of objects."""
+    quotas: dict[str, Limit | Annotated[dict[str, Limit], Field(min_length=1)]] | None = None
+    """Maximum number of objects in a bin, in all or of each class."""
+    tree: Child
+    """Root node of the tree."""
+    trees: dict[Name, Child | SubtreeKeys] | None = None
+    """Subtrees by name."""
 
 
 NAME_PATTERN = re.compile(NAME_EXPRESSION)
@@ -288,18 +286,18 @@ def is_empty(node: YamlNode) -> bool:
 
 
 def read_settings(
-    node: YamlNode, owner: str, findings: list[Finding], example_key: str = "name"
-) -> dict[str, Setting]:
+    node: YamlNode | None, owner: str, findings: list[Finding], example_key: str = "name"
+) -> dict[LocatedName, Value]:
     """Return the settings below `owner`, a skill or a key; the hint of an error shows `example_key`."""
-    if is_empty(node):
+    if node is None or is_empty(node):
         return {}
     if not isinstance(node, YamlMapping):
         message = f"the value of {owner} must be a mapping of names to values, not {node.description}"
         hint = f"Write {owner}: {{{example_key}: {node.text}}}." if isinstance(node, YamlScalar) else ""
         findings.append(make_error(node.span, "wrong-type", message, hint))
         return {}
-    entries = ((entry.key, entry.value) for entry in node.entries)
-    return {key.text: Setting(key.span, read_value(value, findings)) for key, value in entries}
+    entries = ((LocatedName(entry.key.text, entry.key.span), entry.value) for entry in node.entries)
+    return {name: read_value(value, findings) for name, value in entries}
 
 
 def read_value(node: YamlNode, findings: list[Finding]) -> Value:

@@ -1,10 +1,11 @@
-"""Loading of a mission: reading and checking of the mission file, its libraries and its cell file."""
+"""Loading of a mission: reading and checking of its files, and construction of its behaviour tree."""
 
 from __future__ import annotations
 
 from collections import ChainMap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from itertools import islice
 from pathlib import Path
 from typing import Protocol, cast
@@ -14,16 +15,20 @@ from pydantic import JsonValue
 from executive.behaviours import Skills
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.objects import Quotas
+from executive.cell.protocols import Cell
 from executive.errors import InputError
-from executive.mission import check_flow, check_nodes, check_skills, check_variables
+from executive.events import Emit
+from executive.mission import check_nodes, check_skills, check_variables
 from executive.mission.analysis import CheckContext, UnhandledFailure, find_unhandled_failures
 from executive.mission.cell_file import CellFile, read_cell
 from executive.mission.expand import assign_paths, expand
+from executive.mission.grammar import SEQUENCE_KEYWORD
 from executive.mission.mission_file import Mission, Subtree, parse_library, parse_mission
 from executive.mission.node_parser import NodeParser
+from executive.mission.ports import convert_setting, find_literals, find_wires
 from executive.perception.camera_model import find_calibration_doubts
 from executive.perception.detectors.envelope import find_unmeasured_detectors
-from executive.skill import Skill
+from executive.skill import Direction, Param, Port, Skill
 from executive.text.findings import Finding, MissionError, Source, make_warning, sort_findings
 from executive.text.validate import KeyPath
 from executive.text.yaml_files import (
@@ -34,8 +39,10 @@ from executive.text.yaml_files import (
     parse_yaml,
     read_source,
 )
-from executive.tree.node import ControlNodes, load_control_nodes
-from executive.tree.specification import Constant, InvalidNode, LocatedName, Node
+from executive.tree.blackboard import Blackboard, NodeContext, Wiring
+from executive.tree.node import ControlNode, ControlNodes, load_control_nodes
+from executive.tree.specification import Constant, InvalidNode, LocatedName, Node, SkillNode, SubtreeNode
+from executive.tree.tree_node import SkillLeaf, TreeNode
 
 Check = Callable[[CheckContext], Iterator[Finding]]
 """Function that yields the findings of one check."""
@@ -56,13 +63,13 @@ CHECKS: tuple[Check, ...] = (
     check_variables.find_unread_variables,
     check_variables.find_unwritten_returns,
     check_variables.check_port_types,
-    check_flow.check_tool_states,
-    check_flow.check_tool_at_end,
-    check_flow.find_unreachable,
+    check_nodes.check_tool_states,
+    check_nodes.check_tool_at_end,
+    check_nodes.find_unreachable,
     check_nodes.run_node_checks,
-    check_flow.find_shared_resources,
-    check_flow.find_shared_variables,
-    check_flow.find_read_races,
+    check_nodes.find_shared_resources,
+    check_nodes.find_shared_variables,
+    check_nodes.find_read_races,
 )
 """All checks; a check ignores the errors that another check reports, and their consequences."""
 
@@ -97,11 +104,7 @@ class MissionFiles:
 
 
 def read_mission(
-    path: Path,
-    overrides: Mapping[str, str],
-    skills: Skills,
-    node_classes: ControlNodes,
-    replacing_cell: str | CellFile = "",
+    path: Path, overrides: Mapping[str, str], skills: Skills, replacing_cell: str | CellFile = ""
 ) -> MissionFiles:
     """Return the content of a mission file, its libraries, and its cell file or the cell that replaces it.
 
@@ -113,7 +116,7 @@ def read_mission(
     root, findings = parse_yaml(source)
     if root is None:
         raise MissionError(sort_findings(findings, source.path))
-    parser = NodeParser(findings, skills, node_classes)
+    parser = NodeParser(findings, skills, load_control_nodes())
     mission = parse_mission(root, overrides, parser)
     subtrees = dict(mission.subtrees)
     texts = {str(file): _add_library(file, path.parent, parser, subtrees) for file in mission.libraries}
@@ -210,7 +213,7 @@ class LoadedMission:
     unhandled_failures: tuple[UnhandledFailure, ...]
     warnings: tuple[Finding, ...]
     overrides: Mapping[str, str]
-    skills: Mapping[str, type[Skill]]
+    skills: Skills
     replacing_cell: str
 
     @property
@@ -234,7 +237,7 @@ class LoadedMission:
 
 def load_mission(
     path: str | Path,
-    skills: Mapping[str, type[Skill]],
+    skills: Skills,
     overrides: Mapping[str, str] | None = None,
     find_checker: CheckerFinder | None = None,
     replacing_cell: str | CellFile = "",
@@ -254,8 +257,7 @@ def load_mission(
         InputError: The mission or the cell does not exist.
     """
     mission_path = find_mission(path)
-    node_classes = load_control_nodes()
-    files = read_mission(mission_path, overrides or {}, skills, node_classes, replacing_cell)
+    files = read_mission(mission_path, overrides or {}, skills, replacing_cell)
     mission = files.mission
     cell = files.cell
     findings = list(files.findings)
@@ -264,7 +266,10 @@ def load_mission(
     checker = None
     classes_by_detector = {}
     if cell is not None and config is not None:
-        findings += _warn_about_calibration(cell, config)
+        for name, camera in config.cameras.items():
+            for key, message in find_calibration_doubts(camera):
+                span = cell.find_span(("cameras", name, "calibration", key))
+                findings.append(make_warning(span, "calibration", message))
     if cell is not None and config is not None and find_checker is not None:
         try:
             checker = find_checker(config.kind)
@@ -280,18 +285,25 @@ def load_mission(
             compute_mass = None if cell_findings else checker.compute_mass
             findings += check_skills.check_loads(cell, config, mission, compute_mass)
             findings += check_skills.check_slots(cell, config, mission)
-    expansion = expand(mission, skills, _make_predefined_lists(mission, config) if config else {})
+    predefined_lists: dict[str, Sequence[str]] = {}
+    if config is not None:
+        scan_poses = next(iter(config.cameras.values())).scan_poses
+        labels = list(map(str, mission.routes))
+        predefined_lists = {"poses": scan_poses, "bins": list(config.bins), "classes": labels}
+    expansion = expand(mission, skills, predefined_lists)
     mission = replace(mission, quotas=expansion.quotas)
     tree = assign_paths(expansion.tree or InvalidNode(span=files.source.make_span()))
-    context = CheckContext(
-        mission, tree, expansion.unused_subtrees, skills, node_classes, config, classes_by_detector
-    )
+    unused_subtrees = expansion.unused_subtrees
+    node_classes = load_control_nodes()
+    context = CheckContext(mission, tree, unused_subtrees, skills, node_classes, config, classes_by_detector)
     findings += (*expansion.findings, *run_checks(context))
     has_errors = expansion.tree is None or any(finding.severity == "error" for finding in findings)
     if config is None or cell is None or has_errors:
         raise MissionError(sort_findings(findings, files.source.path))
     if checker is not None:
-        findings += _warn_about_unmeasured_detectors(cell)
+        folders = (cell.path.parent, get_shipped_folder() / "cells")
+        for keys, message in find_unmeasured_detectors(config, cell.path.parent, folders):
+            findings.append(make_warning(cell.find_span(keys, at_key=True), "not-measured", message))
     return LoadedMission(
         mission, tree, config, files.source.text, mission_path, cell.path, files.libraries,
         find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
@@ -299,26 +311,76 @@ def load_mission(
     )  # fmt: skip
 
 
-def _make_predefined_lists(mission: Mission, config: CellConfig) -> dict[str, Sequence[str]]:
-    """Return the predefined lists whose names are known before the run."""
-    return {
-        "poses": next(iter(config.cameras.values())).scan_poses,
-        "bins": list(config.bins),
-        "classes": list(map(str, mission.routes)),
-    }
+def build_tree(
+    loaded: LoadedMission,
+    cell: Cell,
+    blackboard: Blackboard,
+    emit: Emit,
+    substitutes: Skills | None = None,
+) -> TreeNode:
+    """Return the root of a new behaviour tree; every node of the tree has a unique, readable `path`.
+
+    `substitutes` contains skills that run in place of the mission's skills, by pattern of node paths. In a
+    pattern, `*` matches any characters, including `/`. The first matching pattern applies.
+
+    Raises:
+        InputError: A pattern matches no skill node.
+    """
+    builder = TreeBuilder(loaded.skills, cell, blackboard, emit, substitutes or {})
+    root = builder.build_node(loaded.tree)
+    paths = [node.path for node in root.iterate() if isinstance(node, SkillLeaf)]
+    for pattern in builder.substitutes:
+        if not any(fnmatchcase(path, pattern) for path in paths):
+            raise InputError(f'no skill node matches "{pattern}"; the skill nodes are: {", ".join(paths)}')
+    return root
 
 
-def _warn_about_calibration(cell: CellFile, config: CellConfig) -> Iterator[Finding]:
-    """Yield a warning for each entry of a calibration that does not fit the images of its camera."""
-    for name, camera in config.cameras.items():
-        for key, message in find_calibration_doubts(camera):
-            span = cell.find_span(("cameras", name, "calibration", key))
-            yield make_warning(span, "calibration", message)
+@dataclass(frozen=True)
+class TreeBuilder:
+    """Builder of the behaviour tree of one mission.
 
+    Attributes:
+        substitutes: Skills that run in place of the mission's skills, by pattern of node paths.
+    """
 
-def _warn_about_unmeasured_detectors(cell: CellFile) -> Iterator[Finding]:
-    """Yield a warning for each detector of the cell whose error rates were not measured."""
-    assert cell.config is not None
-    folders = (cell.path.parent, get_shipped_folder() / "cells")
-    for keys, message in find_unmeasured_detectors(cell.config, cell.path.parent, folders):
-        yield make_warning(cell.find_span(keys, at_key=True), "not-measured", message)
+    skills: Skills
+    cell: Cell
+    blackboard: Blackboard
+    emit: Emit
+    substitutes: Skills
+    node_classes: ControlNodes = field(default_factory=load_control_nodes)
+
+    def build_node(self, node: Node) -> TreeNode:
+        """Return the behaviour for a node of the mission, with the behaviours of all nodes below it."""
+        cell = self.cell
+        context = NodeContext(node.path, cell.clock, cell.ledger, self.blackboard, node.label, self.emit)
+        match node:
+            case SkillNode():
+                return self._build_skill_leaf(context, node)
+            case ControlNode():
+                return node.Behaviour(context, node, self.build_node)
+            case SubtreeNode(body=Node() as subtree_root):
+                body = self.build_node(subtree_root)
+                # A node has one label, so the label of the `use` belongs to a sequence around the subtree.
+                root = body
+                if node.label:
+                    sequence = self.node_classes[SEQUENCE_KEYWORD].make({}, do=(subtree_root,))
+                    root = sequence.Behaviour(context, sequence, lambda _: body)
+                root.subtree_names = (node.name, *root.subtree_names)
+                return root
+        raise AssertionError(f"a checked mission contains no {type(node).__name__}")
+
+    def _build_skill_leaf(self, context: NodeContext, node: SkillNode) -> TreeNode:
+        skill = self.skills[node.skill]
+        declarations: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
+        literals = find_literals(node)
+        input_wires = list(find_wires(node, skill, Direction.IN))
+        wiring = Wiring(
+            constants={name: convert_setting(one.value, declarations[name]) for name, one in literals},
+            inputs={wire.port.name: wire.variable for wire in input_wires},
+            fields={wire.port.name: wire.field for wire in input_wires if wire.field},
+            outputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.OUT)},
+        )
+        patterns = (pattern for pattern in self.substitutes if fnmatchcase(node.path, pattern))
+        executed_skill = next((self.substitutes[pattern] for pattern in patterns), skill)
+        return SkillLeaf(context, node.skill, executed_skill, wiring, self.cell)

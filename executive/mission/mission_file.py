@@ -136,8 +136,13 @@ def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> 
         le=_read_bound(reader, "max"),
         choices=tuple(item.python_value for item in items) if reader.get("choices") else None,
     )
+    type_name = reader.read_text("type")
+    if type_name and type_name not in PARAM_TYPES:
+        hint = suggest_choice(type_name, PARAM_TYPES, "Types")
+        message = f'there is no type "{type_name}"'
+        reader.add_error(reader.get_value_span("type"), "wrong-value", message, hint)
     default_type = _infer_type(None if default is None else default.python_value)
-    declaration = replace(declaration, type=_read_type(reader) or default_type)
+    declaration = replace(declaration, type=PARAM_TYPES.get(type_name, default_type))
     without_value = MissionParam(InvalidValue(reader.span), declaration)
     problem = f"{name} cannot have any value"
     if declaration.choices == ():
@@ -151,15 +156,6 @@ def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> 
         message = f'the param "{name}" has neither a default nor a value'
         reader.add_error(reader.span, "missing-param", message, f"Set it with --set {name}=...")
     return without_value
-
-
-def _read_type(reader: MappingReader) -> object:
-    """Return the type that the key `type` names, or None; add an error for an unknown name."""
-    name = reader.read_text("type")
-    if name and name not in PARAM_TYPES:
-        hint = suggest_choice(name, PARAM_TYPES, "Types")
-        reader.add_error(reader.get_value_span("type"), "wrong-value", f'there is no type "{name}"', hint)
-    return PARAM_TYPES.get(name)
 
 
 def _infer_type(value: object) -> object:
@@ -198,13 +194,12 @@ def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodePars
     span = replace(root.span, length=1)
     reader = MappingReader("the mission", span, root, MissionKeys.get_keys(), parser.findings)
     tree = reader.get("tree")
+    library_rule = "library must be the path of a file or a list of paths"
     return Mission(
         name=_read_name(reader),
         description=reader.read_text("description"),
         cell=_read_cell(reader),
-        libraries=_read_names(
-            reader, reader.list_items("library"), "library must be the path of a file or a list of paths"
-        ),
+        libraries=_read_names(reader, reader.list_items("library"), library_rule),
         params=parse_params(reader, overrides),
         routes=_read_routes(reader),
         quotas=_read_quotas(reader),
@@ -249,7 +244,7 @@ def _read_quotas(reader: MappingReader) -> dict[QuotaKey, Value]:
             reader.add_error(node.span, "empty-list", f"the quota of {bin} names no class")
         else:
             labels = read_settings(node, "quotas", reader.findings).items()
-            quotas |= {(bin, LocatedName(label, limit.name_span)): limit.value for label, limit in labels}
+            quotas |= {(bin, label): limit for label, limit in labels}
     return quotas
 
 

@@ -29,6 +29,7 @@ from executive.tree.specification import (
     Constant,
     InvalidNode,
     InvalidValue,
+    LocatedName,
     Node,
     Reason,
     Reference,
@@ -136,9 +137,8 @@ class NodeParser:
         if surplus_entries:
             # Errors in surplus nodes are discarded, because the author must correct the mapping first.
             parts = [self.make_silent_parser()._read_entry(mapping, entry, "") for entry in surplus_entries]
-            return InvalidNode(
-                span=span, label=label, parts=(self._read_entry(mapping, node_entry, ""), *parts)
-            )
+            first_part = self._read_entry(mapping, node_entry, "")
+            return InvalidNode(span=span, label=label, parts=(first_part, *parts))
         node_class = self._node_classes.get(name)
         sibling_keys = node_class.sibling_keys if node_class else {}
         allowed_keys = ("as", *(grammar.UseKeys.get_keys() if name == grammar.USE_KEYWORD else sibling_keys))
@@ -169,16 +169,12 @@ class NodeParser:
 
     def _read_use(self, mapping: YamlMapping, entry: YamlEntry, label: str) -> Node:
         """Return the use of a subtree, or an invalid node if the name of the subtree is no text."""
-        siblings = [
-            (key, value) for key in grammar.UseKeys.get_keys() if (value := mapping.get(key)) is not None
-        ]
-        settings = {key: read_settings(value, key, self.findings) for key, value in siblings}
+        arguments = read_settings(mapping.get("with"), "with", self.findings)
+        returns = read_settings(mapping.get("returns"), "returns", self.findings)
         if not (isinstance(entry.value, YamlScalar) and isinstance(entry.value.value, str)):
             message = f"use must be the name of a subtree, not {entry.value.description}"
             self.add_error(entry.value.span, "wrong-type", message)
             return InvalidNode(span=entry.key.span)
-        arguments = settings.get("with", {})
-        returns = settings.get("returns", {})
         return SubtreeNode.model_construct(
             span=entry.value.span, label=label, name=entry.value.text, arguments=arguments, returns=returns
         )
@@ -189,7 +185,7 @@ class NodeParser:
         class_key = grammar.BEHAVIOUR_CLASS
         span = entry.key.span
         settings = read_settings(entry.value, keyword, self.findings, class_key)
-        path = settings.pop(class_key).value if class_key in settings else None
+        path = settings.pop(LocatedName(class_key), None)
         if isinstance(path, Constant) and isinstance(path.value, str):
             try:
                 skill = load_behaviour(path.value)
@@ -203,9 +199,8 @@ class NodeParser:
             self.behaviours[name] = skill
             return SkillNode.model_construct(span=span, label=label, skill=name, settings=settings)
         if isinstance(path, Constant | Reference):
-            message = (
-                f"{keyword}.{class_key} must be an import path, for example py_trees.behaviours:TickCounter"
-            )
+            example = "for example py_trees.behaviours:TickCounter"
+            message = f"{keyword}.{class_key} must be an import path, {example}"
             self.add_error(path.span, "wrong-type", message)
         elif path is None and (is_empty(entry.value) or isinstance(entry.value, YamlMapping)):
             self.add_error(span, "missing-key", f'{keyword} needs the key "{class_key}"')

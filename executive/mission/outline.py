@@ -175,13 +175,12 @@ def _describe_skill(node: OutlineNode, leaf: SkillLeaf) -> OutlineNode:
     """Return `node` with the declarations and connections of the skill of `leaf`."""
     skill = leaf.skill_type
     wiring = leaf.wiring
-    ports = leaf.skill_type.ports
+    optional_names = [port.name for port in skill.ports.values() if port.default is not ...]
 
     def make_connections(variables_by_port: Mapping[str, str]) -> tuple[Connection, ...]:
-        pairs = ((name, name in ports and ports[name].default is not ...) for name in variables_by_port)
         return tuple(
-            Connection(name, variables_by_port[name] + wiring.make_field_suffix(name), not has_default)
-            for name, has_default in pairs
+            Connection(name, f"{variable}{wiring.make_field_suffix(name)}", name not in optional_names)
+            for name, variable in variables_by_port.items()
         )
 
     return replace(

@@ -5,19 +5,19 @@ from __future__ import annotations
 import functools
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, NoReturn, Union, cast, get_args, get_origin, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from executive.behaviours import find_mission_type
+from executive.behaviours import Skills, find_mission_type
 from executive.cell.objects import KnownItem, RefersTo
 from executive.skill import Direction, Param, Port, Skill
 from executive.text.findings import Span, describe_validation_error, describe_value, suggest_word
 from executive.tree.keys import Elements, Key, is_union
 from executive.tree.node import ControlNode
-from executive.tree.specification import Constant, Node, Reference, SkillNode, VariableName
+from executive.tree.specification import Constant, LocatedName, Node, Reference, SkillNode, VariableName
 
 _DESCRIPTIONS = {
     str: "a text",
@@ -240,8 +240,7 @@ def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Seq
     declarations: list[Param | Port] = [*(param for param in params if param.accepts_variable), *ports]
     wires: list[Wire] = []
     for declaration in declarations:
-        setting = node.settings.get(declaration.name)
-        value = setting.value if setting else None
+        value = node.settings.get(LocatedName(declaration.name))
         if isinstance(value, Reference):
             wires.append(Wire(node, declaration, value.name, value.span, True, value.field))
         # `check_settings` reports a constant for an output.
@@ -254,7 +253,7 @@ def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Seq
     return wires
 
 
-def find_node_wires(node: Node, skills: Mapping[str, type[Skill]], direction: Direction) -> Sequence[Wire]:
+def find_node_wires(node: Node, skills: Skills, direction: Direction) -> Sequence[Wire]:
     """Return the connections of a skill or control node; none for a skill that is not installed."""
     if isinstance(node, SkillNode):
         return find_wires(node, skills[node.skill], direction) if node.skill in skills else ()
@@ -269,10 +268,10 @@ def find_node_wires(node: Node, skills: Mapping[str, type[Skill]], direction: Di
 
 def find_literals(node: SkillNode) -> Sequence[tuple[str, Constant]]:
     """Return the name and the constant of every param and port that has a constant."""
-    values = [(name, setting.value) for name, setting in node.settings.items()]
-    return [(name, value) for name, value in values if isinstance(value, Constant)]
+    settings = node.settings.items()
+    return [(str(name), value) for name, value in settings if isinstance(value, Constant)]
 
 
-def find_written_variables(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
+def find_written_variables(root: Node, skills: Skills) -> set[str]:
     """Return the variables that the nodes of a tree may write."""
     return {wire.variable for node in root.walk() for wire in find_node_wires(node, skills, Direction.OUT)}

@@ -50,14 +50,15 @@ class Draft07(GenerateJsonSchema):
         return {**tuple_schema, "items": elements[0] if are_equal else elements}
 
     def model_schema(self, schema: core_schema.ModelSchema) -> Schema:
-        """Return the schema of a section of the cell file, without title."""
+        """Return the schema of a section of a file, without title."""
         section_schema = super().model_schema(schema)
         del section_schema["title"]
         ancestors = reversed(schema["cls"].__mro__[:-1])
         sections = (each for each in ancestors if issubclass(each, BaseModel) and each is not BaseModel)
         for section in sections:
             for name, docstring in find_attribute_docstrings(section).items():
-                section_schema["properties"][name]["description"] = docstring
+                key = section.model_fields[name].alias or name
+                section_schema["properties"][key]["description"] = docstring
         return section_schema
 
     def field_title_should_be_set(self, _schema: object) -> bool:
@@ -142,7 +143,7 @@ def make_settings_schema(name: str, skill: type[Skill]) -> Schema:
     return {"title": name, **_document_skill(skill), "allOf": [mapping]}
 
 
-def make_name_schemas(skills: Mapping[str, type[Skill]]) -> list[Schema]:
+def make_name_schemas(skills: Skills) -> list[Schema]:
     """Return the schemas of skills that may be written as a name only: they require no setting."""
     return [
         {"const": name, "title": name, **_document_skill(skill), **NO_ITEM_SUGGESTION}

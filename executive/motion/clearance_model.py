@@ -20,7 +20,7 @@ from executive.cell.config import CellConfig
 from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array, format_point
-from executive.motion.arms import SAMPLING_MARGIN
+from executive.motion.joints import SAMPLING_MARGIN
 
 OBSERVED_RADIUS = 0.05
 """Radius around the ends of a motion in which only known obstacles count [m]."""

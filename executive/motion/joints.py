@@ -1,17 +1,27 @@
-"""Joints of an arm: state, range, limits, and the protocol of kinematics."""
+"""Joints of an arm: range and limits; kinematics of the arm of a cell, by the solver that its file names."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from executive.cell.arm_config import LimitsConfig
+from executive.cell.arm_config import ArmFile, LimitsConfig
+from executive.cell.config import CellConfig
+from executive.errors import InputError
 from executive.geometry import Array, Pose
+from executive.plugins import list_entries
+from executive.text.findings import suggest_choice
+from executive.text.validate import KeyPath
+
+IK_SOLVER_GROUP = "executive.ik_solvers"
+"""Group of the entry points of the solvers that an arm file can name."""
+SAMPLING_MARGIN = 0.001
+"""Addition to the margin of the cell, because only samples of a motion are checked [m]."""
 
 BranchKey = tuple[float, ...]
 """Key of a branch of the inverse kinematics; the meaning of the numbers depends on the arm.
@@ -144,6 +154,53 @@ class Kinematics(Protocol):
         Raises:
             Unreachable: The pose is too near to the arm or too far from the arm.
         """
+
+
+class KinematicsFactory(Protocol):
+    """A solver: function or class that builds the kinematics of an arm."""
+
+    def __call__(
+        self, arm: ArmFile, tool_length: float, min_link_distance: float | None = None
+    ) -> Kinematics:
+        """Return the kinematics of an arm with a tool.
+
+        Args:
+            arm: The arm file.
+            tool_length: Distance from the flange to the tool centre point [m].
+            min_link_distance: Minimum distance between links of the wrist [m], which may make the range of
+                the joints narrower than the limits, or None.
+
+        Raises:
+            InputError: The solver cannot solve this arm.
+        """
+
+
+def find_arm_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the key and the message of an error if the solver is not installed or cannot solve the arm."""
+    try:
+        build_kinematics(config)
+    except InputError as error:
+        yield ("arm", "solver"), str(error)
+
+
+def build_kinematics(config: CellConfig, min_link_distance: float | None = None) -> Kinematics:
+    """Return the kinematics of the arm of a cell file, with a minimum distance [m] between its links.
+
+    Raises:
+        InputError: The solver is not installed, or cannot solve the arm.
+    """
+    arm = config.arm
+    solvers = list_entries(IK_SOLVER_GROUP, "solver")
+    if arm.solver not in solvers:
+        hint = suggest_choice(arm.solver, solvers, "Installed solvers")
+        raise InputError(f'the solver "{arm.solver}" of the arm {arm.arm} is not installed. {hint}')
+    factory: KinematicsFactory = solvers[arm.solver].load()
+    return factory(arm, config.tool.length, min_link_distance)
+
+
+def build_planning_kinematics(config: CellConfig) -> Kinematics:
+    """Return the kinematics of the arm of a cell file, whose links keep the margin of planned motions."""
+    return build_kinematics(config, config.motion.margin + SAMPLING_MARGIN)
 
 
 def wrap_angles(angles: Array) -> Array:

@@ -57,7 +57,6 @@ class MotionSearch:
     Args:
         config: Content of the cell file.
         kinematics: Kinematics of the arm.
-        limits: Joint limits of the arm.
         start: Joint positions at the start `(n,)` [rad].
         end: A goal, or joint positions at the end `(n,)` [rad].
         task: Load and obstacles of the free part; `task.obstacles` includes the target.
@@ -67,16 +66,10 @@ class MotionSearch:
     """
 
     def __init__(
-        self,
-        config: CellConfig,
-        kinematics: Kinematics,
-        limits: JointLimits,
-        start: Array,
-        end: Goal | Array,
-        task: Task,
+        self, config: CellConfig, kinematics: Kinematics, start: Array, end: Goal | Array, task: Task
     ) -> None:
         self._kinematics = kinematics
-        self._limits = limits
+        self._limits = JointLimits.from_config(config.arm.limits)
         self._travel_height = config.travel_height
         self._end = end
         self._straight_part_length = config.motion.straight
@@ -98,7 +91,7 @@ class MotionSearch:
             payload = PayloadLimit(task.load, task.holding_force, config.tool, kinematics)
         self._departure = departure = self._plan_departure(start, float(tcps[0, 2]), payload)
         free_start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
-        self.problem = MotionProblem(free_start, Connector(limits), kinematics, clearance, payload)
+        self.problem = MotionProblem(free_start, Connector(self._limits), kinematics, clearance, payload)
         # The motion up to a via point is the same for all candidates, and is planned once per height.
         self._get_rise = functools.cache(self._plan_rise)
 
@@ -106,9 +99,8 @@ class MotionSearch:
         """Plan and yield motions, the best first; motions that stop at via points are last."""
         if isinstance(self._end, Goal):
             length = self._end.slow_length or self._straight_part_length
-            all_candidates = find_candidates(
-                self._kinematics, self._limits, self.problem.start, self._end, length
-            )
+            start = self.problem.start
+            all_candidates = find_candidates(self._kinematics, self._limits, start, self._end, length)
         else:
             all_candidates = iter([Candidate(0.0, JointState.at_rest(self._end), None, None)])
         remaining_candidates = islice(all_candidates, MAX_CANDIDATES)

@@ -184,9 +184,8 @@ class Trajectory:
     def state_at(self, time: float) -> JointState:
         """Return the joint state at `time` [s]; the arm is at rest before time 0 and after `duration`."""
         if not math.isfinite(time):  # ruckig would end the process
-            raise Fault(
-                f"a trajectory has no state at the time {time}; its times are 0 to {self.duration:.3f} s"
-            )
+            problem = f"a trajectory has no state at the time {time}"
+            raise Fault(f"{problem}; its times are 0 to {self.duration:.3f} s")
         if time <= 0 or time >= self.duration:
             return JointState.at_rest((self.start if time <= 0 else self.end).copy())
         index = min(bisect_right(self._end_times, time), len(self._pieces) - 1)
@@ -220,9 +219,8 @@ class Trajectory:
         for name, peaks in zip(("velocity", "acceleration", "jerk"), peak_fractions, strict=True):
             joint = np.argmax(peaks)
             if peaks[joint] > 1 + _MAX_STATE_DIFFERENCE:
-                raise JointLimitError(
-                    f"the {name} of joint {joint + 1} would be {peaks[joint]:.3f} times its limit"
-                )
+                message = f"the {name} of joint {joint + 1} would be {peaks[joint]:.3f} times its limit"
+                raise JointLimitError(message)
         return states
 
 

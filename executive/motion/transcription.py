@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import daqp
 import numpy as np
@@ -50,6 +50,8 @@ MIN_DURATION_FACTOR = 0.8
 """Minimum factor on the duration of the motion in one quadratic program."""
 MAX_DURATION_FACTOR = 1.6
 """Maximum factor on the duration of the motion in one quadratic program."""
+Rows: TypeAlias = tuple[Array, Array]
+"""`R` linear constraints of a program: coefficients of `V` variables `(R, V)`, and upper bounds `(R,)`."""
 _VIOLATION_UNIT = 0.01  # [m]
 _UNBOUNDED = 1e30  # bound that daqp treats as infinite
 _STATUS_SOLVED = 1  # of daqp
@@ -206,12 +208,7 @@ class Transcription:
         return self._solve(step, self._matrices.hessian, gradient, bounds, extra_constraints)
 
     def _solve(
-        self,
-        step: float,
-        hessian: Array,
-        gradient: Array,
-        bounds: Array,
-        extra_constraints: Sequence[tuple[Array, Array]],
+        self, step: float, hessian: Array, gradient: Array, bounds: Array, extra_constraints: Sequence[Rows]
     ) -> DiscreteMotion | None:
         """Return the motion that solves a program linearized about time steps of `step` [s], or None.
 

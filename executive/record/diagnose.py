@@ -10,12 +10,11 @@ from pathlib import Path, PurePath
 from executive.errors import RecordLost
 from executive.events import RunEnded
 from executive.mission.load import LoadedMission
-from executive.record.diagnosis import Diagnosis, FailureNode
 from executive.record.picture_recorder import find_picture
-from executive.record.result import is_resumable
+from executive.record.result import Diagnosis, FailureNode, is_resumable
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline import Look, Timeline, get_skill_name
-from executive.tree.node import Advice, ControlNode, PropagatedFailure, load_control_nodes
+from executive.tree.node import ControlNode, PropagatedFailure, load_control_nodes
 from executive.tree.specification import Node, Reason, SkillNode, SubtreeNode
 
 CAMERA_ADVICE = "mount camera and bins as the cell file says, or measure the pose again"
@@ -93,7 +92,7 @@ class _FailurePathNode:
     name: str
     explanation: str = ""
     attempt: tuple[int, int] | None = None
-    changes: Sequence[Advice] = ()
+    changes: Sequence[tuple[str, Node]] = ()
     is_handler: bool = False
 
 
@@ -274,7 +273,11 @@ def _list_advice(run: _FailedRun, arm_state: str, is_record_lost: bool) -> Itera
 def _list_changes(run: _FailedRun) -> Iterator[str]:
     """Yield changes of the mission after which the failure would not end the run."""
     entries = reversed(run.failure_path)
-    changes = [(entry, _format_advice(run, entry, advice)) for entry in entries for advice in entry.changes]
+    changes = [
+        (entry, f"{text} at {_format_location(run, node)}")
+        for entry in entries
+        for text, node in entry.changes
+    ]
     remedies = (node.remedy for node in load_control_nodes().values() if node.remedy)
     new_handler = f"{next(remedies)} {_format_location(run, run.failure_path[-1].node)}"
     yield next((text for entry, text in changes if entry.is_handler), new_handler)
@@ -284,10 +287,6 @@ def _list_changes(run: _FailedRun) -> Iterator[str]:
             # Changes of ancestors are omitted: the innermost node with attempts should be changed first.
             if entry.attempt:
                 return
-
-
-def _format_advice(run: _FailedRun, entry: _FailurePathNode, advice: Advice) -> str:
-    return f"{advice.text} at {_format_location(run, advice.child or entry.node)}"
 
 
 def _format_location(run: _FailedRun, node: Node) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +11,7 @@ from pathlib import Path
 from pydantic import JsonValue
 
 from executive import events
+from executive.behaviours import Skills
 from executive.errors import InputError, escape_control_characters, shorten_quotations
 from executive.events import MotionPlanned, NodeEnded, NodeStarted, RequestGiven, RunStarted, TimedEvent
 from executive.mission.load import LoadedMission
@@ -21,7 +22,6 @@ from executive.record.run_directory import RunDirectory, find_recorded_options, 
 from executive.record.timeline import get_skill_name
 from executive.run.assembly import RunOptions
 from executive.run.replay import InputLog, ResumedRun, assemble_replay, assemble_resumed
-from executive.skill import Skill
 
 EVENTS_WITHOUT_REPLAY = (RunStarted, MotionPlanned, RequestGiven)
 """Kinds of events that a replay does not emit."""
@@ -69,7 +69,7 @@ class ReplayResult:
 
 
 def replay_run(
-    path: Path, journal: Iterable[TimedEvent], skills: Mapping[str, type[Skill]], mission: Path | None = None
+    path: Path, journal: Iterable[TimedEvent], skills: Skills, mission: Path | None = None
 ) -> ReplayResult:
     """Replay a recorded run with the installed skills, and compare its decisions with the journal.
 
@@ -200,9 +200,7 @@ def _describe_decision(decision: TimedEvent | None) -> str:
     return shorten_quotations(escape_control_characters(text))
 
 
-def resume_run(
-    path: Path, skills: Mapping[str, type[Skill]], options: RunOptions, record: RecordOptions
-) -> Result:
+def resume_run(path: Path, skills: Skills, options: RunOptions, record: RecordOptions) -> Result:
     """Resume the run in a directory, and return its result.
 
     The replay of the journal up to the interruption restores the tree, the variables and the ledger. A

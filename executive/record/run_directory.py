@@ -11,6 +11,7 @@ from pathlib import Path
 import yaml
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+from executive.behaviours import Skills
 from executive.cell.arm_config import DEFAULT_ARM_FILE
 from executive.cell.config import CellConfig
 from executive.cell.devices import find_driver_options
@@ -19,7 +20,6 @@ from executive.events import RunStarted
 from executive.mission.cell_file import CellFile
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.outline import OutlineNode
-from executive.skill import Skill
 from executive.text.findings import Source
 from executive.text.yaml_files import get_shipped_folder
 
@@ -159,7 +159,7 @@ def write_atomically(path: Path, text: str) -> None:
 
 
 def read_mission_of_run(
-    path: Path, start: RunStarted, skills: Mapping[str, type[Skill]], mission: Path | None = None
+    path: Path, start: RunStarted, skills: Skills, mission: Path | None = None
 ) -> LoadedMission:
     """Return the mission of a run directory, with the params and the cell of the run.
 

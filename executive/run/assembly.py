@@ -9,8 +9,7 @@ from pathlib import Path
 from executive.cell.devices import check_driver_options
 from executive.cell.protocols import Operator
 from executive.events import Observer, RunStarted
-from executive.mission.build import build_tree
-from executive.mission.load import LoadedMission
+from executive.mission.load import LoadedMission, build_tree
 from executive.plugins import list_versions
 from executive.run.operator import ScriptedOperator, TerminalOperator
 from executive.run.run import Run

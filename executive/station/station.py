@@ -32,8 +32,8 @@ from executive.events import Emit, TargetSelected
 from executive.geometry import Array
 from executive.ledger.item import ItemRecord, State
 from executive.ledger.tracker import Tracker
-from executive.motion.arms import build_planning_kinematics
-from executive.motion.joints import Kinematics
+from executive.motion.joints import Kinematics, build_planning_kinematics
+from executive.motion.planner import Planner
 from executive.perception.detectors.cell_detector import CellDetector, TruthDetector, build_cell_detectors
 from executive.perception.detectors.detector_registry import KindMaker, make_installed_kind
 from executive.perception.localization import CellLocalizer
@@ -260,11 +260,11 @@ def _build_planner(
     planning_time = config.motion.planning_time
     # Each cell needs only one planner; PyBullet and the libraries of the second one take 0.3 s to load.
     if is_without_physics:
-        from executive.motion.straight_paths import plan_straight_motion
+        from executive.motion.planner import plan_straight_motion
 
         plan_straight = partial(plan_straight_motion, config, kinematics)
         return PlannerService(plan_straight, clock, planning_time, emit)
-    from executive.motion.planner import Planner
+    # The import loads PyBullet, which takes 0.2 s; a cell without physics and a replay do not need it.
     from executive.physics.collision import ClearanceChecker
 
     checker = ClearanceChecker(config)

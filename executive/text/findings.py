@@ -76,10 +76,8 @@ _SECRET_PATTERN = re.compile(
     r"(?i)(\b\w*(?:api_?key|token|secret|password|authorization)\w*[\"']?\s*[:=]\s*|://(?=\S+@)).*"
 )
 """Matches `api_key:` and similar names, or `://` before a user name and `@`, up to the end of the line."""
-_CODES_FILE = Path(__file__).parent / "finding_codes.txt"
-MEANING_BY_CODE: Mapping[str, str] = dict(
-    line.split(": ", 1) for line in _CODES_FILE.read_text(encoding="utf-8").splitlines()
-)
+_CODES = (Path(__file__).parent / "finding_codes.txt").read_text(encoding="utf-8")
+MEANING_BY_CODE: Mapping[str, str] = dict(line.split(": ", 1) for line in _CODES.splitlines())
 """Meaning of each code of a finding, and the action to take."""
 _VALUE_CODES = frozenset({
     "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten",

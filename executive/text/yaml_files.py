@@ -281,7 +281,10 @@ def parse_yaml(source: Source, text: str | None = None) -> tuple[YamlNode | None
     except yaml.MarkedYAMLError as error:
         return None, [*composer.findings, _make_syntax_error(source, error)]
     except yaml.reader.ReaderError as error:
-        return None, [*composer.findings, _make_character_error(source, error)]
+        lines = source.text[: error.position + 1].splitlines()
+        span = source.make_span(len(lines), len(lines[-1]), 1)
+        message = f"the character {source.text[error.position : error.position + 1]!r} is not allowed in YAML"
+        return None, [*composer.findings, make_error(span, "yaml", message)]
     except _IncompleteTree:
         return None, composer.findings
     return root, composer.findings
@@ -417,13 +420,6 @@ def _make_syntax_error(source: Source, error: yaml.MarkedYAMLError) -> Finding:
     message = f"not valid YAML:{context}{note}: {error.problem}".replace("::", ":")
     hints = (hint for text, hint in _ADVICE_BY_MESSAGE.items() if str(error.problem).startswith(text))
     return make_error(span, "yaml", message, next(hints, ""))
-
-
-def _make_character_error(source: Source, error: yaml.reader.ReaderError) -> Finding:
-    lines = source.text[: error.position + 1].splitlines()
-    character = source.text[error.position : error.position + 1]
-    span = source.make_span(len(lines), len(lines[-1]), 1)
-    return make_error(span, "yaml", f"the character {character!r} is not allowed in YAML")
 
 
 # Spellings of the values in the core schema.

@@ -10,7 +10,7 @@ from py_trees.common import Status
 from executive.skill import Seconds
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.keys import key
-from executive.tree.node import Advice, ControlNode, Counterpart, PropagatedFailure
+from executive.tree.node import ControlNode, Counterpart, PropagatedFailure
 from executive.tree.specification import Child, Node
 from executive.tree.tree_node import NodeBehaviour
 
@@ -45,9 +45,8 @@ class Invert(ControlNode):
             """Tick the body."""
             status = self.await_child(self.node.do)
             if status is Status.SUCCESS:
-                return self.fail_with_reason(
-                    "inverted", f"{self.behaviour_by_child[self.node.do].name} succeeded"
-                )
+                name = self.behaviour_by_child[self.node.do].name
+                return self.fail_with_reason("inverted", f"{name} succeeded")
             return Status.SUCCESS if status is Status.FAILURE else status
 
 
@@ -142,10 +141,10 @@ class Timeout(ControlNode):
         """Return the duration of the body and the limit."""
         return f"handles no failures; {failure.duration:.2f} of {self.seconds:g} s had passed"
 
-    def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
+    def advise(self, failure: PropagatedFailure) -> Iterator[tuple[str, Node]]:
         """Yield the advice to increase the limit after a timeout."""
         if failure.child is None:
-            yield Advice(f"allow more than {self.seconds:g} s")
+            yield f"allow more than {self.seconds:g} s", self
 
     @property
     def counterpart(self) -> Counterpart | None:
@@ -170,7 +169,6 @@ class Timeout(ControlNode):
             # 1 ns covers the rounding errors of a clock that sums control periods.
             if status is Status.RUNNING and self.clock.now >= self._deadline - 1e-9:
                 self.halt_children([self.node.do])
-                return self.fail_with_reason(
-                    "timeout", f"the body did not end within {self.node.seconds:g} s"
-                )
+                message = f"the body did not end within {self.node.seconds:g} s"
+                return self.fail_with_reason("timeout", message)
             return status

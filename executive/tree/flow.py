@@ -82,9 +82,8 @@ class FlowState:
         failure_name = f"{failure.source}.{failure.reason}"
         # Merge the states that differ only in `handled_failure`; tuples are hashed faster than dataclasses.
         merged_states = {(state.state, state.cause) for state in self.tool_states}
-        return self.with_tool_states(
-            frozenset(PossibleToolState(state, cause, failure_name) for state, cause in merged_states)
-        )
+        states = (PossibleToolState(state, cause, failure_name) for state, cause in merged_states)
+        return self.with_tool_states(frozenset(states))
 
     def apply_precondition(self, required_state: ToolState, path: str) -> FlowState:
         """Return the state at the start of the skill at `path`, which requires a state of the tool.

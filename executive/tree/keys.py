@@ -21,7 +21,6 @@ from executive.tree.specification import (
     Node,
     Reason,
     Reference,
-    Setting,
     Specification,
     Value,
     VariableName,
@@ -286,9 +285,6 @@ def map_parts(owner: PartT, change: Callable[[Part], object]) -> PartT:
 def _map_value(value: object, change: Callable[[Part], object]) -> object:
     if isinstance(value, Node | Reference | VariableName):
         return change(value)
-    if isinstance(value, Setting):
-        new_value = _map_value(value.value, change)
-        return value if new_value is value.value else replace(value, value=cast("Value", new_value))
     if isinstance(value, KeySection):
         return map_parts(value, change)
     if isinstance(value, tuple):

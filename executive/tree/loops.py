@@ -10,10 +10,11 @@ from py_trees.common import Status
 from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.skill import ANY, EMPTY, HOLDING
+from executive.text.findings import Finding, make_error
 from executive.tree.blackboard import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.keys import Elements, KeySection, key
-from executive.tree.node import ControlNode, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
+from executive.tree.node import ControlNode, Counterpart, NodeAnalysis, PropagatedFailure
 from executive.tree.specification import Child, Node, Reason, VariableName, format_reasons
 from executive.tree.tree_node import NodeBehaviour
 
@@ -98,12 +99,12 @@ class While(ControlNode):
         halted = join_states((condition.halted, entry, body.halted))
         return Flow(join_states(condition.failures.values()), body.failures, halted)
 
-    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[Finding]:
         """Yield an error if the loop never ends because its condition cannot fail."""
         condition = analysis.get_flow(self.condition)
         if condition is not None and not condition.failures and not analysis.is_halted_by_sibling:
             message = f"this loop never ends: its condition, {self.condition.path_name}, cannot fail"
-            yield NodeFinding("", "endless", message, "Use `repeat` with `times` or `until`.")
+            yield make_error(self.span, "endless", message, "Use `repeat` with `times` or `until`.")
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the cause of a failure: the body, not the condition, failed."""
@@ -201,7 +202,7 @@ class Repeat(ControlNode):
         failures = {cause: end for cause, end in body.failures.items() if not cause.matches(reasons)}
         return Flow(success, failures, join_states((body.halted, entry)))
 
-    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[Finding]:
         """Yield an error if only a limit of `placed` can end the loop, and the body places no item."""
         has_only_placed = {name for name, _ in self.limits} == {"placed"} and not self.expected_reasons
         if not has_only_placed or self.is_empty or self.times or analysis.is_concurrent:
@@ -210,7 +211,7 @@ class Repeat(ControlNode):
         if not any(skill is None or skill.tool_state in ((HOLDING, EMPTY), (ANY, EMPTY)) for skill in skills):
             message = "this loop never succeeds: its body releases no object, so `placed` does not increase"
             hint = "Add a failure reason or `elapsed` to `until`, or add `times`."
-            yield NodeFinding("", "endless", message, hint)
+            yield make_error(self.span, "endless", message, hint)
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return why the loop passed on a failure of its body."""
@@ -250,13 +251,11 @@ class Repeat(ControlNode):
 
         def _find_reached_limit(self) -> str:
             """Return the first limit that a counter has reached, as a text: `placed: 4`; "" if none."""
-            limits = (
-                f"{name}: {limit:g}" for name, limit in self.node.limits if self._read_counter(name) >= limit
-            )
-            return next(limits, "")
-
-        def _read_counter(self, name: str) -> float:
-            return self.clock.now if name == "elapsed" else self.ledger.count_items(name)
+            for name, limit in self.node.limits:
+                count = self.clock.now if name == "elapsed" else self.ledger.count_items(name)
+                if count >= limit:
+                    return f"{name}: {limit:g}"
+            return ""
 
 
 class ForEach(ControlNode):

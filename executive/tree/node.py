@@ -8,62 +8,49 @@ class `Behaviour` runs the node: `start` and `step`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from typing import ClassVar, Protocol, TypeAlias
+from typing import ClassVar, TypeAlias
 
+from executive.behaviours import Skills
 from executive.errors import InputError
 from executive.plugins import PluginEntry, list_entries
 from executive.skill import Skill
+from executive.text.findings import Finding
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.keys import KeyOwner
-from executive.tree.specification import Node, Reason
+from executive.tree.specification import Node, Reason, SkillNode
 from executive.tree.tree_node import NodeBehaviour as NodeBehaviour
 
 
 @dataclass(frozen=True)
-class NodeFinding:
-    """A mistake in the mission that a control node finds.
-
-    Attributes:
-        place: Place of the mistake: a key of the node, a reason under a key, or a child; "" for the node
-            itself.
-        code: Code of the finding, such as `endless`.
-        message: Description of the mistake, one sentence.
-        hint: Description of a remedy, or "".
-        is_warning: True if the mission can run nevertheless.
-    """
-
-    place: str | Reason | Node
-    code: str
-    message: str
-    hint: str = ""
-    is_warning: bool = False
-
-
-class NodeAnalysis(Protocol):
+class NodeAnalysis:
     """Static analysis of a control node in a mission and of the children of the node.
 
     Attributes:
+        flows: Possible outcomes of each node that may run, by path.
+        skills: Installed skills by name.
+        compute_flow: Returns the possible outcomes of a child that starts in a state; if the last argument is
+            True, only outcomes in the first tick of the child are possible.
         is_halted_by_sibling: True if the node is halted when a concurrent node ends.
         is_concurrent: True if another node may run at the same time.
     """
 
+    flows: Mapping[str, Flow]
+    skills: Skills
+    compute_flow: Callable[[Node, FlowState, bool], Flow]
     is_halted_by_sibling: bool
     is_concurrent: bool
 
     def get_flow(self, child: Node) -> Flow | None:
         """Return the possible outcomes of a child; None if the child never runs."""
-
-    def compute_flow(self, child: Node, entry: FlowState, *, is_first_tick: bool = False) -> Flow:
-        """Return the possible outcomes of a child that starts in a state.
-
-        If `is_first_tick` is True, only outcomes in the first tick of the child are possible.
-        """
+        return self.flows.get(child.path)
 
     def list_skills(self, node: Node) -> Mapping[str, type[Skill] | None]:
         """Return the class of each skill in and below a node, by name; None if not installed."""
+        names = [node.skill for node in node.walk() if isinstance(node, SkillNode)]
+        return {name: self.skills.get(name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -93,19 +80,6 @@ class PropagatedFailure:
     def matches(self, reasons: Sequence[Reason]) -> bool:
         """Return True if one of `reasons` denotes the failure."""
         return any(reason in self.reasons for reason in reasons)
-
-
-@dataclass(frozen=True)
-class Advice:
-    """A change of the mission after which a failure would not end the run.
-
-    Attributes:
-        text: Description of the change without the line number, which the diagnosis adds.
-        child: Node that the author should change; None for the node itself.
-    """
-
-    text: str
-    child: Node | None = None
 
 
 @dataclass(frozen=True)
@@ -169,7 +143,7 @@ class ControlNode(KeyOwner, Node):
         """Return the outcomes that are possible from a state; `get_flow` returns the outcomes of a child."""
         raise NotImplementedError
 
-    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[Finding]:
         """Yield mistakes in the use of this control node in the mission."""
         yield from ()
 
@@ -200,8 +174,11 @@ class ControlNode(KeyOwner, Node):
         """Return the number of the failed attempt and the maximum number; None if the node never retries."""
         return None
 
-    def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
-        """Yield changes of the mission after which this node would handle a failure."""
+    def advise(self, failure: PropagatedFailure) -> Iterator[tuple[str, Node]]:
+        """Yield changes of the mission after which this node would handle a failure.
+
+        Each change is a text without the line number, and the node that the author should change.
+        """
         yield from ()
 
     def list_contingencies(self) -> Iterator[tuple[str, Node]]:

@@ -7,10 +7,11 @@ from collections.abc import Iterator, Mapping
 from math import inf, isfinite
 
 from executive.skill import Seconds
+from executive.text.findings import Finding, make_warning
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.keys import KeySection, Reasons, key
 from executive.tree.loops import GeneratorBehaviour, NodeRun
-from executive.tree.node import Advice, ControlNode, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
+from executive.tree.node import ControlNode, Counterpart, NodeAnalysis, PropagatedFailure
 from executive.tree.specification import Child, Constant, Node, Reason, format_reasons
 
 _GIVE_UP = "give up: the recovery failed"
@@ -90,19 +91,19 @@ class Retry(ControlNode):
         delay_state = body.join_handled(self.on) if self.backoff and self.attempts != 1 else None
         return Flow(body.success, failures, join_states((body.halted, recovery.halted, delay_state)))
 
-    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[Finding]:
         """Yield a warning if nothing changes between the attempts, or if there is only one attempt."""
         skills = analysis.list_skills(self).values()
         may_change = any(skill is None or skill.senses or skill.moves or skill.waits for skill in skills)
         if not self.backoff and skills and not may_change:
             message = "this retry changes nothing between its attempts: no node in it looks, moves or waits"
             hint = "Put a look or a motion into `do` or `recover`, or wait with `backoff`."
-            yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
+            yield make_warning(self.span, "unchanging-retry", message, hint)
         # A param with the value 1 is no mistake, because the param may have another value in another run.
         attempts = self.settings.get("attempts")
         if self.attempts == 1 and isinstance(attempts, Constant) and not attempts.origin:
             message = "a retry with 1 attempt never runs its body again"
-            yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
+            yield make_warning(attempts.span, "unchanging-retry", message)
 
     def explain_unreachable(self) -> str:
         """Reason why the recovery never runs; "" if another finding explains this."""
@@ -135,13 +136,13 @@ class Retry(ControlNode):
         # The node passed on the failure of the last attempt without handling it.
         return handled_count + 1, self.attempts
 
-    def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
+    def advise(self, failure: PropagatedFailure) -> Iterator[tuple[str, Node]]:
         """Yield the advice to handle a failure in the recovery, or to allow more attempts."""
         attempt, attempts = self.count_attempts(failure)
         if failure.last_choice == _GIVE_UP:
-            yield Advice(f"handle {failure.last_handled_name} in the recovery", child=self.recover)
+            yield f"handle {failure.last_handled_name} in the recovery", self.recover or self
         elif attempt == attempts and (not self.on or failure.matches(self.on)):
-            yield Advice(f"allow more than {attempts} attempt{'s' if attempts > 1 else ''}")
+            yield f"allow more than {attempts} attempt{'s' if attempts > 1 else ''}", self
 
     def list_contingencies(self) -> Iterator[tuple[str, Node]]:
         """Yield the key `recover` and the node at this key, if the node has a recovery."""
@@ -251,7 +252,7 @@ class TryCatch(ControlNode):
         flow = Flow(success, failures, halted)
         return flow if self.finally_ is None else _append_finally(self.finally_, flow, get_flow)
 
-    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[Finding]:
         """Yield a warning for each reason whose failures are all caught by earlier reasons."""
         body = analysis.get_flow(self.do)
         failures = () if body is None else body.failures
@@ -262,7 +263,7 @@ class TryCatch(ControlNode):
                 earlier_reason = next(name for name in earlier_reasons if caught[0].matches([name]))
                 place = earlier_reason.span.describe_place(reason.span.source)
                 message = f"{reason} is caught already, as {earlier_reason} in {place}"
-                yield NodeFinding(reason, "unreachable", message, is_warning=True)
+                yield make_warning(reason.span, "unreachable", message)
             earlier_reasons.append(reason)
 
     @property
@@ -280,10 +281,10 @@ class TryCatch(ControlNode):
         reasons = [reason for handler in self.catch for reason in handler.on]
         return f"catches only {format_reasons(reasons)}" if reasons else "has no catch"
 
-    def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
+    def advise(self, failure: PropagatedFailure) -> Iterator[tuple[str, Node]]:
         """Yield the advice to add a handler for a failure of the body."""
         if failure.child is self.do:
-            yield Advice("catch this failure in the try")
+            yield "catch this failure in the try", self
 
     def list_contingencies(self) -> Iterator[tuple[str, Node]]:
         """Yield the handlers with names such as `catch on Grasp.missed`, then `finally`."""
@@ -305,10 +306,9 @@ class TryCatch(ControlNode):
                 if handler is not None:
                     self.report_choice("catch", failure)
                     failure = yield from self.run_child(handler)
-            failure_of_finally = (
-                (yield from self.run_child(self.node.finally_)) if self.node.finally_ else None
-            )
-            return failure or failure_of_finally
+            if self.node.finally_ and (later_failure := (yield from self.run_child(self.node.finally_))):
+                failure = failure or later_failure
+            return failure
 
 
 def _append_finally(finally_child: Node, flow: Flow, get_flow: FlowFunction) -> Flow:

@@ -12,10 +12,11 @@ from py_trees.common import Status
 
 from executive.errors import Fault
 from executive.skill import HOLDING
+from executive.text.findings import Finding, make_error, make_warning
 from executive.tree.flow import UNKNOWN_STATE, Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.keys import Children, KeyOwner, key
-from executive.tree.node import ControlNode, Counterpart, NodeAnalysis, NodeFinding, PropagatedFailure
-from executive.tree.specification import Child, Node
+from executive.tree.node import ControlNode, Counterpart, NodeAnalysis, PropagatedFailure
+from executive.tree.specification import Child, Constant, Node
 from executive.tree.tree_node import NodeBehaviour
 
 _COMPARED_ATTRIBUTES = ("node", "status", "reason", "choice", "item", "outputs")
@@ -104,15 +105,16 @@ class OrderedNode(ControlNode):
             return flow.success
         return flow.join_handled()
 
-    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[Finding]:
         """Yield a warning if `memory: false` has no effect, halts a child, or repeats an action."""
-        if self.memory:
+        memory = self.settings.get("memory")
+        if self.memory or not isinstance(memory, Constant):
             return
         flows = {child: analysis.get_flow(child) for child in self.do}
         slow = [child for child, flow in flows.items() if flow and flow.halted is not None]
         if not slow or slow == [self.do[0]]:
             message = "`memory: false` has no effect: no child after the first takes time"
-            yield NodeFinding("memory", "useless-reactive", message, is_warning=True)
+            yield make_warning(memory.span, "useless-reactive", message + memory.origin_note)
             return
         # `blocker` is the first slow child that cannot end with `continue_status` in its first tick; if there
         # is none, the last slow child. Each tick of `blocker` halts a running child after it.
@@ -124,17 +126,17 @@ class OrderedNode(ControlNode):
                 f"runs {name} again, which halts {child.path_name}"
             )
             hint = "Only one child may take time: combine these nodes into one child (a list)."
-            yield NodeFinding(child, "two-running", message, hint, is_warning=True)
+            yield make_warning(child.span, "two-running", message, hint)
         for child in self.do[: self.do.index(blocker)]:
             skills = analysis.list_skills(child).items() if child not in slow else ()
             if actions := [name for name, skill in skills if skill is not None and not skill.is_condition]:
                 message = f"{actions[0]} is not a condition, but runs again at every tick of {name}"
                 hint = "Put the action before this node, or use a condition."
-                yield NodeFinding(child, "repeated-action", message, hint, is_warning=True)
+                yield make_warning(child.span, "repeated-action", message, hint)
 
     def _may_continue_at_once(self, child: Node, analysis: NodeAnalysis) -> bool:
         """Return True if a child may end with `continue_status` in its first tick."""
-        flow = analysis.compute_flow(child, UNKNOWN_STATE, is_first_tick=True)
+        flow = analysis.compute_flow(child, UNKNOWN_STATE, True)
         return self._compute_next_entry(flow) is not None
 
     @property
@@ -309,7 +311,7 @@ class Guard(ControlNode):
             failures[PossibleFailure(self.keyword, "broken", self.path)] = broken_state
         return Flow(body.success, failures, body.halted)
 
-    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[Finding]:
         """Yield an error if the body can never run, and a warning if the guard can never stop the body."""
         condition = analysis.get_flow(self.holds)
         body = analysis.get_flow(self.do)
@@ -318,18 +320,18 @@ class Guard(ControlNode):
         name = self.holds.path_name
         if body is None:
             message = f"{name} cannot succeed here, so the body of this guard never runs"
-            yield NodeFinding(self.holds, "never-holds", message)
+            yield make_error(self.holds.span, "never-holds", message)
         elif not condition.failures:
             message = f"{name} cannot fail here, so this guard never stops its body"
-            yield NodeFinding(self.holds, "useless-guard", message, is_warning=True)
+            yield make_warning(self.holds.span, "useless-guard", message)
         elif body.halted is None:
             message = f"this guard cannot stop its body: {self.do.path_name} ends in its first tick"
             hint = "Use a sequence (a list) of the condition and the body instead of a guard."
-            yield NodeFinding(self.do, "useless-guard", message, hint, is_warning=True)
+            yield make_warning(self.do.span, "useless-guard", message, hint)
         elif body.success and self._fails_after_release(analysis, body.success):
             message = f"{name} fails as soon as the body of this guard releases the object"
             hint = "Put the release after the guard."
-            yield NodeFinding(self.do, "always-breaks", message, hint, is_warning=True)
+            yield make_warning(self.do.span, "always-breaks", message, hint)
 
     def _fails_after_release(self, analysis: NodeAnalysis, body_end: FlowState) -> bool:
         """Return True if the body ends with an empty tool, and the condition cannot succeed with that tool.
@@ -338,7 +340,7 @@ class Guard(ControlNode):
         fails.
         """
         is_empty = body_end.tool_states is not None and body_end.find_tool_state(HOLDING) is None
-        return is_empty and analysis.compute_flow(self.holds, body_end).success is None
+        return is_empty and analysis.compute_flow(self.holds, body_end, False).success is None
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return why the guard passed on a failure of its body."""

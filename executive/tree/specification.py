@@ -104,7 +104,7 @@ Value = Constant | Reference | InvalidValue
 
 
 class LocatedName(str):
-    """A name in a mission file with its position, for example a bin in a route, or the path of a library."""
+    """A name in a mission file with its position, for example a param, a bin in a route, or a library."""
 
     span: Span
 
@@ -142,14 +142,6 @@ class VariableName(str):
     def __get_pydantic_json_schema__(cls, *_: object) -> dict[str, JsonValue]:
         """Return the reference to the definition in the schema of missions."""
         return {"definition": "variable"}
-
-
-@dataclass(frozen=True)
-class Setting:
-    """Value of an entry `name: value` of a skill, `with` or `returns`, and the position of `name`."""
-
-    name_span: Span
-    value: Value
 
 
 SpecificationT = TypeVar("SpecificationT", bound="Specification")
@@ -244,7 +236,7 @@ class SkillNode(Node):
     """
 
     skill: str
-    settings: Mapping[str, Setting]
+    settings: Mapping[LocatedName, Value]
     variables_by_port: Mapping[str, str] = {}
 
     @property
@@ -276,8 +268,8 @@ class SubtreeNode(Node):
     """
 
     name: str
-    arguments: Mapping[str, Setting]
-    returns: Mapping[str, Setting] = {}
+    arguments: Mapping[LocatedName, Value]
+    returns: Mapping[LocatedName, Value] = {}
     written_variables: tuple[str, ...] = ()
     body: Node | None = None
 

@@ -326,9 +326,8 @@ class SkillLeaf(TreeNode):
         self._run: SkillRun | None = None
         self._item = ""
         # A required port names the item on which the skill acts; an optional port limits the selection.
-        self._item_ports = tuple(
-            name for name, port in skill.ports.items() if port.refers_to == "item" and port.default is ...
-        )
+        required_ports = [port for port in skill.ports.values() if port.default is ...]
+        self._item_ports = [port.name for port in required_ports if port.refers_to == "item"]
 
     @property
     def detail(self) -> str:
@@ -359,7 +358,12 @@ class SkillLeaf(TreeNode):
             raise self._end_with_fault(message) from error
         else:
             if has_succeeded:
-                self._succeed(run.read_outputs())
+                values = run.read_outputs()
+                outputs = {port: values[port] for port in self.wiring.outputs}
+                self.blackboard.update({self.wiring.outputs[port]: value for port, value in outputs.items()})
+                self._item = self._find_item(outputs) or self._item
+                texts = {port: to_json_or_type_name(value) for port, value in outputs.items()}
+                self._end(Status.SUCCESS, outputs=texts)
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
         """Set the status; close the generator of a running skill, so that its `finally` runs.
@@ -410,12 +414,6 @@ class SkillLeaf(TreeNode):
                 return value.item
         items = (values.get(port) for port in self._item_ports)
         return next((item for item in items if isinstance(item, str) and item), "")
-
-    def _succeed(self, port_values: Mapping[str, object]) -> None:
-        outputs = {port: port_values[port] for port in self.wiring.outputs}
-        self.blackboard.update({self.wiring.outputs[port]: value for port, value in outputs.items()})
-        self._item = self._find_item(outputs) or self._item
-        self._end(Status.SUCCESS, outputs={port: to_json_or_type_name(outputs[port]) for port in outputs})
 
     def _end_with_fault(self, message: str) -> Fault:
         """End the node, and return the fault, which the caller raises."""

@@ -90,7 +90,7 @@ class _Exporter:
     def _add_skill(self, parent: Element, node: SkillNode) -> Element:
         skill = self._skills[node.skill]
         values = {name: _format_pointer(name) for name in skill.ports}
-        values |= {name: _format(setting.value) for name, setting in node.settings.items()}
+        values |= {name: _format(value) for name, value in node.settings.items()}
         kind = "Condition" if skill.is_condition else "Action"
         declarations: tuple[Param | Port, ...] = (*skill.params.values(), *skill.ports.values())
         return self._add_element(parent, kind, node.skill, declarations, values)
@@ -105,7 +105,7 @@ class _Exporter:
         for name, value in subtree.arguments.items():
             default = _format(value) if value else ""
             ports.append(Port(name, None, Direction.IN, default, "", ""))
-            values[name] = _format(node.arguments[name].value) if name in node.arguments else default
+            values[name] = _format(node.arguments[name]) if name in node.arguments else default
         if subtree.returns is not None:
             # Local variables get unique names, because `_autoremap` shares all variables that are no ports.
             prefix = f"{node.name}-{self._use_counts[node.name]}."
@@ -113,7 +113,7 @@ class _Exporter:
                 ports.append(Port(variable, None, Direction.OUT, ..., "", ""))
                 is_returned = variable in subtree.returns
                 values[variable] = _format_pointer(variable if is_returned else prefix + variable)
-        values |= {name: _format(setting.value) for name, setting in node.returns.items()}
+        values |= {name: _format(value) for name, value in node.returns.items()}
         element = self._add_element(parent, "SubTree", self._tree_ids[node.name], ports, values)
         element.set("_autoremap", "true")
         return element
@@ -124,7 +124,7 @@ class _Exporter:
         for use in body.walk():
             if isinstance(use, SubtreeNode):
                 names |= self._find_written_variables(self._mission.subtrees[use.name].body)
-                names |= {getattr(setting.value, "name", "") for setting in use.returns.values()}
+                names |= {getattr(value, "name", "") for value in use.returns.values()}
         return names
 
     def _add_control_node(self, parent: Element, node: ControlNode) -> Element:

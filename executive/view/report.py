@@ -23,10 +23,15 @@ from markupsafe import Markup
 from executive.errors import ExecutiveError, InputError, explain_os_errors
 from executive.mission.outline import OutlineNode
 from executive.perception.evidence import describe_unknown_labels
-from executive.record.diagnosis import list_labelled_sentences, make_resume_command
 from executive.record.journal import find_run_end, find_run_start, read_journal
 from executive.record.picture_recorder import PALETTE, split_picture_name
-from executive.record.result import is_resumable, list_requests, read_result
+from executive.record.result import (
+    is_resumable,
+    list_labelled_sentences,
+    list_requests,
+    make_resume_command,
+    read_result,
+)
 from executive.record.run_directory import RunDirectory, find_recorded_options, read_tree, write_atomically
 from executive.record.timeline import Activation, Timeline, find_last_failure, format_counts, group_by_node
 from executive.text.yaml_files import get_shipped_folder

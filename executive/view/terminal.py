@@ -23,8 +23,7 @@ from executive.errors import escape_control_characters
 from executive.events import ItemChanged, OperatorAsked, RequestGiven, TimedEvent
 from executive.mission.outline import OutlineNode, make_outline
 from executive.perception.evidence import describe_unknown_labels
-from executive.record.diagnosis import format_diagnosis, make_resume_command, wrap_lines
-from executive.record.result import Result
+from executive.record.result import Result, format_diagnosis, make_resume_command, wrap_lines
 from executive.record.timeline import STATUS_TEXTS, Timeline
 from executive.run.operator import RunControl
 from executive.run.run import Run

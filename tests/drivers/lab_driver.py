@@ -15,7 +15,7 @@ from executive.cell.arm import Motion, MotionGuard
 from executive.cell.config import CellConfig
 from executive.cell.devices import DEFAULT_ROLE, CameraImage, DriverOptions, StepClock
 from executive.geometry import Array
-from executive.motion.arms import build_kinematics
+from executive.motion.joints import build_kinematics
 from executive.text.validate import KeyPath
 
 IMAGES = "images.npy"

@@ -12,7 +12,7 @@ from executive.cell.device_config import STEP
 from executive.cell.objects import BIN_THICKNESS, Obstacle
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
-from executive.motion.straight_paths import JOINT_SPEED
+from executive.motion.planner import JOINT_SPEED
 from executive.testing.fake_cell import FakeCell, load_empty_cell
 
 ASIDE = np.radians(load_empty_cell().arm.poses_deg["aside"])

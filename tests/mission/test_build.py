@@ -10,8 +10,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.events import Event, NodeEnded, discard_event
-from executive.mission.build import build_tree
-from executive.mission.load import LoadedMission
+from executive.mission.load import LoadedMission, build_tree
 from executive.mission.outline import make_outline
 from executive.skill import Skill
 from executive.tree.blackboard import Blackboard

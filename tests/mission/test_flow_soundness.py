@@ -14,9 +14,8 @@ from py_trees.common import Status
 from executive.cell.protocols import Cell, Steps
 from executive.events import discard_event
 from executive.mission.analysis import CheckContext, find_unhandled_failures
-from executive.mission.build import TreeBuilder
 from executive.mission.expand import assign_paths, expand
-from executive.mission.load import run_checks
+from executive.mission.load import TreeBuilder, run_checks
 from executive.mission.mission_file import parse_mission
 from executive.mission.node_parser import NodeParser
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Skill, port

@@ -113,7 +113,7 @@ def test_shipped_missions_go_by_name(name: str, tmp_path: Path, monkeypatch: pyt
 def test_names_are_replaced_by_what_they_stand_for(
     load: Load, text: str, found: str, port: str, value: str
 ) -> None:
-    setting = skill(load(HEAD + text), found).settings[port].value
+    setting = skill(load(HEAD + text), found).settings[port]
     assert (setting.name if isinstance(setting, Reference) else setting.value) == value
 
 

@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 from executive.cell.arm import Goal, JointState
 from executive.geometry import Array
 from executive.mission.cell_file import load_cell
-from executive.motion.arms import build_kinematics
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.joints import JointLimits, Kinematics
+from executive.motion.joints import JointLimits, Kinematics, build_kinematics
 from executive.motion.trajectory import MotionPiece
 from executive.text.yaml_files import get_shipped_folder
 

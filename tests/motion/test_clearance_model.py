@@ -12,7 +12,6 @@ from executive.cell.config import CellConfig
 from executive.cell.objects import BIN_THICKNESS, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
-from executive.motion.arms import SAMPLING_MARGIN
 from executive.motion.clearance_model import (
     DISTANCE_PER_COSINE,
     OBSERVED_RADIUS,
@@ -21,6 +20,7 @@ from executive.motion.clearance_model import (
     Discs,
     make_tool_discs,
 )
+from executive.motion.joints import SAMPLING_MARGIN
 from executive.tools.suction import SHAFT_RADIUS
 
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -12,9 +12,8 @@ from joint_states import ARM, CONFIG, LIMITS
 from executive.cell.arm import Goal
 from executive.errors import Unreachable
 from executive.geometry import Array
-from executive.motion.arms import build_kinematics
 from executive.motion.configurations import find_configuration_pairs, find_vertical_waypoints
-from executive.motion.joints import Kinematics
+from executive.motion.joints import Kinematics, build_kinematics
 
 START = np.radians([38, 33, 0, -88, 0, 59, 20])
 places = st.tuples(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.02, 0.1))

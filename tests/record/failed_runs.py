@@ -10,7 +10,7 @@ from executive.behaviours import load_skills
 from executive.events import RunEnded
 from executive.mission.load import load_mission
 from executive.record.diagnose import diagnose
-from executive.record.diagnosis import Diagnosis
+from executive.record.result import Diagnosis
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.fake_cell import FakeCell

@@ -199,7 +199,7 @@ def test_a_target_out_of_reach_fails_in_its_approach_only(
             raise Unreachable("beyond the reach of the arm")
         return find_configuration_pairs(kinematics, goal, *others)
 
-    monkeypatch.setattr("executive.motion.straight_paths.find_configuration_pairs", find_near_pairs)
+    monkeypatch.setattr("executive.motion.planner.find_configuration_pairs", find_near_pairs)
     bench.fake.world.put("duck", 0.6, 0.2)
     cube, duck = bench.look()
     bench.carry([cube])

@@ -14,7 +14,7 @@ PERMITTED = {
     ("mission/grammar.py", f'"{USE_KEYWORD}"'),
     ("drivers/sim/scene.py", '"any"'),  # any class of objects
     ("skill.py", '"any"'),  # any state of the tool
-    ("record/diagnosis.py", '"repeat"'),  # label before the command that repeats a run
+    ("record/result.py", '"repeat"'),  # label before the command that repeats a run
     # The table of former and foreign words states what to write instead.
     *(("text/findings.py", f'"{word}"') for word in ("all", "any", "fallback", "for_each", "repeat", "try")),
 }

@@ -12,7 +12,6 @@ from executive.behaviours import load_skills
 from executive.mission.load import read_mission
 from executive.skill import In, Out, Skill, param, port
 from executive.text.yaml_files import find_mission, get_shipped_folder
-from executive.tree.node import load_control_nodes
 from executive.view.btcpp import format_btcpp
 
 COUNTERPARTS = {
@@ -53,7 +52,7 @@ def export(path: Path, text: str = "") -> Element:
     """Return the exported XML of the mission in a file, which gets the text if there is one."""
     if text:
         path.write_text(f"cell: cells/overhead.yaml\n{text}", encoding="utf-8")
-    files = read_mission(path, {}, SKILLS, load_control_nodes())
+    files = read_mission(path, {}, SKILLS)
     return fromstring(format_btcpp(files.mission, {**SKILLS, **files.behaviours}).encode())
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from executive.record.diagnosis import (
+from executive.record.result import (
     MAX_LINE_WIDTH,
     format_diagnosis,
 )

@@ -13,6 +13,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -192,9 +193,8 @@ def read_labels(path: Path) -> tuple[str, ...]:
         InputError: The file does not exist, is not a text file, or is empty.
     """
     if not path.is_file():
-        raise InputError(
-            f"there is no label file {path}; it needs one class name per line, in the order of the model"
-        )
+        advice = "it needs one class name per line, in the order of the model"
+        raise InputError(f"there is no label file {path}; {advice}")
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -226,23 +226,21 @@ class RfdetrOptions(DetectorOptions):
         return read_labels(base / self.labels) if isinstance(self.labels, str) else self.labels
 
 
+@dataclass(frozen=True, eq=False)
 class RfdetrDetector:
     """Detector that runs an exported RF-DETR model, an ONNX file.
 
-    Args:
+    Attributes:
         model: The model.
         config: Section of the detector in the cell file.
         context: Parts of the cell that the detector uses.
         class_map: Class names of the cell by class names of the model, if the names differ.
     """
 
-    def __init__(
-        self, model: OnnxModel, config: DetectorConfig, context: DetectorContext, class_map: Mapping[str, str]
-    ) -> None:
-        self._model = model
-        self._min_confidence = config.floor
-        self._table_view = context.camera.table_view
-        self._class_map = class_map
+    model: OnnxModel
+    config: DetectorConfig
+    context: DetectorContext
+    class_map: Mapping[str, str]
 
     @classmethod
     def from_config(cls, config: DetectorConfig, context: DetectorContext) -> RfdetrDetector:
@@ -310,9 +308,9 @@ class RfdetrDetector:
     def detect(self, frame: Frame, view: str) -> list[Detection]:
         """Search the regions of a view, and merge the detections."""
         height, width = frame.image.shape[:2]
-        regions = list_regions(view, self._table_view, (width, height))
-        detect = partial(self._model.detect, min_confidence=self._min_confidence)
-        return search_regions(frame.image, regions, detect, self._class_map)
+        regions = list_regions(view, self.context.camera.table_view, (width, height))
+        detect = partial(self.model.detect, min_confidence=self.config.floor)
+        return search_regions(frame.image, regions, detect, self.class_map)
 
 
 class EmbeddedDetector(RfdetrDetector):

@@ -16,6 +16,8 @@ Region = tuple[int, int, int, int]
 """Left, top, right and bottom side [pixel] of a region of an image."""
 LocatedDetection = tuple[Detection, Region]
 """Detection with the box in pixels of the image, and the region in which the object was detected."""
+CropSearch = Callable[[NDArray[np.uint8]], Iterable[Detection]]
+"""Function that returns the detections in a crop `(H, W, 3)`, RGB, with boxes in pixels of the crop."""
 
 TILE_OVERLAP = 0.25
 """Minimum overlap of neighbouring tiles, as a fraction of their side; larger than every object."""
@@ -49,17 +51,14 @@ def list_regions(view: str, table_view: Region, size: tuple[int, int]) -> list[R
 
 
 def search_regions(
-    image: NDArray[np.uint8],
-    regions: Sequence[Region],
-    detect: Callable[[NDArray[np.uint8]], Iterable[Detection]],
-    class_map: Mapping[str, str],
+    image: NDArray[np.uint8], regions: Sequence[Region], detect: CropSearch, class_map: Mapping[str, str]
 ) -> list[Detection]:
     """Return the detections in regions of an image, one per object, most confident first.
 
     Args:
         image: The image `(H, W, 3)`, RGB.
         regions: The regions to search.
-        detect: Function that returns the detections in a crop, with boxes in pixels of the crop.
+        detect: Function that searches a crop.
         class_map: Class names of the cell by class names from `detect`, if the names differ.
     """
     detections: list[LocatedDetection] = []

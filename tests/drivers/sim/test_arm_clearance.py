@@ -12,7 +12,7 @@ from executive.cell.arm import Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass, Obstacle
 from executive.errors import Blocked
-from executive.motion.arms import build_kinematics
+from executive.motion.joints import build_kinematics
 from executive.physics.collision import ClearanceChecker
 from tests.motion.joint_states import reach
 

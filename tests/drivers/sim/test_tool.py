@@ -8,7 +8,7 @@ import pytest
 
 from executive.drivers.sim.world import World
 from executive.geometry import GRAVITY, Array, Pose
-from executive.motion.arms import build_kinematics
+from executive.motion.joints import build_kinematics
 from tests.motion.joint_states import CONFIG, reach
 
 X, Y = 0.5, 0.05

@@ -370,32 +370,29 @@ def read_output(output: Any, size: tuple[int, int], is_of_crop: bool = False) ->
 
 def _convert_predictions(predictions: list[_Prediction], size: tuple[int, int]) -> Iterator[Detection]:
     """Yield the predictions as detections, with boxes clipped to the image."""
-    width, height = size
     for index, prediction in enumerate(predictions):
         if prediction.width * prediction.height < MIN_BOX_AREA:
             box_size = f"{prediction.width:g} x {prediction.height:g} pixels"
             raise ValueError(f"predictions[{index}] is a box of {box_size}, as if in fractions of the image")
         origin = prediction.origin or _Origin(offset_x=0.0, offset_y=0.0)
-        x = prediction.x + origin.offset_x
-        y = prediction.y + origin.offset_y
+        centre = np.array([prediction.x + origin.offset_x, prediction.y + origin.offset_y])
         angle = math.radians(prediction.angle or 0.0)
         sine = abs(math.sin(angle))
         cosine = abs(math.cos(angle))
-        half_width = (prediction.width * cosine + prediction.height * sine) / 2
-        half_height = (prediction.width * sine + prediction.height * cosine) / 2
-        left = x - half_width
-        right = x + half_width
-        top = y - half_height
-        bottom = y + half_height
-        if (
-            min(left / width, top / height) < -MAX_OVERHANG
-            or max(right / width, bottom / height) > 1 + MAX_OVERHANG
-            or not (0 <= x <= width and 0 <= y <= height)
-        ):
-            corners = f"({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f})"
-            image = f"an image of {width} x {height} pixels"
+        width = prediction.width * cosine + prediction.height * sine
+        height = prediction.width * sine + prediction.height * cosine
+        half_size = np.array([width, height]) / 2
+        low = centre - half_size
+        high = centre + half_size
+        is_centre_inside = ((centre >= 0) & (centre <= size)).all()
+        overhang = max((-low / size).max(), (high / size - 1).max())
+        if overhang > MAX_OVERHANG or not is_centre_inside:
+            corners = "({:.0f}, {:.0f}) to ({:.0f}, {:.0f})".format(*low, *high)
+            image = f"an image of {size[0]} x {size[1]} pixels"
             raise ValueError(f"predictions[{index}] is a box from {corners} in {image}")
-        box = (max(left, 0.0), max(top, 0.0), min(right, float(width)), min(bottom, float(height)))
+        left, top = np.maximum(low, 0.0).tolist()
+        right, bottom = np.minimum(high, size).tolist()
+        box = (left, top, right, bottom)
         yield Detection(prediction.label, prediction.confidence, box)
 
 
