@@ -8,8 +8,8 @@ from pathlib import Path
 
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.devices import DriverKind, is_rehearsal, load_driver_kind
-from executive.motion.configurations import find_places_out_of_reach
 from executive.motion.joints import find_arm_errors
+from executive.motion.planner import find_places_out_of_reach
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 from executive.station.view_check import find_view_errors
 from executive.text.validate import KeyPath
