@@ -13,16 +13,7 @@ from executive.mission.grammar import NAME_PATTERN, MappingReader, is_empty, rea
 from executive.skill import Skill
 from executive.text.findings import Finding, Span, make_error, suggest_choice
 from executive.text.yaml_files import YamlEntry, YamlMapping, YamlNode, YamlScalar, YamlSequence
-from executive.tree.keys import (
-    Children,
-    Key,
-    KeyOwner,
-    KeySection,
-    KeyValue,
-    OwnerT,
-    list_member_types,
-    list_nodes,
-)
+from executive.tree.keys import Children, Key, KeyOwner, KeySection, KeyValue, OwnerT, list_nodes
 from executive.tree.node import ControlNode, ControlNodes
 from executive.tree.specification import (
     Child,
@@ -31,7 +22,6 @@ from executive.tree.specification import (
     InvalidValue,
     LocatedName,
     Node,
-    Reason,
     Reference,
     SkillNode,
     SubtreeNode,
@@ -320,7 +310,7 @@ class NodeParser:
             return reader.read_reasons(key.name)
         if key.value_type is section:
             return self._read_section(key.name, section, yaml_node, span)
-        if Reason in list_member_types(key.value_type):
+        if key.has_reasons:
             names = reader.read_reasons(key.name, tuple(section.keys))
             mappings = [item for item in reader.list_items(key.name) if isinstance(item, YamlMapping)]
             return *names, *(self._read_section(key.name, section, item, item.span) for item in mappings)

@@ -1,4 +1,4 @@
-"""Joint configurations at goals and on vertical lines, straight motions between them, check of the reach.
+"""Joint configurations at goals and on vertical lines, and straight motions of the tool between them.
 
 The joint path `q(s)` of a straight motion is a polynomial through inverse-kinematics solutions; its parameter
 `s` is the distance that the tool has moved. `q_s`, `q_ss` and `q_sss` are the derivatives of `q` with respect
@@ -20,18 +20,9 @@ from ruckig import InputParameter, Ruckig
 from ruckig import Trajectory as Profile
 
 from executive.cell.arm import Goal, JointState
-from executive.cell.config import CellConfig
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose, make_tool_down_pose
-from executive.motion.joints import (
-    BranchKey,
-    JointLimits,
-    JointRange,
-    Kinematics,
-    build_planning_kinematics,
-    wrap_angles,
-)
-from executive.text.validate import KeyPath
+from executive.motion.joints import BranchKey, JointLimits, JointRange, Kinematics, wrap_angles
 
 PREFERRED_LIMIT_DISTANCE = math.radians(1.0)
 """Preferred minimum distance of joint positions from their limits [rad]."""
@@ -350,34 +341,3 @@ def find_candidates(
             arrival = CartesianLine(waypoints, length, limits, goal.guarded_speed, starts_in_motion=True)
             free_part_end = arrival.state_at(0.0)
         yield Candidate(float(durations[index]), free_part_end, arrival, branch)
-
-
-def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each place or named pose of the cell file that the arm cannot reach.
-
-    The tool must reach each slot of each bin and the safe place, from travel height down to the release
-    height in one inverse kinematics branch. Each named pose must be within the joint limits.
-    """
-    ranges = config.arm.limits.position_ranges_deg
-    for name, pose in config.arm.poses_deg.items():
-        for joint, (angle, (lower, upper)) in enumerate(zip(pose, ranges, strict=True), start=1):
-            if not lower <= angle <= upper:
-                limit = f"{upper:g}" if lower == -upper else f"{lower:g} to {upper:g}"
-                message = f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}'
-                yield ("arm", "poses_deg", name), message
-    kinematics = build_planning_kinematics(config)
-    q_start = np.zeros(config.arm.joint_count)
-    places: list[tuple[KeyPath, str, Array, float]] = [
-        (("bins", name, "position"), f'the bin "{name}"', bin.build_bin(name).slots, bin.position[2])
-        for name, bin in config.bins.items()
-    ]
-    safe_position = np.array([config.safe_place[:2]])
-    places.append((("safe_place",), "the safe place", safe_position, config.safe_place[2]))
-    for key_path, place_name, positions, surface_height in places:
-        height = surface_height + config.max_hold_height
-        approach_height = max(0.0, config.travel_height - height)
-        try:
-            for x, y in positions.tolist():
-                find_configuration_pairs(kinematics, Goal((x, y, height)), approach_height, q_start)
-        except Unreachable as error:
-            yield key_path, f"{place_name} is out of reach: {error}"

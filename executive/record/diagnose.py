@@ -75,7 +75,7 @@ def diagnose(
     )
 
 
-@dataclass(frozen=True)
+@dataclass
 class _FailurePathNode:
     """Node from which a failure propagated to its parent.
 
@@ -204,13 +204,10 @@ def _trace_failure(nodes: Sequence[Node], timeline: Timeline, end: RunEnded) -> 
                 last_handled_name=activation.last_handled_reason, last_choice=activation.choice,
                 duration=activation.end - activation.start,
             )  # fmt: skip
-            entry = replace(
-                entry,
-                explanation=node.explain(failure) if failure.child else "",
-                attempt=node.count_attempts(failure),
-                changes=list(node.advise(failure)),
-                is_handler=bool(node.remedy),
-            )
+            entry.explanation = node.explain(failure) if failure.child else ""
+            entry.attempt = node.count_attempts(failure)
+            entry.changes = list(node.advise(failure))
+            entry.is_handler = bool(node.remedy)
         failure_path.append(entry)
         reasons |= {Reason(node.label, reason)} if node.label else set()
     return failure_path[::-1]
@@ -273,15 +270,12 @@ def _list_advice(run: _FailedRun, arm_state: str, is_record_lost: bool) -> Itera
 def _list_changes(run: _FailedRun) -> Iterator[str]:
     """Yield changes of the mission after which the failure would not end the run."""
     entries = reversed(run.failure_path)
-    changes = [
-        (entry, f"{text} at {_format_location(run, node)}")
-        for entry in entries
-        for text, node in entry.changes
-    ]
+    changes = [(entry, *change) for entry in entries for change in entry.changes]
+    texts = [(entry, f"{text} at {_format_location(run, node)}") for entry, text, node in changes]
     remedies = (node.remedy for node in load_control_nodes().values() if node.remedy)
     new_handler = f"{next(remedies)} {_format_location(run, run.failure_path[-1].node)}"
-    yield next((text for entry, text in changes if entry.is_handler), new_handler)
-    for entry, text in changes:
+    yield next((text for entry, text in texts if entry.is_handler), new_handler)
+    for entry, text in texts:
         if not entry.is_handler:
             yield text
             # Changes of ancestors are omitted: the innermost node with attempts should be changed first.

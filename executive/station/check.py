@@ -16,8 +16,8 @@ from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.devices import CameraImage, DriverKind, is_rehearsal, load_driver_kind
 from executive.cell.frame import Box
 from executive.geometry import Array, Pose
-from executive.motion.configurations import find_places_out_of_reach
 from executive.motion.joints import build_kinematics, find_arm_errors
+from executive.motion.planner import find_places_out_of_reach
 from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, project
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 from executive.station.camera import CellCamera, Robot

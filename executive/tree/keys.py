@@ -91,12 +91,16 @@ class Key:
             return any(key.has_nodes for key in section.keys.values())
         return self.value_type in (Child, Children)
 
+    @property
+    def has_reasons(self) -> bool:
+        """True if the value may contain names of failures."""
+        return Reason in list_member_types(self.value_type)
+
     @cached_property
     def is_constant(self) -> bool:
         """True for a plain value: a number, a text, a boolean, or one of several words."""
-        return self.value_type not in (Child, Children, VariableName, Elements) and not (
-            self.section or Reason in list_member_types(self.value_type)
-        )
+        is_other_value = self.value_type in (Child, Children, VariableName, Elements)
+        return not (is_other_value or self.section or self.has_reasons)
 
     @cached_property
     def is_plain(self) -> bool:

@@ -17,6 +17,7 @@ from executive.behaviours import load_skills
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.run.assembly import RunOptions, assemble
+from executive.station.check import load_checker
 from executive.testing.fake_cell import FakeCell
 from executive.text.findings import MissionError
 
@@ -39,7 +40,7 @@ class HaltedCell(FakeCell):
 
     def advance(self) -> None:
         super().advance()
-        if self.steps == MAX_STEPS:
+        if self.tick_count == MAX_STEPS:
             signal.raise_signal(signal.SIGINT)
 
 
@@ -101,9 +102,8 @@ def test_mutants_are_refused_or_run_without_a_fault(tmp_path: Path) -> None:
         mission = tmp_path / f"{seed}.yaml"
         mission.write_bytes(text.encode(errors="surrogatepass"))
         try:
-            loaded = load_mission(
-                mission, skills, {"cell.table.objects": "[1, 3]"}, find_checker=lambda name: FakeCell
-            )
+            overrides = {"cell.kind": "fake", "cell.table.objects": "[1, 3]"}
+            loaded = load_mission(mission, skills, overrides, load_checker)
         except MissionError as error:
             assert any(finding.severity == "error" for finding in error.findings), seed
             assert str(error).encode(), seed
