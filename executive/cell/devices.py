@@ -10,13 +10,13 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.arm import Motion, MotionGuard
-from executive.cell.config import ObjectConfig
+from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import STEP
 from executive.cell.frame import Detection
 from executive.cell.protocols import Clock, Steps, Tool
@@ -35,6 +35,10 @@ DEFAULT_ROLE = "main"
 
 class DeviceClock(Clock, Protocol):
     """Clock of the devices, which determines the ticks of a run: a `StepClock` or a `WallClock`."""
+
+    @property
+    def is_simulated(self) -> bool:
+        """True if the time stands still between two ticks."""
 
     def begin(self, now: float) -> None:
         """Set the time [s], at the start of a run to 0, at its resumption to the time of the interruption."""
@@ -180,7 +184,8 @@ class CameraImage(NamedTuple):
         depth: Depth image `(H, W)` [m] along the optical axis, NaN for pixels without a measurement; None
             for a camera without a depth sensor.
         stamp: Capture time on the clock of the driver [s].
-        visible: Mask `(H, W)`, False for pixels that the arm occludes; None: the station computes the mask.
+        visible: Mask `(H, W)`, False for pixels that the arm occludes; None: the station computes the mask,
+            but not for a kind without physics (`DriverKind`).
         true_detections: True detections, of a driver that knows them; None: unknown.
     """
 
@@ -247,14 +252,14 @@ class DriverKind(Protocol):
     directory gets a copy of a file.
     """
 
-    def __call__(self, config: Any, options: DriverOptions) -> Driver:
+    def __call__(self, config: CellConfig, options: DriverOptions) -> Driver:
         """Return a driver for a cell file (`executive.cell.config.CellConfig`).
 
         Raises:
             InputError: The driver does not support the cell file or an option.
         """
 
-    def check(self, config: Any, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
+    def check(self, config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
         """Yield key and message of each error in the cell file that only the driver can find."""
 
 

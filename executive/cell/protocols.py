@@ -224,10 +224,6 @@ class Clock(Protocol):
     def step(self) -> float:
         """Time between two ticks [s]."""
 
-    @property
-    def is_simulated(self) -> bool:
-        """True if the time stands still between two ticks."""
-
     def sleep(self, duration: float) -> Steps:
         """Yield until the time of the clock has advanced by `duration` [s]."""
 

@@ -363,7 +363,6 @@ class FakeDriver:
         self.tools = {DEFAULT_ROLE: self.tool}
         self.cameras = dict.fromkeys(config.cameras, self.camera)
         self.last_command_tick = 0
-        self._tick_count = 0
         self._step_count = 0
         self._log: LogFile | None = None
         self._log_length = 0
@@ -380,9 +379,8 @@ class FakeDriver:
     def _advance(self) -> None:
         """Move the arm until the time of the clock."""
         if self.world.is_commanded:
-            self.last_command_tick = self._tick_count
+            self.last_command_tick = self.clock.tick_count - 1
             self.world.is_commanded = False
-        self._tick_count += 1
         due_step_count = round(self.clock.now / STEP)
         for _ in range(due_step_count - self._step_count):
             self.arm.advance()
@@ -401,7 +399,7 @@ class FakeDriver:
         index = None if held is None else self.world.objects.index(held)
         objects = [_encode_object(each) for each in self.world.objects]
         removed_objects = [_encode_object(each) for each in self.world.removed_objects]
-        state = [self._tick_count, self.last_command_tick, self.arm.q, index, objects, removed_objects]
+        state = [self.clock.tick_count, self.last_command_tick, self.arm.q, index, objects, removed_objects]
         text = json.dumps(state, default=np.ndarray.tolist).encode()
         # Blanks pad the text to the length of the longest state so far, to overwrite all old text.
         self._log_length = max(self._log_length, len(text))
@@ -410,7 +408,7 @@ class FakeDriver:
     def rebuild(self, path: Path) -> int:
         try:
             ticks, last_command_tick, q, held, objects, removed_objects = json.loads(path.read_bytes())
-            self._tick_count = int(ticks)
+            self.clock.tick_count = int(ticks)
             self.last_command_tick = int(last_command_tick)
             self.arm.q = np.array(q, dtype=float).reshape(self.arm.q.shape)
             restored = [_decode_object(body, *each) for body, each in enumerate(objects + removed_objects)]
@@ -419,10 +417,9 @@ class FakeDriver:
             self.world.held_object = None if held is None else self.world.objects[held]
         except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
             raise InputError(f'the world in "{path}" is damaged: {error}; run the mission again') from error
-        self.clock.tick_count = self._tick_count
         self._step_count = round(self.clock.now / STEP)
         self.log_to(path)
-        return self._tick_count
+        return self.clock.tick_count
 
     def list_objects(self) -> Sequence[TrueObject]:
         return list(self.world.objects)

@@ -99,6 +99,10 @@ def build_station(
 def complete(
     run: Run, loaded: LoadedMission, options: RunOptions, station: Station, control_period: float
 ) -> None:
-    """Give a run its station and its tree."""
+    """Give a run its station and its tree; after an exception, the station is closed."""
     run.connect(station, control_period)
-    run.set_tree(build_tree(loaded, run.cell, Blackboard(), run.emit, options.substitutes))
+    try:
+        run.set_tree(build_tree(loaded, run.cell, Blackboard(), run.emit, options.substitutes))
+    except BaseException:
+        station.close()
+        raise

@@ -9,7 +9,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from types import FrameType
 from typing import TYPE_CHECKING
 
@@ -34,11 +34,13 @@ class RunControl:
     Attributes:
         is_stopped: True after the first call of `stop`.
         is_idle: True while `wait_while_paused` has nothing to do.
+        hold_time: Function that returns a context in which the clock of the run stands still.
     """
 
     def __init__(self) -> None:
         self.is_stopped = False
         self.is_idle = True
+        self.hold_time: Callable[[], AbstractContextManager[None]] = nullcontext
         self._is_paused = False
         self._remaining_ticks = 0
         """Number of ticks that `step` requested and that have not begun."""
@@ -101,7 +103,8 @@ class RunControl:
             if self._remaining_ticks > 0:
                 self._remaining_ticks -= 1
                 return
-            self._wake_up.wait(PAUSE_POLL_PERIOD)
+            with self.hold_time():
+                self._wake_up.wait(PAUSE_POLL_PERIOD)
             self._wake_up.clear()
 
 
@@ -201,7 +204,8 @@ class TerminalOperator:
             if self._has_keyboard:
                 sys.stderr.write(f"pick what?  {menu}  s rescan  q quit > ")
                 sys.stderr.flush()
-            line = self._read_line()
+            with self._control.hold_time():
+                line = self._read_line()
             request = parse_request(line.strip(), choices) if line else None
             if request != "":
                 self._emit(RequestGiven(request))

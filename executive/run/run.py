@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from py_trees.common import Status
@@ -78,7 +79,6 @@ class RunClock:
     step: float
     offset: float = 0.0
     tick: int = 0
-    is_simulated = True
 
     @property
     def now(self) -> float:
@@ -139,6 +139,7 @@ class Run:
         self._planner = LookaheadPlanner(station.unrecorded_cell)
         self.add_observer(self._planner.on_event)
         self.clock = RunClock(control_period)
+        self.control.hold_time = self._hold_time
         self.cell = replace(station.cell, clock=self.clock)
 
     def set_tree(self, root: TreeNode) -> None:
@@ -179,6 +180,19 @@ class Run:
         if border.is_live and self.station.driver.clock.is_simulated:
             return
         clock.offset = border.read("clock", lambda: self.station.driver.clock.now - tick * clock.step)
+
+    @contextmanager
+    def _hold_time(self) -> Iterator[None]:
+        """Let the clock of the devices continue after the `with` block at its time before the block."""
+        if not self.station.border.is_live:
+            yield
+            return
+        clock = self.station.driver.clock
+        now = clock.now
+        wall_time = time.monotonic()
+        yield
+        clock.begin(now)
+        self._wall_start += time.monotonic() - wall_time
 
     def plan_ahead(self) -> None:
         """Let the planner plan the probable next motion."""

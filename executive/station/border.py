@@ -233,6 +233,7 @@ METHODS: Mapping[str, Input] = {
     "arm.execute": COMMAND,
     "arm.stop": COMMAND,
     "planner.plan": COMMAND,
+    "planner.plan_ahead": COMMAND,
     "plan.result": Input("plan", MOTION),
     "tool.close": COMMAND,
     "tool.open": COMMAND,

@@ -96,6 +96,7 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     partial views must see it from all its scan poses together. If the model of the arm is invalid, only its
     errors are reported.
     """
+    # The import loads PyBullet, which takes 0.2 s; a cell without physics does not need it.
     from executive.physics.collision import ClearanceChecker
     from executive.physics.model_files import find_arm_model_errors
 

@@ -13,8 +13,7 @@ from types import GeneratorType
 import numpy as np
 
 from executive.cell.arm import Goal, Motion, MotionGuard, Planning, Task
-from executive.cell.devices import ArmDevice
-from executive.cell.protocols import Clock
+from executive.cell.devices import ArmDevice, DeviceClock
 from executive.errors import Fault, Unreachable
 from executive.events import Emit, MotionPlanned
 from executive.geometry import Array, Pose
@@ -36,14 +35,14 @@ class Plan:
 
     Attributes:
         query: Bytes of the joint positions at the start, goal and task of the motion.
-        clock: Clock of the run.
+        clock: Clock of the devices.
         ready_time: Time before which the plan is not ready [s].
         future: Planned motion, or exception of the planner, from the worker thread.
         report: Function that is called once when the plan is ready.
     """
 
     query: tuple[bytes, Goal | bytes, Task]
-    clock: Clock
+    clock: DeviceClock
     ready_time: float
     future: Future[Motion]
     report: Callable[[], None] = lambda: None
@@ -76,7 +75,7 @@ class PlannerService:
 
     Args:
         plan_motion: Function that plans a motion; called in the worker thread.
-        clock: Clock of the run.
+        clock: Clock of the devices.
         planning_time: Time from a request until its plan is ready [s].
         emit: Function that receives an event for each requested plan when the plan is ready.
         release: Function that releases the resources of the planner.
@@ -85,7 +84,7 @@ class PlannerService:
     def __init__(
         self,
         plan_motion: PlanMotion,
-        clock: Clock,
+        clock: DeviceClock,
         planning_time: float,
         emit: Emit,
         release: Callable[[], None] = lambda: None,

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from executive.cell.config import CellConfig
 from executive.cell.devices import (
+    DEFAULT_ROLE,
+    DeviceClock,
     Driver,
     DriverKind,
     DriverOptions,
@@ -27,20 +30,24 @@ from executive.cell.devices import (
     load_driver_kind,
 )
 from executive.cell.objects import UNKNOWN_LABEL, Bin, Quotas
-from executive.cell.protocols import Behaviours, Cell, Clock, Operator, Routes
+from executive.cell.protocols import Behaviours, Cell, Operator, Routes
+from executive.errors import InputError
 from executive.events import Emit, TargetSelected
 from executive.geometry import Array
 from executive.ledger.item import ItemRecord, State
 from executive.ledger.tracker import Tracker
 from executive.motion.joints import Kinematics, build_planning_kinematics
 from executive.motion.planner import Planner
-from executive.perception.detectors.cell_detector import CellDetector, TruthDetector, build_cell_detectors
+from executive.perception.detectors.cell_detector import TruthDetector, build_cell_detectors
 from executive.perception.detectors.detector_registry import KindMaker, make_installed_kind
 from executive.perception.localization import CellLocalizer
 from executive.station.border import Border
 from executive.station.camera import CellCamera, Robot
 from executive.station.planner_service import PlannedArm, PlannerService
 from executive.text.yaml_files import get_shipped_folder
+
+DeviceT = TypeVar("DeviceT")
+"""Type of a device."""
 
 
 class SilentOperator:
@@ -122,7 +129,6 @@ class Station:
         self.border = Border(emit)
         self.tick_count = 0
         self.tick_callbacks: list[Callable[[], None]] = []
-        self._detectors: dict[str, CellDetector] = {}
         bins = config.build_bins()
         classes = {label: section.build_class(label) for label, section in config.objects.items()}
         ignored_labels = set(config.unknown.ignore).difference(classes)
@@ -137,85 +143,93 @@ class Station:
             ignored_labels,
             config.tool.find_distinct_labels(classes),
         )
-        # In a replay, the border needs none of these parts, because all values come from the record.
-        clock: Any = None
-        arm: Any = None
-        tool: Any = None
-        camera_device: Any = None
-        self._planner: Any = None
-        cast_ray = None
-        is_without_physics = kind is not None and is_rehearsal(kind)
-        if options.has_devices:
-            kind = kind or load_driver_kind(config.kind)
-            is_without_physics = is_rehearsal(kind)
-            if (compute_mass := getattr(kind, "compute_mass", None)) is not None:
-                masses = {label: compute_mass(section) for label, section in config.objects.items()}
-                classes = {label: replace(each, mass=masses[label]) for label, each in classes.items()}
-            driver_options = DriverOptions(seed, options.cell_folder, options.driver_options)
-            self.driver = kind(config, driver_options)
-            clock = self.driver.clock
-            arm = next(iter(self.driver.arms.values()))
-            tool = next(iter(self.driver.tools.values()))
-            camera_device = next(iter(self.driver.cameras.values()))
-            if isinstance(self.driver, RayCaster):
-                cast_ray = self.driver.cast_ray
-            if options.world_log is not None and isinstance(self.driver, Rebuildable):
-                self.tick_count = self.driver.rebuild(options.world_log)
-        kinematics = build_planning_kinematics(config)
-        poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
-        if options.has_devices:
-            self._planner = _build_planner(config, kinematics, clock, emit, is_without_physics)
-            # Detectors are built last: their processes would outlive an exception in a later statement.
-            truth = TruthDetector.from_config if is_without_physics else make_installed_kind
-            self._detectors = build_cell_detectors(
+        camera_name = next(iter(config.cameras))
+        with ExitStack() as resources:
+            # In a replay, the border needs none of these parts, because all values come from the record.
+            clock: Any = None
+            arm: Any = None
+            tool: Any = None
+            camera_device: Any = None
+            planner: Any = None
+            detectors: Mapping[str, Any] = dict.fromkeys(config.detectors)
+            cast_ray = None
+            is_without_physics = kind is not None and is_rehearsal(kind)
+            if options.has_devices:
+                kind = kind or load_driver_kind(config.kind)
+                is_without_physics = is_rehearsal(kind)
+                if (compute_mass := getattr(kind, "compute_mass", None)) is not None:
+                    masses = {label: compute_mass(section) for label, section in config.objects.items()}
+                    classes = {label: replace(each, mass=masses[label]) for label, each in classes.items()}
+                driver_options = DriverOptions(seed, options.cell_folder, options.driver_options)
+                self.driver = kind(config, driver_options)
+                resources.callback(self.driver.close)
+                clock = self.driver.clock
+                arm = _get_device(self.driver.arms, DEFAULT_ROLE, "arm", config.kind)
+                tool = _get_device(self.driver.tools, DEFAULT_ROLE, "tool", config.kind)
+                camera_device = _get_device(self.driver.cameras, camera_name, "camera", config.kind)
+                if isinstance(self.driver, RayCaster):
+                    cast_ray = self.driver.cast_ray
+                if options.world_log is not None and isinstance(self.driver, Rebuildable):
+                    self.tick_count = self.driver.rebuild(options.world_log)
+            kinematics = build_planning_kinematics(config)
+            poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
+            if options.has_devices:
+                planner = _build_planner(config, kinematics, clock, emit, is_without_physics)
+                resources.callback(planner.close)
+                truth = TruthDetector.from_config if is_without_physics else make_installed_kind
+                detectors = build_cell_detectors(
+                    config,
+                    clock=clock,
+                    cell_folder=options.cell_folder,
+                    seed=derive_seeds(seed)[2],
+                    classes=classes,
+                    folders=(options.cell_folder, get_shipped_folder() / "cells"),
+                    make_kind=make_detector or truth,
+                )
+                for detector in detectors.values():
+                    resources.callback(detector.close)
+            recorded_arm = self.border.wrap("arm", arm)
+            recorded_tool = self.border.wrap("tool", tool)
+            camera = CellCamera(
                 config,
-                clock=clock,
-                cell_folder=options.cell_folder,
-                seed=derive_seeds(seed)[2],
-                classes=classes,
-                folders=(options.cell_folder, get_shipped_folder() / "cells"),
-                make_kind=make_detector or truth,
+                camera_name,
+                self.border.wrap("image", camera_device),
+                Robot(recorded_arm, recorded_tool),
+                Robot(arm, tool),
+                kinematics,
+                bins=bins.values(),
+                get_change_count=lambda: self.ledger.change_count,
+                is_hidden_by_arm=not is_without_physics,
             )
-        recorded_arm = self.border.wrap("arm", arm)
-        recorded_tool = self.border.wrap("tool", tool)
-        camera = CellCamera(
-            config,
-            next(iter(config.cameras)),
-            self.border.wrap("image", camera_device),
-            Robot(recorded_arm, recorded_tool),
-            Robot(arm, tool),
-            kinematics,
-            bins=bins.values(),
-            get_change_count=lambda: self.ledger.change_count,
-            is_hidden_by_arm=not is_without_physics,
-        )
-        method = "plane" if is_without_physics else config.localization
-        localizer = CellLocalizer(method, classes, tuple(bins.values()), cast_ray)
-        detectors: Mapping[str, Any] = self._detectors or dict.fromkeys(config.detectors)
-        self.cell = Cell(
-            clock=clock,
-            arm=PlannedArm(recorded_arm, self.border.wrap("planner", self._planner), kinematics, poses),
-            tool=recorded_tool,
-            camera=self.border.wrap("camera", camera),
-            detectors={name: self.border.wrap("detector", each, name) for name, each in detectors.items()},
-            ledger=self.ledger,
-            operator=self.border.wrap("operator", options.operator),
-            bins=bins,
-            classes=classes,
-            routes=self.routes,
-            localizer=self.border.wrap("localizer", localizer),
-            safe_place=np.array(config.safe_place),
-            tool_model=config.tool,
-            motion=config.motion,
-            report_selection=lambda target, bin: emit(
-                TargetSelected(target.item, target.label, target.frame, bin)
-            ),
-            quotas=options.quotas,
-            behaviours=self.border.wrap("behaviours", Behaviours()),
-        )
-        self.unrecorded_cell = replace(
-            self.cell, arm=PlannedArm(arm, self._planner, kinematics, poses), tool=tool
-        )
+            method = "plane" if is_without_physics else config.localization
+            localizer = CellLocalizer(method, classes, tuple(bins.values()), cast_ray)
+            self.cell = Cell(
+                clock=clock,
+                arm=PlannedArm(recorded_arm, self.border.wrap("planner", planner), kinematics, poses),
+                tool=recorded_tool,
+                camera=self.border.wrap("camera", camera),
+                detectors={
+                    name: self.border.wrap("detector", each, name) for name, each in detectors.items()
+                },
+                ledger=self.ledger,
+                operator=self.border.wrap("operator", options.operator),
+                bins=bins,
+                classes=classes,
+                routes=self.routes,
+                localizer=self.border.wrap("localizer", localizer),
+                safe_place=np.array(config.safe_place),
+                tool_model=config.tool,
+                motion=config.motion,
+                report_selection=lambda target, bin: emit(
+                    TargetSelected(target.item, target.label, target.frame, bin)
+                ),
+                quotas=options.quotas,
+                behaviours=self.border.wrap("behaviours", Behaviours()),
+            )
+            self.unrecorded_cell = replace(
+                self.cell, arm=PlannedArm(arm, planner, kinematics, poses), tool=tool
+            )
+            self._resources = resources.pop_all()
 
     def advance(self) -> None:
         """Wait for the next tick of the devices."""
@@ -246,15 +260,18 @@ class Station:
 
     def close(self) -> None:
         """Release all resources; the station is unusable afterwards."""
-        for detector in self._detectors.values():
-            detector.close()
-        if self._planner is not None:
-            self._planner.close()
-            self.driver.close()
+        self._resources.close()
+
+
+def _get_device(devices: Mapping[str, DeviceT], role: str, noun: str, kind: str) -> DeviceT:
+    if role not in devices:
+        roles = ", ".join(devices) or "none"
+        raise InputError(f'the driver "{kind}" has no {noun} with the name "{role}"; it has: {roles}')
+    return devices[role]
 
 
 def _build_planner(
-    config: CellConfig, kinematics: Kinematics, clock: Clock, emit: Emit, is_without_physics: bool
+    config: CellConfig, kinematics: Kinematics, clock: DeviceClock, emit: Emit, is_without_physics: bool
 ) -> PlannerService:
     """Return the planner service of a cell; without physics, motions have straight joint paths."""
     planning_time = config.motion.planning_time

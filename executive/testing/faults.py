@@ -69,22 +69,26 @@ def after(start: float, effect: Effect) -> ScheduledFault:
 
 def grip_fails() -> Effect:
     """Return an effect: the tool cannot grip, and `Grasp` fails with `missed`; held objects stay held."""
-    return Effect("grip_fails", interceptors={"close": _return_constant}, arguments=(None,))
+    return Effect("grip_fails", interceptors={"tool.close": _return_constant}, arguments=(None,))
 
 
 def workspace_occluded() -> Effect:
     """Return an effect: the camera does not see the whole table, and `Detect` fails with `hidden`."""
-    return Effect("workspace_occluded", interceptors={"sees_table": _return_constant}, arguments=(False,))
+    return Effect(
+        "workspace_occluded", interceptors={"camera.sees_table": _return_constant}, arguments=(False,)
+    )
 
 
 def operator_quits() -> Effect:
     """Return an effect: the operator quits, and `AwaitRequest` fails with `quit`."""
-    return Effect("operator_quits", interceptors={"ask": _return_constant}, arguments=(None,))
+    return Effect("operator_quits", interceptors={"operator.ask": _return_constant}, arguments=(None,))
 
 
 def operator_asks_rescan() -> Effect:
     """Return an effect: the operator requests a new scan, and `AwaitRequest` fails with `rescan`."""
-    return Effect("operator_asks_rescan", interceptors={"ask": _return_constant}, arguments=("rescan",))
+    return Effect(
+        "operator_asks_rescan", interceptors={"operator.ask": _return_constant}, arguments=("rescan",)
+    )
 
 
 def _return_constant(proceed: Callable[[], object], occurrence: Occurrence, answer: object) -> object:
@@ -95,7 +99,7 @@ def _return_constant(proceed: Callable[[], object], occurrence: Occurrence, answ
 
 def object_ungrippable(choice: ObjectChoice) -> Effect:
     """Return an effect: the tool cannot grip one object, and `Grasp` fails with `missed` on this object."""
-    return Effect("grip_fails", interceptors={"close": _prevent_grip}, arguments=(choice,))
+    return Effect("grip_fails", interceptors={"tool.close": _prevent_grip}, arguments=(choice,))
 
 
 def _prevent_grip(proceed: Callable[[], None], occurrence: Occurrence, choice: ObjectChoice) -> None:
@@ -109,7 +113,7 @@ def _prevent_grip(proceed: Callable[[], None], occurrence: Occurrence, choice: O
 
 def tool_does_not_release() -> Effect:
     """Return an effect: the object sticks to the opened tool, and `Release` fails with `stuck`."""
-    return Effect("tool_does_not_release", interceptors={"open": _prevent_opening})
+    return Effect("tool_does_not_release", interceptors={"tool.open": _prevent_opening})
 
 
 def _prevent_opening(proceed: Callable[[], None], occurrence: Occurrence) -> None:
@@ -122,7 +126,7 @@ def _prevent_opening(proceed: Callable[[], None], occurrence: Occurrence) -> Non
 
 def no_depth() -> Effect:
     """Return an effect: no detection can be localized, and `Localize` fails with `no_depth`."""
-    return Effect("no_depth", interceptors={"localize": _raise_no_depth})
+    return Effect("no_depth", interceptors={"localizer.localize": _raise_no_depth})
 
 
 def _raise_no_depth(proceed: Callable[[], object], occurrence: Occurrence) -> None:
@@ -204,7 +208,7 @@ def _bump_object(occurrence: Occurrence, choice: ObjectChoice, x: Interval, y: I
 
 def no_path() -> Effect:
     """Return an effect: planning fails, and skills that move the arm fail with `unreachable`."""
-    return Effect("no_path", interceptors={"plan": _change_answer}, arguments=(_raise_unreachable,))
+    return Effect("no_path", interceptors={"planner.plan": _change_answer}, arguments=(_raise_unreachable,))
 
 
 def _raise_unreachable(motion: Motion) -> Motion:
@@ -234,7 +238,7 @@ def detector_finds_nothing() -> Effect:
 
 def make_detector_effect(name: str, change_answer: AnswerChange | None = None, hangs: bool = False) -> Effect:
     """Return an effect: the detector answers with changed answers, or not before the end of the fault."""
-    return Effect(name, interceptors={"request": _change_answer}, arguments=(change_answer, hangs))
+    return Effect(name, interceptors={"detector.request": _change_answer}, arguments=(change_answer, hangs))
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,10 +35,10 @@ class Effect:
         name: Name of the effect in the journal.
         action: Function `action(occurrence, *arguments)` that changes the cell and returns True, or returns
             False if the change is not possible yet; it is then called again after each control step.
-        interceptors: Functions `interceptor(proceed, occurrence, *arguments)`, by the name of the method of
-            the cell whose result they return: `close`, `open` (tool), `plan` (arm), `sees_table`, `capture`
-            (camera), `request` (detector), `localize` (localizer), `ask` (operator). `proceed()` calls the
-            method.
+        interceptors: Functions `interceptor(proceed, occurrence, *arguments)`, by the path of the method
+            whose result they return: `tool.close`, `tool.open`, `planner.plan`, `camera.sees_table`,
+            `camera.capture`, `detector.request`, `localizer.localize`, `operator.ask`, ...
+            (`executive.station.border.METHODS`). `proceed()` calls the method.
         arguments: Further arguments of the action and of the interceptors.
         fraction: Fraction of a motion of the arm before which no action occurs, 0 to 1; None: no condition.
     """
@@ -189,7 +189,7 @@ class FaultInjector:
         if access.is_call:
             self._update_occurrences()
             for occurrence in self._occurrences:
-                if interceptor := occurrence.effect.interceptors.get(access.member):
+                if interceptor := occurrence.effect.interceptors.get(access.path):
                     proceed = partial(interceptor, proceed, occurrence, *occurrence.effect.arguments)
         result = proceed()
         if access.path == "arm.execute":

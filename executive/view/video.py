@@ -13,6 +13,7 @@ import numpy as np
 import PIL.Image
 
 from executive.cell.config import CellConfig
+from executive.cell.device_config import STEP
 from executive.drivers.sim.camera import Image, Light, render
 from executive.drivers.sim.driver import WorldRebuilder
 from executive.drivers.sim.scene import build_world_of_run
@@ -68,13 +69,15 @@ def _draw_frames(directory: RunDirectory, period: float) -> Iterator[Image]:
     later_files = deque(sorted(directory.pictures.glob("*.jpg")))
     timeline = Timeline(has_history=False)
     camera_picture = np.zeros((*PICTURE_SIZE[::-1], 3), np.uint8)
-    for step, world_picture in _render_pictures(directory, start.seed, max(1, round(period / start.step))):
-        while later_events and later_events[0].tick <= step:
+    for step_count, world_picture in _render_pictures(directory, start.seed, max(1, round(period / STEP))):
+        time = step_count * STEP
+        tick = round(time / start.step)
+        while later_events and later_events[0].tick <= tick:
             timeline(later_events.popleft())
-        while later_files and split_picture_name(later_files[0])[0] <= step:
+        while later_files and split_picture_name(later_files[0])[0] <= tick:
             camera_picture = _read_picture(later_files.popleft())
         text_line = np.zeros((TEXT_HEIGHT, 2 * PICTURE_SIZE[0], 3), np.uint8)
-        text = f"{step * start.step:.1f} s   {_describe_state(timeline)}"
+        text = f"{time:.1f} s   {_describe_state(timeline)}"
         cv2.putText(text_line, text, (12, 25), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (255, 255, 255), 1, cv2.LINE_AA)
         frame = np.vstack([np.hstack([world_picture, camera_picture]), text_line])
         yield frame
@@ -102,9 +105,9 @@ def _describe_state(timeline: Timeline) -> str:
 def _render_pictures(
     directory: RunDirectory, seed: int, steps_per_picture: int
 ) -> Iterator[tuple[int, Image]]:
-    """Yield pictures of the world after every `steps_per_picture` control steps, from the start to the end.
+    """Yield pictures of the world after every `steps_per_picture` physics steps, from the start to the end.
 
-    The number of control steps up to each picture precedes the picture.
+    The number of physics steps up to each picture precedes the picture.
     """
     config = read_cell(directory.path)
     viewpoint = _compute_viewpoint(config)

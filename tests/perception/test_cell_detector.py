@@ -52,7 +52,7 @@ class Kind:
 
 @pytest.fixture
 def clock() -> SimpleNamespace:
-    return SimpleNamespace(now=0.0)
+    return SimpleNamespace(now=0.0, is_simulated=True)
 
 
 def make_detector(kind: Kind, clock: SimpleNamespace) -> CellDetector:
@@ -61,7 +61,7 @@ def make_detector(kind: Kind, clock: SimpleNamespace) -> CellDetector:
 
 def screen(*found: Detection, view: str = "table") -> Answer:
     """Return the answer of a detector that finds this."""
-    clock = SimpleNamespace(now=0.0)
+    clock = SimpleNamespace(now=0.0, is_simulated=True)
     request = make_detector(Kind(found), clock).request(FRAME, view)
     clock.now = 0.05
     return request.result()

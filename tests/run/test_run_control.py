@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from executive.run.assembly import RunOptions, assemble
 from executive.run.operator import RunControl
 from executive.run.run import Run
 from executive.testing.fake_cell import FakeCell
+from tests.benchmarks.longest_step import WallClockDriver
 
 
 def make(missions: Path, observer) -> Run:
@@ -36,6 +38,26 @@ def test_a_paused_run_stands_still_and_a_step_is_a_tick(missions: Path, steps: i
     assert run.execute().status == "SUCCESS"
     # It ends the tick it is in before it stands still.
     assert ticks[1] == ticks[0] + 1 + steps
+
+
+def test_the_time_of_devices_on_a_wall_clock_stands_still_in_a_pause(missions: Path) -> None:
+    times: list[float] = []
+
+    def pause_once(event: Event) -> None:
+        if event.tick == 20 and not times:
+            times.append(run.now)
+            run.control.pause()
+            threading.Timer(1.0, run.control.resume).start()
+        elif event.tick > 25 and len(times) == 1:
+            times.append(run.now)
+            run.control.stop()
+
+    overrides = {"cell.clock.step": "0.0166666667"}
+    loaded = load_mission(missions / "sort_overhead.yaml", load_skills(), overrides)
+    make_cell = partial(FakeCell, kind=WallClockDriver)
+    run = assemble(loaded, RunOptions(3, make_cell=make_cell), [pause_once])
+    run.execute()
+    assert times[1] - times[0] < 0.5
 
 
 def test_a_paused_run_can_be_stopped(missions: Path) -> None:

@@ -16,9 +16,9 @@ import numpy as np
 
 from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.device_config import CameraConfig
+from executive.cell.devices import DeviceClock
 from executive.cell.frame import Answer, Detection, ErrorRates, Frame, TrueFrame
 from executive.cell.objects import ObjectClass
-from executive.cell.protocols import Clock
 from executive.errors import Crowded, DeadlinePassed, Unavailable
 from executive.perception.detectors.detector_registry import (
     DetectorContext,
@@ -49,14 +49,15 @@ MAX_SECOND_CLASS_RATIO = 0.5
 
 
 def build_cell_detectors(
-    config: CellConfig, *, clock: Clock, cell_folder: Path, seed: int, classes: Mapping[str, ObjectClass],
-    folders: Sequence[Path] = (), make_kind: KindMaker = make_installed_kind,
+    config: CellConfig, *, clock: DeviceClock, cell_folder: Path, seed: int,
+    classes: Mapping[str, ObjectClass], folders: Sequence[Path] = (),
+    make_kind: KindMaker = make_installed_kind,
 ) -> dict[str, CellDetector]:  # fmt: skip
     """Return the detectors of a cell by name, in the order of the cell file; the first is the default.
 
     Args:
         config: The cell file.
-        clock: Clock of the run, which determines when answers become available.
+        clock: Clock of the devices, which determines when answers become available.
         cell_folder: Folder of the cell file, to which paths in the file are relative.
         seed: Random seed of the detectors.
         classes: Classes of the cell by label.
@@ -90,7 +91,7 @@ class CellDetector:
         name: Name of the detector in the cell file.
         kind: Finds the detections in a frame.
         latency: Minimum time from a request to its answer, on the clock of the run [s].
-        clock: Clock of the run.
+        clock: Clock of the devices.
         rate: Returns the error rates of the detector for a frame.
         label_map: For each class of the cell, the class that detectors report for it.
     """
@@ -98,7 +99,7 @@ class CellDetector:
     name: str
     kind: DetectorKind
     latency: float
-    clock: Clock
+    clock: DeviceClock
     rate: Callable[[Frame], ErrorRates]
     label_map: Mapping[str, str]
 
@@ -168,13 +169,13 @@ class PendingAnswer:
 
     Attributes:
         future: Screened answer of the search, or its error.
-        clock: Clock of the run.
+        clock: Clock of the devices.
         request_time: Time of the request [s].
         due_time: Time from which the answer is available [s].
     """
 
     future: Future[Answer]
-    clock: Clock
+    clock: DeviceClock
     request_time: float
     due_time: float
 
@@ -187,7 +188,7 @@ class PendingAnswer:
         """
         if self.clock.now < self.due_time - CLOCK_ROUNDING_ERROR:
             return False
-        if getattr(self.clock, "is_simulated", True):
+        if self.clock.is_simulated:
             wait_until_done(self.future)
         elif not self.future.done():
             return False
