@@ -17,11 +17,11 @@ from executive.behaviours import load_skills
 from executive.campaign.jobs import JobOptions, list_jobs, make_fault_record, run_job, run_jobs
 from executive.campaign.results import FILE_NAME, ResultsDatabase, RunRecord, SweepSettings
 from executive.campaign.sweep_summary import SweepResults, summarize_runs
-from executive.cell.devices import check_driver_options
+from executive.cell.devices import check_driver_options, is_rehearsal, load_driver_kind
 from executive.drivers.sim.scene import load_scene
 from executive.errors import InputError
 from executive.mission.load import load_mission
-from executive.perception.detectors.envelope import FAKE_KIND, compute_fingerprint
+from executive.perception.detectors.envelope import compute_fingerprint
 from executive.plugins import DISTRIBUTION, list_versions
 from executive.record.run_directory import make_dated_folder
 from executive.station.check import load_checker
@@ -71,7 +71,7 @@ def _complete_settings(settings: SweepSettings) -> SweepSettings:
         cell = loaded.cell_config
         check_driver_options(cell.kind, settings.driver_options)
         load_scene(settings.scene, cell)
-        names = [] if cell.kind == FAKE_KIND else [*cell.detectors]
+        names = [] if is_rehearsal(load_driver_kind(cell.kind)) else [*cell.detectors]
         weights = [compute_fingerprint(cell, name, loaded.cell_path.parent)["weights"] for name in names]
         inputs += [loaded.text, dict(loaded.libraries), cell.model_dump(mode="json"), weights]
     if settings.scene is not None:

@@ -181,7 +181,7 @@ class CellFileChecker(Protocol):
 
 
 CheckerFinder = Callable[[str], CellFileChecker]
-"""Function that returns the checker of a kind of cell; raises InputError if the kind is not installed."""
+"""Function that returns the checker of cells with a driver; raises InputError if it is not installed."""
 
 
 @dataclass(frozen=True)
@@ -248,7 +248,7 @@ def load_mission(
         path: A mission file, or the name of a shipped mission.
         skills: Installed skills by name.
         overrides: Values as text, by name of a param or by `cell.<key>.<key>` for a key of the cell.
-        find_checker: Function that returns the checker of a kind of cell; None to skip its checks.
+        find_checker: Function that returns the checker of cells with a driver; None to skip its checks.
         replacing_cell: Cell instead of the mission's cell: a cell file, the name of a shipped cell, or the
             cell of a recorded run; "" for the mission's cell.
 

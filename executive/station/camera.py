@@ -23,7 +23,7 @@ from executive.perception.camera_model import BORDER_FRACTION, compute_calibrati
 MAX_LOAD_OFFSET = 0.015
 """Maximum distance of the centre of a held object from the axis of the tool [m]."""
 TOOL_SPHERE_RADIUS = 0.02
-"""Radius of the spheres that enclose the tool, including tube and fittings [m]."""
+"""Radius of the spheres that enclose the tool with its cables and hoses [m]."""
 SPHERES_PER_SEGMENT = 9
 """Number of spheres that cover the segment between two points on the axis of a part of the arm."""
 

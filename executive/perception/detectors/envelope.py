@@ -18,6 +18,7 @@ from pydantic import Field, ValidationError
 
 from executive.cell.config import CellConfig
 from executive.cell.device_config import Section
+from executive.cell.devices import is_rehearsal, load_driver_kind
 from executive.cell.frame import ErrorRates, Frame, assume_rates
 from executive.errors import InputError
 from executive.perception.camera_model import compute_calibration, compute_hull_mask
@@ -36,8 +37,6 @@ MEASUREMENT_SUFFIX = ".measured.json"
 """Suffix of a measurement file, after the name of the cell."""
 MAX_FILE_SIZE = 1_000_000
 """Maximum size of a measurement file [byte]."""
-FAKE_KIND = "fake"
-"""Kind of cell whose detectors are not measured, because they read the true positions of the objects."""
 MEASUREMENT_MINUTES = 2
 """Typical duration of a measurement on two cores [min]."""
 
@@ -301,8 +300,11 @@ def find_unmeasured_detectors(
 
 
 def find_measurable_detectors(config: CellConfig) -> Iterator[str]:
-    """Yield the names of the detectors that can be measured: their kind is installed and not fake."""
-    kinds = {} if config.kind == FAKE_KIND else find_detector_kinds()
+    """Yield the names of the detectors that can be measured: their kind is installed and not fake.
+
+    The detectors of a driver without physics read the true positions of the objects.
+    """
+    kinds = {} if is_rehearsal(load_driver_kind(config.kind)) else find_detector_kinds()
     for name, section in config.detectors.items():
         if section.kind in kinds and not getattr(kinds[section.kind].load(), "is_fake", False):
             yield name
