@@ -118,6 +118,11 @@ class Campaign:
             problem = f"without a fault, {mission.name} with seed {mission.seed} ends as {end_text}"
             advice = "choose another seed or mission, whose run succeeds and observes the whole table"
             raise InputError(f"{problem}; {advice}")
+        if run.audit is None:
+            problem = (
+                f"a campaign compares ledger and true objects, which the driver of {mission.name} does not"
+            )
+            raise InputError(f"{problem} know; add --set cell.kind=fake, or --cell with a simulated cell")
         self.faults = list(FaultLister(mission, run.steps_by_path, run.robot_time).list_faults())
         self.trials: list[Trial] = []
         self.is_complete = True

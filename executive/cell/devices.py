@@ -212,11 +212,11 @@ class Driver(Protocol):
 
     @property
     def arms(self) -> Mapping[str, ArmDevice]:
-        """Arms by role."""
+        """Arms by role; of several arms, the role of the arm that moves is `DEFAULT_ROLE`."""
 
     @property
     def tools(self) -> Mapping[str, Tool]:
-        """Tools by role."""
+        """Tools by role, as the arms."""
 
     @property
     def cameras(self) -> Mapping[str, CameraDevice]:
@@ -277,6 +277,8 @@ def load_driver_kind(name: str) -> DriverKind:
     entries = list_entries(DRIVER_GROUP, "driver")
     if name in entries:
         kind: DriverKind = entries[name].load()
+        if not (callable(kind) and hasattr(kind, "check")):
+            raise InputError(f"the driver {entries[name].value} has no method `check`, or cannot be called")
         return kind
     if name in list_entries(FORMER_DRIVER_GROUP, "kind of cell"):
         raise InputError(

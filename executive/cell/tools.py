@@ -123,6 +123,8 @@ class ToolModel(Section):
             model: type[ToolModel] = entries[kind].load()
         except InputError as error:
             raise ValueError(str(error)) from error
+        if not (isinstance(model, type) and issubclass(model, ToolModel)):
+            raise ValueError(f"{entries[kind].value} is no subclass of executive.cell.tools.ToolModel")
         return model
 
     @model_validator(mode="wrap")
@@ -147,12 +149,12 @@ class ToolModel(Section):
     @property
     def parts(self) -> Sequence[ToolPart]:
         """Parts of the tool, from the flange to the tip."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} does not define `parts`")
 
     @property
     def max_holding_force(self) -> float:
         """Largest force with which the tool can hold an object [N]."""
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} does not define `max_holding_force`")
 
     def explain_unsuitable(self, object_class: ObjectClass) -> str:  # noqa: ARG002
         """Return a clause that states why the tool cannot hold objects of a class, or ""."""
@@ -184,7 +186,7 @@ class ToolModel(Section):
             overtravel: Distance by which a guarded motion continues below the expected surface [m].
             spacing: Distance between the contact points of repeated attempts [m].
         """
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} does not define `list_grasps`")
 
     def measure_contact(
         self,
@@ -215,7 +217,7 @@ class ToolModel(Section):
         The result is an `executive.drivers.sim.tool.SimTool`, or has its public attributes and methods.
         `noise_seed` is the random seed of the noise of the load.
         """
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} does not define `build_sim`")
 
 
 def load_tool_models() -> dict[str, type[ToolModel]]:

@@ -14,7 +14,7 @@ from executive.cell.frame import Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, Item, ObjectClass, Obstacle, Target, is_quota_reached
 from executive.cell.protocols import Cell
 from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose
-from executive.errors import NoDepth
+from executive.errors import Fault, NoDepth
 
 MAX_ROLL_DISTANCE = 0.002
 """Maximum distance that an object rolls in a bin after its release [m]."""
@@ -116,7 +116,7 @@ def choose_grasp(
         overtravel: Distance by which a guarded motion continues below the expected surface [m].
         spacing: Distance between the contact points of repeated attempts [m].
     """
-    grasp = cell.tool_model.list_grasps(
+    grasps = cell.tool_model.list_grasps(
         cell.classes[target.label],
         target,
         cell.motion,
@@ -124,8 +124,10 @@ def choose_grasp(
         is_confirmed=cell.ledger.is_confirmed_by_tool(target.label),
         overtravel=overtravel,
         spacing=spacing,
-    )[0]
-    return grasp, Task(obstacles=list_obstacles(cell, target.item), target=make_obstacle(cell, target))
+    )
+    if not grasps:
+        raise Fault(f'the tool "{cell.tool_model.kind}" lists no grasp of a {target.label}')
+    return grasps[0], Task(obstacles=list_obstacles(cell, target.item), target=make_obstacle(cell, target))
 
 
 def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]:

@@ -191,6 +191,12 @@ def read_cell(path: Path) -> CellConfig:
         # Earlier records contain only model, limits and poses of their arm, which was always the default arm.
         default_arm = yaml.safe_load((get_shipped_folder() / DEFAULT_ARM_FILE).read_text(encoding="utf-8"))
         return CellConfig(**{**content, "arm": {**default_arm, **content["arm"]}})
+    except ValidationError as error:
+        problems = "; ".join(f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in error.errors())
+        advice = "install the packages that the run used"
+        raise InputError(
+            f'the cell file in the run directory "{path}" is invalid: {problems}; {advice}'
+        ) from error
     except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError) as error:
         raise InputError(f'cannot read the cell file in the run directory "{path}": {error}') from error
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import math
 import re
 import zlib
 from collections import Counter, deque
@@ -63,9 +64,33 @@ def decode_array(value: Any) -> Array:
 
 
 def encode_image(image: CameraImage) -> dict[str, Any]:
-    """Return size, time and visible pixels of an image; the journal does not contain the colours."""
+    """Return size, time and visible pixels of an image; the journal does not contain the colours.
+
+    Raises:
+        Fault: A camera returned something else than a valid image.
+    """
+    if problem := _describe_invalid_image(image):
+        raise errors.Fault(
+            f"a camera returned {problem}; `CameraImage` in executive.cell.devices is required"
+        )
     visible = None if image.visible is None else _encode_mask(image.visible)
     return {"size": list(image.colour.shape[:2]), "stamp": image.stamp, "visible": visible}
+
+
+def _describe_invalid_image(image: Any) -> str:
+    if not isinstance(image, CameraImage):
+        return f"a {type(image).__name__}"
+    for name, dtype in {"colour": np.uint8, "depth": np.floating, "visible": np.bool_}.items():
+        array = getattr(image, name)
+        if array is None and name != "colour":
+            continue
+        if not isinstance(array, np.ndarray):
+            return f"{type(array).__name__} as {name}"
+        size = np.shape(image.colour)[:2]
+        if array.shape != ((*size, 3) if name == "colour" else size) or not np.issubdtype(array.dtype, dtype):
+            return f"an array {array.shape} of {array.dtype} as {name}"
+    is_time = isinstance(image.stamp, int | float) and math.isfinite(image.stamp)
+    return "" if is_time else f"the stamp {image.stamp!r}"
 
 
 def decode_image(value: Any) -> CameraImage:
@@ -177,8 +202,8 @@ def _decode_mask(text: str, height: int, width: int) -> NDArray[np.bool_]:
     return np.unpackbits(packed_bits, count=height * width).reshape(height, width).astype(np.bool_)
 
 
-IDENTITY = Codec(lambda value: value, lambda value: value)
-"""Codec of numbers, truth values, strings and None."""
+IDENTITY = Codec(lambda value: value.item() if isinstance(value, np.generic) else value, lambda value: value)
+"""Codec of numbers, also those of numpy, truth values, strings and None."""
 NONE = Codec(lambda _: None, lambda _: None)
 """Codec of the results of commands, which a replay does not need."""
 ARRAY = Codec(np.ndarray.tolist, decode_array)
@@ -379,7 +404,7 @@ class Border:
         except (Exception, Stopped) as error:
             self._emit(InputRead(name, read_count, str(error), type(error).__name__))
             raise
-        encoded: Any = value if codec is IDENTITY else codec.encode(value)
+        encoded = codec.encode(value)
         if name not in self._last_values or encoded != self._last_values[name]:
             self._last_values[name] = encoded
             self._emit(InputRead(name, read_count, encoded))

@@ -15,6 +15,7 @@ from executive.cell.devices import ArmDevice, CameraDevice
 from executive.cell.frame import Box, Frame, TrueFrame
 from executive.cell.objects import Bin
 from executive.cell.protocols import Tool
+from executive.errors import Fault
 from executive.geometry import Array, Pose
 from executive.motion.joints import Kinematics
 from executive.perception.camera_check import describe_displacement
@@ -119,6 +120,10 @@ class CellCamera:
         self._frame_count += 1
         X_WC = self._compute_pose(self._robot.arm.q)
         image = self._device.capture()
+        height, width = image.colour.shape[:2]
+        if (width, height) != self._size:
+            sizes = f"{width} x {height} pixels instead of {self._size[0]} x {self._size[1]}"
+            raise Fault(f"the camera {self.name} returned an image of {sizes}, which the cell file declares")
         visible = image.visible
         if visible is None:
             visible = self._compute_visibility_mask(self._robot, X_WC)

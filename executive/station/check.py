@@ -51,6 +51,9 @@ class CellChecker:
             yield from find_view_errors(config)
             return
         yield from find_detector_errors(config.detectors, cell_folder)
+        if config.localization == "ray" and not hasattr(self.kind, "cast_ray"):
+            message = f'"ray" casts rays in a simulated world, which the driver "{config.kind}" does not have'
+            yield ("localization",), f'{message}; write "plane" or "depth"'
         yield from find_pose_errors(config)
 
     def labels(self, config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:

@@ -164,9 +164,9 @@ class Station:
                 self.driver = kind(config, driver_options)
                 resources.callback(self.driver.close)
                 clock = self.driver.clock
-                arm = _get_device(self.driver.arms, DEFAULT_ROLE, "arm", config.kind)
-                tool = _get_device(self.driver.tools, DEFAULT_ROLE, "tool", config.kind)
-                camera_device = _get_device(self.driver.cameras, camera_name, "camera", config.kind)
+                arm = _find_device(self.driver.arms, "arm", config.kind)
+                tool = _find_device(self.driver.tools, "tool", config.kind)
+                camera_device = _find_device(self.driver.cameras, "camera", config.kind, camera_name)
                 if isinstance(self.driver, RayCaster):
                     cast_ray = self.driver.cast_ray
                 if options.world_log is not None and isinstance(self.driver, Rebuildable):
@@ -263,7 +263,10 @@ class Station:
         self._resources.close()
 
 
-def _get_device(devices: Mapping[str, DeviceT], role: str, noun: str, kind: str) -> DeviceT:
+def _find_device(devices: Mapping[str, DeviceT], noun: str, kind: str, role: str = "") -> DeviceT:
+    """Return the device with a role; without a role, the only device or that with `DEFAULT_ROLE`."""
+    if not role:
+        role = next(iter(devices)) if len(devices) == 1 else DEFAULT_ROLE
     if role not in devices:
         roles = ", ".join(devices) or "none"
         raise InputError(f'the driver "{kind}" has no {noun} with the name "{role}"; it has: {roles}')

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import pytest
 from at_hand import look, pick
 
 from executive.cell.config import CellConfig
+from executive.cell.devices import CameraImage
+from executive.errors import Fault
 from executive.geometry import Pose
 from executive.testing.fake_cell import FakeCell
 
@@ -35,3 +40,23 @@ def test_pixels_that_the_device_says_are_hidden_are_not_visible(fake: FakeCell) 
     frame = fake.cell.camera.capture()
     assert not frame.visible[20:40, 10:30].any()
     assert frame.visible.sum() == frame.visible.size - 400
+
+
+IMAGE = CameraImage(np.zeros((480, 640, 3), np.uint8), None, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("image", "problem"),
+    [
+        (None, "a NoneType"),
+        (IMAGE._replace(colour=IMAGE.colour[::2, ::2]), "320 x 240 pixels instead of 640 x 480"),
+        (IMAGE._replace(colour=IMAGE.colour[..., 0]), r"an array \(480, 640\) of uint8 as colour"),
+        (IMAGE._replace(depth=np.zeros((3, 3))), "of float64 as depth"),
+        (IMAGE._replace(stamp=float("nan")), "the stamp nan"),
+    ],
+)
+def test_an_image_that_is_not_as_declared_is_a_fault(image: Any, problem: str) -> None:
+    fake = FakeCell()
+    fake.border.interceptor = lambda access: image if access.path == "image.capture" else access.proceed()
+    with pytest.raises(Fault, match=problem):
+        fake.cell.camera.capture()

@@ -24,11 +24,11 @@ class ClosedDriver(FakeDriver):
 
 
 class OtherRole(ClosedDriver):
-    """A driver whose arm has an unknown role."""
+    """A driver with two arms, of which none has the default role."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
-        self.arms = {"left": self.arm}
+        self.arms = {"left": self.arm, "right": self.arm}
 
 
 def refuse(*_: Any) -> Any:
@@ -37,7 +37,10 @@ def refuse(*_: Any) -> Any:
 
 @pytest.mark.parametrize(
     ("kind", "make_detector", "problem"),
-    [(ClosedDriver, refuse, "no weights"), (OtherRole, None, 'no arm with the name "main"; it has: left')],
+    [
+        (ClosedDriver, refuse, "no weights"),
+        (OtherRole, None, 'no arm with the name "main"; it has: left, right'),
+    ],
 )
 def test_a_driver_is_closed_if_its_station_cannot_be_built(
     kind: Any, make_detector: Any, problem: str
