@@ -67,7 +67,7 @@ def test_a_skill_of_the_project_is_found_beside_the_installed_ones(project: Writ
 
 def test_drivers_and_kinds_of_detectors_are_found_likewise(project: Write) -> None:
     project(
-        "hall_four", "class Bench:\n    pass\n\n\nclass Eye:\n    pass\n",
+        "hall_four", "class Bench:\n    check = print\n\n\nclass Eye:\n    pass\n",
         drivers='bench = "hall_four.part:Bench"', detectors='eye = "hall_four.part:Eye"',
     )  # fmt: skip
     assert load_checker("bench").kind.__name__ == "Bench"
