@@ -404,7 +404,9 @@ class Border:
         except (Exception, Stopped) as error:
             self._emit(InputRead(name, read_count, str(error), type(error).__name__))
             raise
-        encoded = codec.encode(value)
+        # Most values are read in every tick and need no conversion.
+        is_encoded = codec is IDENTITY and not isinstance(value, np.generic)
+        encoded: Any = value if is_encoded else codec.encode(value)
         if name not in self._last_values or encoded != self._last_values[name]:
             self._last_values[name] = encoded
             self._emit(InputRead(name, read_count, encoded))
