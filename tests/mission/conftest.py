@@ -68,7 +68,8 @@ SMALL_CELL = Path(__file__).with_name("small_cell.yaml").read_text()
 @pytest.fixture(scope="module")
 def shared_cells() -> Iterator[None]:
     """Read each file once, check each cell once, and load the control nodes once, per module."""
-    check, found = CellChecker.check, {}
+    check = CellChecker.check
+    found = {}
 
     def check_once(checker: CellChecker, config: CellConfig, cell_folder: Path) -> Any:
         key = checker, config.model_dump_json(), cell_folder

@@ -61,7 +61,8 @@ def rendered(path: Path, findings: Iterable[Finding]) -> str:
 @pytest.fixture(scope="module")
 def look(shared_cells: None) -> Look:
     """What is wrong with a mission; each is loaded once."""
-    skills, kind = load_skills(), functools.cache(load_checker)
+    skills = load_skills()
+    kind = functools.cache(load_checker)
     return functools.cache(lambda path: findings_of(path, skills, kind))
 
 
@@ -120,6 +121,7 @@ def test_every_kind_of_finding_has_a_broken_mission() -> None:
 if __name__ == "__main__":
     os.chdir(FOLDER)
     with keep_stdout_clean():
-        skills, kind = load_skills(), functools.cache(load_checker)
+        skills = load_skills()
+        kind = functools.cache(load_checker)
         texts = [rendered(path, findings_of(path, skills, kind)) for path in BROKEN]
     WORDS.write_text("".join(texts), encoding="utf-8")

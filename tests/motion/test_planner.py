@@ -41,7 +41,8 @@ def question(name: str, planner: Planner, config: CellConfig, home: Array) -> Tr
     aside, beyond = np.radians(config.arm.poses_deg["aside"]), Goal((0.5, 0.15, 0.07))
     picked = planner.plan(home, pick(0.5, -0.1)).end
     motion = config.motion.model_copy(update={"straight": 0.05})
-    beside, onto = planner.plan(home, Goal((0.42, 0.0, 0.01))).end, Goal((0.5, 0.0, 0.035), (), 0.02, 0.035)
+    beside = planner.plan(home, Goal((0.42, 0.0, 0.01))).end
+    onto = Goal((0.5, 0.0, 0.035), (), 0.02, 0.035)
     straight = Planner(config.model_copy(update={"motion": motion}))
     return {
         "pick": lambda: planner.plan(home, pick(0.5, -0.1)),

@@ -137,14 +137,18 @@ def test_that_a_deadline_has_passed_shows_when_it_has_passed_on_the_runs_clock_t
 
 
 def test_detections_are_divided_by_confidence_second_class_and_label() -> None:
-    cube, weak, torn = find(), find(confidence=0.4), find(confidence=0.7, second_confidence=0.4)
-    mug, weak_mug = find("mug"), find("mug", confidence=0.4)
+    cube = find()
+    weak = find(confidence=0.4)
+    torn = find(confidence=0.7, second_confidence=0.4)
+    mug = find("mug")
+    weak_mug = find("mug", confidence=0.4)
     answer = screen(cube, mug, torn, weak, weak_mug)
     assert (answer.confident, answer.doubtful, answer.unknown) == ((cube,), (torn, weak), (mug,))
 
 
 def test_a_box_that_the_arm_hides_is_left_out() -> None:
-    shown, hidden = find(right=12.0), find(right=16.0)
+    shown = find(right=12.0)
+    hidden = find(right=16.0)
     assert screen(shown, hidden).confident == (shown,)
 
 

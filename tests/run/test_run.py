@@ -38,7 +38,9 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
     fake = fake_of(run)
     stubborn = fake.world.objects[0]
     fake.tool.can_hold = lambda: fake.world.find_touched_object(fake.arm.tool_pose.position) is not stubborn
-    outcome, items, audit = run.execute(), run.station.ledger.count_states(), run.station.audit()
+    outcome = run.execute()
+    items = run.station.ledger.count_states()
+    audit = run.station.audit()
     assert (outcome.status, outcome.reason) == ("INCOMPLETE", "rejected")
     (rejected,) = (row for row in run.station.ledger.list_items() if row.state == "rejected")
     assert rejected.reason == "could not be picked (6 failed attempts)"
@@ -83,7 +85,9 @@ def test_requests_are_served_in_order_and_the_rest_is_left(missions: Path) -> No
     fake.world.objects.clear()
     for label, x, y in (("cube", 0.45, -0.1), ("cube", 0.55, 0.1), ("duck", 0.5, 0.0)):
         fake.world.put(label, x, y)
-    outcome, items, audit = run.execute(), run.station.ledger.count_states(), run.station.audit()
+    outcome = run.execute()
+    items = run.station.ledger.count_states()
+    audit = run.station.audit()
     assert outcome.status == "SUCCESS"
     requests = [one.event.request for one in events if isinstance(one.event, RequestGiven)]
     assert requests == ["cube", "rescan", "cube", None]
@@ -103,7 +107,9 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
         assert fake.tick_count < 60_000, "the mission tries for ever"
 
     fake.advance = slipping  # type: ignore[method-assign]
-    outcome, items, audit = run.execute(), run.station.ledger.count_states(), run.station.audit()
+    outcome = run.execute()
+    items = run.station.ledger.count_states()
+    audit = run.station.audit()
     assert outcome.status == "INCOMPLETE", outcome
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1

@@ -108,7 +108,8 @@ def empty(config: CellConfig) -> CellConfig:
 
 def test_the_final_objects_are_in_their_bins_dropped_held_or_removed(overhead: CellConfig) -> None:
     driver = SimDriver(empty(overhead), DriverOptions())
-    add, tip = driver.world.add_object, driver.world.get_tool_pose().position
+    add = driver.world.add_object
+    tip = driver.world.get_tool_pose().position
     in_bin = add("cube", Pose.of(overhead.bins["red_bin"].position), (1, 1, 1))
     places = [(0.5, 0.0, 0.025), (1.4, 0.0, -0.6), tip - (0.0, 0.0, 0.0255)]
     bodies = [in_bin, *(add("cube", Pose.of(place), (1, 1, 1)) for place in places)]

@@ -48,7 +48,8 @@ def driver_of(station: Station) -> SimDriver:
 
 def state_of(station: Station) -> str:
     """Everything that moves, and the seal."""
-    world, tool = driver_of(station).world, driver_of(station).tool
+    world = driver_of(station).world
+    tool = driver_of(station).tool
     joints = [joint[:2] for joint in world.client.getJointStates(world.arm, range(7))]
     bodies = [
         (body, world.client.getBasePositionAndOrientation(body), world.client.getBaseVelocity(body))

@@ -21,7 +21,8 @@ class Eye:
 
     def __init__(self, result):
         self.result = result
-        self.views, self.closed = [], False
+        self.views = []
+        self.closed = False
 
     def detect(self, frame, view):
         self.views.append(view)
