@@ -24,8 +24,8 @@ from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.perception.detectors.noisy import NoisyOptions
 from executive.perception.detectors.rfdetr import RfdetrOptions
 from executive.perception.detectors.roboflow.detector import RoboflowOptions
+from executive.text.files import list_shipped_missions
 from executive.text.findings import MEANING_BY_CODE
-from executive.text.yaml_files import list_shipped_missions
 from executive.tree.keys import KeyOwner
 from executive.tree.node import load_control_nodes
 

@@ -33,6 +33,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
     "Clock": [("cell.clock", "cell/protocols.py", "Clock")],
     "Arm": [
         ("cell.arm", "cell/arm.py", "Arm"),
+        ("class Arm(MovingArm)", "cell/arm.py", "MovingArm"),
         ("planning = cell.arm.plan(goal, task)", "cell/arm.py", "Planning"),
         ("motion = planning.result()", "cell/arm.py", "Motion"),
         ("goal = Goal(...)", "cell/arm.py", "Goal"),
@@ -84,7 +85,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
     ],
     "Test kit: fake cell": [
         ("fake = FakeCell()", "testing/fake_cell.py", "FakeCell"),
-        ("fake.world", "drivers/fake.py", "FakeWorld"),
+        ("fake.world", "drivers/fake_world.py", "FakeWorld"),
         ("fake.arm", "drivers/fake.py", "FakeArm"),
         ("fake.tool", "drivers/fake.py", "FakeTool"),
         ("fake.camera", "drivers/fake.py", "FakeCamera"),

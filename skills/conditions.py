@@ -6,6 +6,7 @@ from typing import TypeAlias
 
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
+from executive.cell.tools import GraspAttempt
 from executive.skill import ANY, HOLDING, In, Seconds, Skill, param, port
 
 Plain: TypeAlias = str | int | float | bool
@@ -133,7 +134,7 @@ class IsReachable(Skill):
     def run(self, cell: Cell) -> None:
         """Solve the inverse kinematics of the arm, without planning a motion."""
         object_class = cell.classes[self.target.label]
-        grasps = cell.tool_model.list_grasps(object_class, self.target, cell.motion)
+        grasps = cell.tool_model.list_grasps(object_class, self.target, cell.motion, GraspAttempt())
         problems = [cell.arm.describe_unreachable(grasp.goal) for grasp in grasps]
         if all(problems):
             raise self.failure("unreachable", f"{self.target.item}: {problems[0]}")

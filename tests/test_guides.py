@@ -26,8 +26,9 @@ from executive.mission.schema import make_mission_schema
 from executive.run.assembly import RunOptions, assemble
 from executive.station.check import load_checker
 from executive.testing.fake_cell import FakeCell
+from executive.text.files import list_shipped_missions
 from executive.text.findings import Source
-from executive.text.yaml_files import list_shipped_missions, parse_yaml
+from executive.text.yaml_files import parse_yaml
 from executive.tree.node import load_control_nodes
 
 LONGEST = 300.0

@@ -43,7 +43,7 @@ from executive.perception.detectors.envelope import MEASUREMENT_SUFFIX
 from executive.processes import WorkerPool
 from executive.record.run_directory import FOLDER_ADVICE, make_unique_folder
 from executive.run.operator import HALT_SIGNALS, handle_signals
-from executive.text.yaml_files import find_cell, find_mission, get_shipped_folder
+from executive.text.files import find_cell, find_mission, get_shipped_folder
 from executive.tree.node import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
 
 CONNECTION_TIMEOUT = 10.0

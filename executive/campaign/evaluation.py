@@ -21,8 +21,8 @@ from executive.perception.detectors import envelope
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
 from executive.perception.localization import CellLocalizer
 from executive.record.run_directory import write_atomically
+from executive.text.files import find_cell
 from executive.text.findings import suggest_choice
-from executive.text.yaml_files import find_cell
 from executive.training import evaluate
 from executive.training.dataset import LabelledImage
 from executive.training.evaluate import EvaluatedDetector, Mistake

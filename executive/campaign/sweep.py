@@ -25,7 +25,7 @@ from executive.perception.detectors.envelope import compute_fingerprint
 from executive.plugins import DISTRIBUTION, list_versions
 from executive.record.run_directory import make_dated_folder
 from executive.station.check import load_checker
-from executive.text.yaml_files import read_source
+from executive.text.files import read_source
 
 SIDES = ("a", "b")
 """Names of the folders of the two sweeps of a comparison."""

@@ -113,7 +113,26 @@ class Planning(Protocol):
         """
 
 
-class Arm(Protocol):
+class MovingArm(Protocol):
+    """State of the motion of an arm, and its stop: what the arm of a driver and the arm of skills share."""
+
+    @property
+    def at_rest(self) -> bool:
+        """True while the arm neither follows a motion nor brakes."""
+
+    @property
+    def collision(self) -> str | None:
+        """Description of the collision that ended the last motion, or None."""
+
+    @property
+    def contact_point(self) -> Sequence[float] | None:
+        """Point `(x, y, z)` [m] at which the last motion collided; None: unknown, or no collision."""
+
+    def stop(self) -> None:
+        """Start to brake along the path of the current motion, if any; return at once."""
+
+
+class Arm(MovingArm, Protocol):
     """A robot arm that plans and follows motions, as skills see it."""
 
     @property
@@ -127,18 +146,6 @@ class Arm(Protocol):
     @property
     def destination(self) -> Array:
         """Tool position `(3,)` [m] at the end of the current motion; at rest, the current position."""
-
-    @property
-    def at_rest(self) -> bool:
-        """True while the arm neither follows a motion nor brakes."""
-
-    @property
-    def collision(self) -> str | None:
-        """Description of the collision that ended the last motion, or None."""
-
-    @property
-    def contact_point(self) -> Sequence[float] | None:
-        """Point `(x, y, z)` [m] at which the last motion collided; None: unknown, or no collision."""
 
     def describe_unreachable(self, goal: Goal) -> str:
         """Return a sentence if no joint configuration within the limits reaches a goal, else ""."""
@@ -155,6 +162,3 @@ class Arm(Protocol):
 
     def start(self, motion: Motion, guard: MotionGuard = MotionGuard()) -> None:
         """Follow `motion` until its end or an event of `guard`; the arm must be at rest at its start."""
-
-    def stop(self) -> None:
-        """Start to brake along the path of the current motion, if any; return at once."""

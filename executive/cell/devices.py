@@ -15,7 +15,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.arm import Motion, MotionGuard
+from executive.cell.arm import Motion, MotionGuard, MovingArm
 from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.device_config import STEP
 from executive.cell.frame import Detection
@@ -135,7 +135,7 @@ def sleep_on(clock: Clock, duration: float) -> Iterator[None]:
         yield
 
 
-class ArmDevice(Protocol):
+class ArmDevice(MovingArm, Protocol):
     """An arm with its controller, which follows trajectories at its own rate."""
 
     @property
@@ -150,18 +150,6 @@ class ArmDevice(Protocol):
     def end_q(self) -> Array:
         """Commanded joint positions `(n,)` [rad] at the end of the current motion; at rest, those of now."""
 
-    @property
-    def at_rest(self) -> bool:
-        """True while the arm neither follows a motion nor brakes."""
-
-    @property
-    def collision(self) -> str | None:
-        """Description of the collision that ended the last motion, or None."""
-
-    @property
-    def contact_point(self) -> Sequence[float] | None:
-        """Point `(x, y, z)` [m] at which the last motion collided; None: unknown, or no collision."""
-
     def execute(self, motion: Motion, guard: MotionGuard) -> None:
         """Begin to follow `motion` from rest at its start; stop along its path as `guard` says.
 
@@ -171,9 +159,6 @@ class ArmDevice(Protocol):
         Raises:
             Fault: The arm is moving, or is not at the start of the motion.
         """
-
-    def stop(self) -> None:
-        """Start to brake along the path of the current motion, if any; return at once."""
 
 
 class CameraImage(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -75,6 +75,22 @@ class ToolMeasurement:
     contradiction: str = ""
     may_be_wrong: bool = False
     is_miss: bool = False
+
+
+class GraspAttempt(NamedTuple):
+    """One of several attempts to grasp an object.
+
+    Attributes:
+        number: Number of failed attempts before this one.
+        is_confirmed: True if a measurement of the tool has confirmed the properties of the class.
+        overtravel: Distance by which a guarded motion continues below the expected surface [m].
+        spacing: Distance between the contact points of repeated attempts [m].
+    """
+
+    number: int = 0
+    is_confirmed: bool = False
+    overtravel: float = OVERTRAVEL
+    spacing: float = CONTACT_SPACING
 
 
 class ToolModel(Section):
@@ -165,15 +181,7 @@ class ToolModel(Section):
         return object_class.height
 
     def list_grasps(
-        self,
-        object_class: ObjectClass,
-        target: Target,
-        motion: MotionConfig,
-        *,
-        attempt: int = 0,
-        is_confirmed: bool = False,
-        overtravel: float = OVERTRAVEL,
-        spacing: float = CONTACT_SPACING,
+        self, object_class: ObjectClass, target: Target, motion: MotionConfig, attempt: GraspAttempt
     ) -> Sequence[GraspPose]:
         """Return the possible grasps of an object, at least one, the best first.
 
@@ -181,10 +189,7 @@ class ToolModel(Section):
             object_class: Class of the object.
             target: Place of the object, and its yaw if it is known.
             motion: Heights and speed of guarded motions.
-            attempt: Number of failed attempts before this one.
-            is_confirmed: True if a measurement of the tool has confirmed the properties of the class.
-            overtravel: Distance by which a guarded motion continues below the expected surface [m].
-            spacing: Distance between the contact points of repeated attempts [m].
+            attempt: The attempt, which may have another grasp than the attempts before.
         """
         raise NotImplementedError(f"{type(self).__name__} does not define `list_grasps`")
 
@@ -203,7 +208,7 @@ class ToolModel(Section):
             position: Assumed centre of the object `(3,)` [m].
             height: Height of the tool centre point at the contact [m].
             classes: Classes of the cell by label.
-            overtravel: As in `list_grasps`.
+            overtravel: As in `GraspAttempt`.
         """
         return ToolMeasurement()
 

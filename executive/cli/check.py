@@ -46,8 +46,8 @@ def check_command(missions: tuple[str, ...], overrides: dict[str, str], cell: st
         from executive.behaviours import load_skills
         from executive.mission.load import load_mission
         from executive.station.check import load_checker
+        from executive.text.files import find_cell
         from executive.text.findings import MAX_LISTED_FINDINGS, Finding, MissionError, describe_findings
-        from executive.text.yaml_files import find_cell
 
         # The last garbage collection of the process would take 0.1 s. Commands that plan motions need this
         # collection, because ruckig would otherwise report its objects as leaks.

@@ -125,7 +125,7 @@ def check_simulator() -> Iterator[CheckResult]:
     """Load a simulated cell."""
     from executive.drivers.sim.world import World
     from executive.mission.cell_file import load_cell
-    from executive.text.yaml_files import get_shipped_folder
+    from executive.text.files import get_shipped_folder
 
     World(load_cell(get_shipped_folder() / "cells" / "overhead.yaml"))
     yield CheckResult("ok", "simulator", "loads the cell overhead")

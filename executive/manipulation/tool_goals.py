@@ -13,7 +13,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.frame import Detection, Frame
 from executive.cell.objects import BIN_THICKNESS, Bin, Item, ObjectClass, Obstacle, Target, is_quota_reached
 from executive.cell.protocols import Cell
-from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose
+from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspAttempt, GraspPose
 from executive.errors import Fault, NoDepth
 
 MAX_ROLL_DISTANCE = 0.002
@@ -113,18 +113,17 @@ def choose_grasp(
     Args:
         cell: The work cell.
         target: Target to grasp.
-        overtravel: Distance by which a guarded motion continues below the expected surface [m].
-        spacing: Distance between the contact points of repeated attempts [m].
+        overtravel: As in `GraspAttempt` [m].
+        spacing: As in `GraspAttempt` [m].
     """
-    grasps = cell.tool_model.list_grasps(
-        cell.classes[target.label],
-        target,
-        cell.motion,
-        attempt=cell.ledger.describe(target.item).attempts,
-        is_confirmed=cell.ledger.is_confirmed_by_tool(target.label),
-        overtravel=overtravel,
-        spacing=spacing,
+    attempt = GraspAttempt(
+        cell.ledger.describe(target.item).attempts,
+        cell.ledger.is_confirmed_by_tool(target.label),
+        overtravel,
+        spacing,
     )
+    object_class = cell.classes[target.label]
+    grasps = cell.tool_model.list_grasps(object_class, target, cell.motion, attempt)
     if not grasps:
         raise Fault(f'the tool "{cell.tool_model.kind}" lists no grasp of a {target.label}')
     return grasps[0], Task(obstacles=list_obstacles(cell, target.item), target=make_obstacle(cell, target))

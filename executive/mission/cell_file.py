@@ -15,6 +15,7 @@ from executive.cell.config import BinConfig, CellConfig, ObjectConfig
 from executive.cell.objects import BIN_THICKNESS
 from executive.errors import InputError
 from executive.geometry import Array
+from executive.text.files import find_file_below, has_outside_link, is_outside_path, read_source
 from executive.text.findings import Finding, MissionError, Source, Span, make_error, sort_findings
 from executive.text.validate import BASE_KEY, KeyPath, find_span, override_cell, validate
 from executive.text.yaml_files import (
@@ -22,12 +23,8 @@ from executive.text.yaml_files import (
     YamlNode,
     YamlScalar,
     YamlSequence,
-    find_file_below,
-    has_outside_link,
-    is_outside_path,
     list_scalars,
     parse_yaml,
-    read_source,
 )
 
 DETECTORS_KEY = "detectors"

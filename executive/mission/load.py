@@ -29,16 +29,10 @@ from executive.mission.ports import convert_setting, find_literals, find_wires
 from executive.perception.camera_model import find_calibration_doubts
 from executive.perception.detectors.envelope import find_unmeasured_detectors
 from executive.skill import Direction, Param, Port, Skill
+from executive.text.files import find_cell, find_file_below, find_mission, get_shipped_folder, read_source
 from executive.text.findings import Finding, MissionError, Source, make_warning, sort_findings
 from executive.text.validate import KeyPath
-from executive.text.yaml_files import (
-    find_cell,
-    find_file_below,
-    find_mission,
-    get_shipped_folder,
-    parse_yaml,
-    read_source,
-)
+from executive.text.yaml_files import parse_yaml
 from executive.tree.blackboard import Blackboard, NodeContext, Wiring
 from executive.tree.node import ControlNode, ControlNodes, load_control_nodes
 from executive.tree.specification import Constant, InvalidNode, LocatedName, Node, SkillNode, SubtreeNode

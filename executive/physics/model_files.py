@@ -25,9 +25,9 @@ from numpy.typing import ArrayLike, NDArray
 from executive.cell.arm_config import TOOL_LINK, ArmFile
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
+from executive.text.files import has_outside_link, is_outside_path
 from executive.text.findings import suggest_choice
 from executive.text.validate import KeyPath
-from executive.text.yaml_files import has_outside_link, is_outside_path
 
 MAX_MODEL_SIZE = 20_000_000
 """Maximum size of a model file [byte], to limit the duration of the check."""

@@ -25,7 +25,7 @@ from executive.record.run_directory import RunDirectory, format_tree, make_dated
 from executive.record.timeline import Timeline
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
-from executive.text.yaml_files import read_source
+from executive.text.files import read_source
 
 
 class View(Protocol):

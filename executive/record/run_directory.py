@@ -20,8 +20,8 @@ from executive.events import RunStarted
 from executive.mission.cell_file import CellFile
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.outline import OutlineNode
+from executive.text.files import get_shipped_folder
 from executive.text.findings import Source
-from executive.text.yaml_files import get_shipped_folder
 
 FOLDER_ADVICE = "name another folder with --runs DIR"
 """Advice if a run directory cannot be made or written."""

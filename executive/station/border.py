@@ -6,11 +6,8 @@ the behaviours of other projects. Replays, resumed runs and injected faults stan
 
 from __future__ import annotations
 
-import base64
 import contextlib
-import math
 import re
-import zlib
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import astuple, dataclass
@@ -20,20 +17,16 @@ from operator import attrgetter
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import JsonValue
 from pydantic_core import from_json, to_json
 
 from executive import errors
-from executive.cell.devices import CameraImage
 from executive.cell.frame import Answer, Detection, ErrorRates, Observation
 from executive.cell.protocols import BehaviourStep
 from executive.errors import Stopped
 from executive.events import Emit, InputRead, ToolCommanded
 from executive.geometry import Array, Yaw
-
-MAX_PIXELS = 10**8
-"""Maximum number of pixels of a recorded image."""
+from executive.station.camera import decode_image, encode_image
 
 _COLLECTION_TYPES: Mapping[str, type] = {kind.__name__: kind for kind in (tuple, set, frozenset)}
 """Types that JSON represents as a list, and that a recorded value names."""
@@ -61,45 +54,6 @@ class RecordedMotion:
 def decode_array(value: Any) -> Array:
     """Return nested lists of floats as an array."""
     return np.array(value, dtype=np.float64)
-
-
-def encode_image(image: CameraImage) -> dict[str, Any]:
-    """Return size, time and visible pixels of an image; the journal does not contain the colours.
-
-    Raises:
-        Fault: A camera returned something else than a valid image.
-    """
-    if problem := _describe_invalid_image(image):
-        raise errors.Fault(
-            f"a camera returned {problem}; `CameraImage` in executive.cell.devices is required"
-        )
-    visible = None if image.visible is None else _encode_mask(image.visible)
-    return {"size": list(image.colour.shape[:2]), "stamp": image.stamp, "visible": visible}
-
-
-def _describe_invalid_image(image: Any) -> str:
-    if not isinstance(image, CameraImage):
-        return f"a {type(image).__name__}"
-    for name, dtype in {"colour": np.uint8, "depth": np.floating, "visible": np.bool_}.items():
-        array = getattr(image, name)
-        if array is None and name != "colour":
-            continue
-        if not isinstance(array, np.ndarray):
-            return f"{type(array).__name__} as {name}"
-        size = np.shape(image.colour)[:2]
-        if array.shape != ((*size, 3) if name == "colour" else size) or not np.issubdtype(array.dtype, dtype):
-            return f"an array {array.shape} of {array.dtype} as {name}"
-    is_time = isinstance(image.stamp, int | float) and math.isfinite(image.stamp)
-    return "" if is_time else f"the stamp {image.stamp!r}"
-
-
-def decode_image(value: Any) -> CameraImage:
-    """Return a black image of the size and the time that `encode_image` encoded, without depth."""
-    height, width = value["size"]
-    if not 0 < height * width <= MAX_PIXELS:
-        raise ValueError(f"an image of {height} x {width} pixels")
-    visible = None if value["visible"] is None else _decode_mask(value["visible"], height, width)
-    return CameraImage(np.zeros((height, width, 3), np.uint8), None, value["stamp"], visible)
 
 
 def encode_detection(detection: Detection) -> list[Any]:
@@ -185,21 +139,6 @@ def _encode_value(value: object) -> list[Any] | str:
 
 def _decode_value(content: Any, collection_type: str = "") -> Any:
     return _COLLECTION_TYPES[collection_type](content) if collection_type else content
-
-
-def _encode_mask(mask: NDArray[np.bool_]) -> str:
-    """Return a mask as compressed bits in base64; "" if all pixels are True, to keep the journal short."""
-    if mask.all():
-        return ""
-    return base64.b64encode(zlib.compress(np.packbits(mask).tobytes())).decode("ascii")
-
-
-def _decode_mask(text: str, height: int, width: int) -> NDArray[np.bool_]:
-    """Return the mask `(height, width)` that `_encode_mask` encoded."""
-    if not text:
-        return np.ones((height, width), np.bool_)
-    packed_bits = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
-    return np.unpackbits(packed_bits, count=height * width).reshape(height, width).astype(np.bool_)
 
 
 IDENTITY = Codec(lambda value: value.item() if isinstance(value, np.generic) else value, lambda value: value)

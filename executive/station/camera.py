@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import base64
 import itertools
+import math
+import zlib
 from collections.abc import Callable, Collection
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig
-from executive.cell.devices import ArmDevice, CameraDevice
+from executive.cell.devices import ArmDevice, CameraDevice, CameraImage
 from executive.cell.frame import Box, Frame, TrueFrame
 from executive.cell.objects import Bin
 from executive.cell.protocols import Tool
@@ -21,6 +24,8 @@ from executive.motion.joints import Kinematics
 from executive.perception.camera_check import describe_displacement
 from executive.perception.camera_model import BORDER_FRACTION, compute_calibration, compute_hull_mask
 
+MAX_PIXELS = 10**8
+"""Maximum number of pixels of a recorded image."""
 MAX_LOAD_OFFSET = 0.015
 """Maximum distance of the centre of a held object from the axis of the tool [m]."""
 TOOL_SPHERE_RADIUS = 0.02
@@ -185,3 +190,55 @@ class CellCamera:
                         size = max(1, round(self.matrix[0, 0] * radius / z))
                         cv2.circle(occluded, (column, row), size, 1, -1)
         return occluded == 0
+
+
+def encode_image(image: CameraImage) -> dict[str, Any]:
+    """Return size, time and visible pixels of an image; the journal does not contain the colours.
+
+    Raises:
+        Fault: A camera returned something else than a valid image.
+    """
+    if problem := _describe_invalid_image(image):
+        raise Fault(f"a camera returned {problem}; `CameraImage` in executive.cell.devices is required")
+    visible = None if image.visible is None else _encode_mask(image.visible)
+    return {"size": list(image.colour.shape[:2]), "stamp": image.stamp, "visible": visible}
+
+
+def _describe_invalid_image(image: Any) -> str:
+    if not isinstance(image, CameraImage):
+        return f"a {type(image).__name__}"
+    for name, dtype in {"colour": np.uint8, "depth": np.floating, "visible": np.bool_}.items():
+        array = getattr(image, name)
+        if array is None and name != "colour":
+            continue
+        if not isinstance(array, np.ndarray):
+            return f"{type(array).__name__} as {name}"
+        size = np.shape(image.colour)[:2]
+        if array.shape != ((*size, 3) if name == "colour" else size) or not np.issubdtype(array.dtype, dtype):
+            return f"an array {array.shape} of {array.dtype} as {name}"
+    is_time = isinstance(image.stamp, int | float) and math.isfinite(image.stamp)
+    return "" if is_time else f"the stamp {image.stamp!r}"
+
+
+def decode_image(value: Any) -> CameraImage:
+    """Return a black image of the size and the time that `encode_image` encoded, without depth."""
+    height, width = value["size"]
+    if not 0 < height * width <= MAX_PIXELS:
+        raise ValueError(f"an image of {height} x {width} pixels")
+    visible = None if value["visible"] is None else _decode_mask(value["visible"], height, width)
+    return CameraImage(np.zeros((height, width, 3), np.uint8), None, value["stamp"], visible)
+
+
+def _encode_mask(mask: NDArray[np.bool_]) -> str:
+    """Return a mask as compressed bits in base64; "" if all pixels are True, to keep the journal short."""
+    if mask.all():
+        return ""
+    return base64.b64encode(zlib.compress(np.packbits(mask).tobytes())).decode("ascii")
+
+
+def _decode_mask(text: str, height: int, width: int) -> NDArray[np.bool_]:
+    """Return the mask `(height, width)` that `_encode_mask` encoded."""
+    if not text:
+        return np.ones((height, width), np.bool_)
+    packed_bits = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
+    return np.unpackbits(packed_bits, count=height * width).reshape(height, width).astype(np.bool_)

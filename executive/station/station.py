@@ -44,7 +44,7 @@ from executive.perception.localization import CellLocalizer
 from executive.station.border import Border
 from executive.station.camera import CellCamera, Robot
 from executive.station.planner_service import PlannedArm, PlannerService
-from executive.text.yaml_files import get_shipped_folder
+from executive.text.files import get_shipped_folder
 
 DeviceT = TypeVar("DeviceT")
 """Type of a device."""

@@ -13,7 +13,7 @@ from executive.mission.cell_file import load_cell
 from executive.perception.detectors.cell_detector import TruthDetector
 from executive.perception.detectors.detector_registry import DetectorContext
 from executive.station.station import CellOptions, SilentOperator, Station
-from executive.text.yaml_files import get_shipped_folder
+from executive.text.files import get_shipped_folder
 
 SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
 """Permitted bins of each class of the shipped cells."""

@@ -1,4 +1,4 @@
-"""Search for the files of missions and cells, and parsing of their YAML text to nodes with positions.
+"""YAML text of missions and cells, parsed to nodes with positions.
 
 A file can neither execute code nor exhaust the memory: tags are errors, and the size of the tree is limited.
 """
@@ -6,145 +6,14 @@ A file can neither execute code nor exhaust the memory: tags are errors, and the
 from __future__ import annotations
 
 import math
-import os.path
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
 
 import yaml
 from pydantic import JsonValue
 
-import executive
-from executive.errors import InputError
-from executive.text.findings import Finding, Source, Span, describe_value, make_error, suggest_choice
-
-_MAX_FILE_SIZE = 1_000_000
-"""Maximum size of a mission or cell file [byte]."""
-
-
-def is_outside_path(path_text: str) -> bool:
-    """Return True if a path may lead out of its folder: it is absolute, or contains `..` or a backslash."""
-    path = PurePosixPath(path_text)
-    return path.is_absolute() or ".." in path.parts or "\\" in path_text
-
-
-def has_outside_link(folder: Path, path_text: str) -> bool:
-    """Return True if a relative path leads out of a folder through a symbolic link."""
-    return not (folder / path_text).resolve().is_relative_to(folder.resolve())
-
-
-def get_shipped_folder() -> Path:
-    """Return the folder of the shipped missions, in a wheel or in a checkout."""
-    package = Path(executive.__file__).parent
-    wheel_folder = package / "shipped"
-    return wheel_folder if wheel_folder.is_dir() else package.parent / "missions"
-
-
-def list_shipped_missions() -> list[str]:
-    """Return the names of the shipped missions."""
-    return sorted(path.stem for path in get_shipped_folder().glob("*.yaml"))
-
-
-def find_mission(name: str | Path) -> Path:
-    """Return the mission file with the path `name`, or the shipped mission with this name.
-
-    Raises:
-        InputError: There is no such file and no such shipped mission.
-    """
-    return _find_file_or_shipped(str(name), "mission", Path("missions"))
-
-
-def find_cell(name: str) -> Path:
-    """Return the cell file with the path `name`, or the shipped cell with this name.
-
-    Raises:
-        InputError: There is no such file and no such shipped cell.
-    """
-    return _find_file_or_shipped(name, "cell", Path("missions/cells"))
-
-
-def _find_file_or_shipped(name: str, noun: str, folder: Path) -> Path:
-    path = Path(name)
-    # Unlike the methods of Path, these functions return False for invalid file names.
-    if os.path.isfile(path):
-        return path
-    if os.path.lexists(path):
-        raise InputError(f'"{name}" is {_describe_kind(path)}, not a file')
-    shipped_folder = get_shipped_folder() / folder.relative_to("missions")
-    shipped_files = {file.stem: file for file in sorted(shipped_folder.glob("*.yaml"))}
-    stem = name.removeprefix(f"{folder}/").removesuffix(".yaml")
-    if stem in shipped_files:
-        return shipped_files[stem]
-    hint = suggest_choice(stem, shipped_files, f"Shipped {noun}s")
-    raise InputError(f'there is no {noun} file and no shipped {noun} "{name}". {hint}')
-
-
-def find_file_below(folder: Path, reference: str, shipped_subfolders: Sequence[str] = ("",)) -> Path:
-    """Return the file with the relative path `reference` in `folder`, otherwise in a shipped subfolder.
-
-    Raises:
-        InputError: The reference leaves the folder, or the file does not exist.
-    """
-    if is_outside_path(reference):
-        advice = 'give a relative path without ".."'
-        raise InputError(f'"{reference}" is outside the folder of the file that names it; {advice}')
-    roots = (folder, *(get_shipped_folder() / subfolder for subfolder in shipped_subfolders))
-    for root in roots:
-        path = root / reference
-        if os.path.isfile(path):
-            if has_outside_link(root, reference):
-                raise InputError(f'"{reference}" is a link to a file outside {root}')
-            return path
-        if os.path.lexists(path):
-            raise InputError(f'"{reference}" in {_shorten_path(root)} is {_describe_kind(path)}, not a file')
-    subfolder = PurePosixPath(reference).parent
-    existing_files = {
-        path.relative_to(root).as_posix()
-        for root in roots
-        if os.path.isdir(root / subfolder)
-        for path in (root / subfolder).glob("*.yaml")
-    }
-    hint = suggest_choice(reference, sorted(existing_files), "Existing files")
-    folders = " or ".join(dict.fromkeys(map(_shorten_path, roots)))
-    raise InputError(f'there is no file "{reference}" in {folders}. {hint}')
-
-
-def read_source(path: Path) -> Source:
-    """Return the text of a file.
-
-    Raises:
-        InputError: The file is missing, too large, or not UTF-8 text.
-    """
-    try:
-        if path.exists() and not path.is_file():
-            raise InputError(f"{path} is {_describe_kind(path)}, not a file")
-        if path.stat().st_size > _MAX_FILE_SIZE:
-            limit = f"{_MAX_FILE_SIZE} bytes, the maximum size of a mission or a cell"
-            raise InputError(f"{path} is larger than {limit}")
-        return Source(_shorten_path(path), path.read_bytes().decode("utf-8-sig"))
-    except FileNotFoundError:
-        raise InputError(f"there is no file {path}") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not UTF-8 text: byte {error.start} is invalid") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}") from None
-
-
-def _describe_kind(path: str | Path) -> str:
-    if os.path.isdir(path):
-        return "a folder"
-    return "a pipe or a device" if os.path.exists(path) else "a link to nothing"
-
-
-def _shorten_path(path: Path) -> str:
-    """Return the path relative to the working directory; a path outside this directory is unchanged."""
-    try:
-        cwd = Path.cwd()
-    except FileNotFoundError:  # The working directory was deleted.
-        return str(path)
-    return str(path.relative_to(cwd)) if path.is_absolute() and path.is_relative_to(cwd) else str(path)
-
+from executive.text.findings import Finding, Source, Span, describe_value, make_error
 
 _MAX_DEPTH = 50
 """Maximum depth of the nesting of lists and mappings."""

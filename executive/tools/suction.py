@@ -14,7 +14,7 @@ from pydantic import Field
 from executive.cell.arm import Goal
 from executive.cell.device_config import Force, Length, MotionConfig
 from executive.cell.objects import ObjectClass, Target, list_top_heights
-from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose, ToolMeasurement, ToolModel, ToolPart
+from executive.cell.tools import OVERTRAVEL, GraspAttempt, GraspPose, ToolMeasurement, ToolModel, ToolPart
 from executive.geometry import Array, Pose
 
 if TYPE_CHECKING:
@@ -74,15 +74,7 @@ class Suction(ToolModel):
         return self.force
 
     def list_grasps(
-        self,
-        object_class: ObjectClass,
-        target: Target,
-        motion: MotionConfig,
-        *,
-        attempt: int = 0,
-        is_confirmed: bool = False,
-        overtravel: float = OVERTRAVEL,
-        spacing: float = CONTACT_SPACING,
+        self, object_class: ObjectClass, target: Target, motion: MotionConfig, attempt: GraspAttempt
     ) -> tuple[GraspPose]:
         """Return the grasp from above at the contact point of an attempt.
 
@@ -93,15 +85,15 @@ class Suction(ToolModel):
         x, y, z = map(float, target.pose_at(target.stamp).position)
         # After n failed attempts, the contact point on a solid object lies on a Vogel spiral, at the distance
         # spacing * sqrt(n) and the angle n * GOLDEN_ANGLE; on an object with a hole, it lies on the ring.
-        angle = attempt * GOLDEN_ANGLE
-        distance = object_class.contact_radius or spacing * math.sqrt(attempt)
+        angle = attempt.number * GOLDEN_ANGLE
+        distance = object_class.contact_radius or attempt.spacing * math.sqrt(attempt.number)
         contact_x = x + distance * math.cos(angle)
         contact_y = y + distance * math.sin(angle)
-        end_height = _compute_min_contact_height(object_class, z, overtravel)
-        if attempt >= ATTEMPTS_BEFORE_PROBE:
+        end_height = _compute_min_contact_height(object_class, z, attempt.overtravel)
+        if attempt.number >= ATTEMPTS_BEFORE_PROBE:
             end_height = min(end_height, z - object_class.height / 2 + PROBE_CLEARANCE)
         guarded_length = z + object_class.height / 2 + motion.descent - end_height
-        is_fast = is_confirmed and not attempt
+        is_fast = attempt.is_confirmed and not attempt.number
         goal = Goal(
             (contact_x, contact_y, end_height),
             guarded_length=guarded_length,

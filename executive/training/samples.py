@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
 from executive.errors import MAX_QUOTATION_LENGTH, InputError
 from executive.geometry import Array
-from executive.text.yaml_files import has_outside_link
+from executive.text.files import has_outside_link
 from executive.training import dataset
 from executive.training.dataset import DatasetEntry, LabelledImage
 

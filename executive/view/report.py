@@ -34,7 +34,7 @@ from executive.record.result import (
 )
 from executive.record.run_directory import RunDirectory, find_recorded_options, read_tree, write_atomically
 from executive.record.timeline import Activation, Timeline, find_last_failure, format_counts, group_by_node
-from executive.text.yaml_files import get_shipped_folder
+from executive.text.files import get_shipped_folder
 from executive.view import drawing
 from executive.view.drawing import NodeResult
 from executive.view.terminal import describe_place_on_table, format_repeat_command

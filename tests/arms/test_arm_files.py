@@ -19,8 +19,8 @@ from executive.station.check import load_checker
 from executive.station.station import Station
 from executive.testing.fake_cell import FakeCell
 from executive.testing.run_mission import run_mission
+from executive.text.files import get_shipped_folder
 from executive.text.findings import MissionError
-from executive.text.yaml_files import get_shipped_folder
 
 CELL = """\
 base: cells/overhead.yaml

@@ -12,7 +12,7 @@ from pybullet_utils.bullet_client import BulletClient
 from executive.arms.iiwa14 import Iiwa14
 from executive.geometry import Pose
 from executive.mission.cell_file import load_cell
-from executive.text.yaml_files import get_shipped_folder
+from executive.text.files import get_shipped_folder
 
 LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])
 ARM = Iiwa14(load_cell(get_shipped_folder() / "cells" / "overhead.yaml").arm, 0.12)

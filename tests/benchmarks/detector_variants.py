@@ -11,7 +11,7 @@ import yaml
 from executive.campaign.evaluation import ImageSettings, check_detector, list_detectors, measure_detector
 from executive.cell.config import CellConfig
 from executive.cli.shared import show_progress
-from executive.text.yaml_files import find_cell
+from executive.text.files import find_cell
 from executive.training.metrics import NO_OBJECT, Evaluation
 from tests.benchmarks.outside_the_envelope import SCENES
 from tests.benchmarks.report import Figures, run_command, write_json

@@ -14,6 +14,7 @@ import numpy as np
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass, Obstacle, Target
+from executive.cell.tools import GraspAttempt
 from executive.drivers.sim.models import compute_mass, load_mesh
 from executive.drivers.sim.scene import spawn_objects
 from executive.drivers.sim.world import World
@@ -32,7 +33,8 @@ MAX_TRIES = 50
 @contextmanager
 def open_world(cell: CellConfig) -> Iterator[tuple[World, Planner]]:
     """Yield a world without objects, and a planner that makes all checks of the planner of a run."""
-    world, clearance = World(cell), ClearanceChecker(cell)
+    world = World(cell)
+    clearance = ClearanceChecker(cell)
     try:
         yield world, Planner(cell, clearance.check)
     finally:
@@ -133,7 +135,10 @@ class SceneGenerator:
         centre = np.array([target.x, target.y, target.top - kind.height / 2])
         tool = self._cell.tool
         approach = tool.list_grasps(
-            kind, Target("object-1", kind.label, centre, 1.0, 0, 0, 0.0), motion, is_confirmed=True
+            kind,
+            Target("object-1", kind.label, centre, 1.0, 0, 0, 0.0),
+            motion,
+            GraspAttempt(is_confirmed=True),
         )[0].goal
         surface, force = self._measure_seal(first, approach.position[:2], target.top)
         drop = make_slot_goal(bin, slot, kind.height, self._tallest)

@@ -14,7 +14,7 @@ from events import at, item_changed
 from executive.campaign.jobs import MissionUnderTest, load_mission_under_test
 from executive.mission.cell_file import load_cell
 from executive.record.result import Audit, ItemCounts, Result
-from executive.text.yaml_files import find_cell
+from executive.text.files import find_cell
 from tests.benchmarks import (
     damaged_records,
     halts,

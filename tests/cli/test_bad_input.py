@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 
 from executive.behaviours import load_skills
 from executive.cli.main import main
-from executive.text.yaml_files import list_shipped_missions
+from executive.text.files import list_shipped_missions
 
 MISSION = """\
 mission: small

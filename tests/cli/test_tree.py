@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
-from executive.text.yaml_files import get_shipped_folder
+from executive.text.files import get_shipped_folder
 
 SHIPPED = sorted(path.stem for path in get_shipped_folder().glob("*.yaml"))
 QUICK = ("sort_overhead", "kit_fasteners")

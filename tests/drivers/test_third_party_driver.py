@@ -21,7 +21,7 @@ from executive.record.journal import read_journal
 from executive.station.station import Station
 from executive.testing.faults import during, grip_fails
 from executive.testing.run_mission import run_mission
-from executive.text.yaml_files import get_shipped_folder
+from executive.text.files import get_shipped_folder
 
 DRIVER = Path(__file__).with_name("lab_driver.py")
 PROJECT = """\

@@ -12,8 +12,8 @@ import pytest
 from executive.errors import InputError
 from executive.mission.load import LoadedMission
 from executive.station.check import CellChecker
+from executive.text.files import find_mission, get_shipped_folder
 from executive.text.findings import MissionError
-from executive.text.yaml_files import find_mission, get_shipped_folder
 from executive.tree.specification import Reference, SkillNode
 
 Load = Callable[..., LoadedMission]

@@ -19,8 +19,9 @@ from executive.mission.schema import (
     make_mission_schema,
 )
 from executive.skill import Skill
+from executive.text.files import get_shipped_folder
 from executive.text.findings import Source
-from executive.text.yaml_files import get_shipped_folder, parse_yaml
+from executive.text.yaml_files import parse_yaml
 from executive.tree.node import load_control_nodes
 
 MISSIONS = get_shipped_folder()

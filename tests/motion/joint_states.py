@@ -14,7 +14,7 @@ from executive.mission.cell_file import load_cell
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import JointLimits, Kinematics, build_kinematics
 from executive.motion.trajectory import MotionPiece
-from executive.text.yaml_files import get_shipped_folder
+from executive.text.files import get_shipped_folder
 
 CONFIG = load_cell(get_shipped_folder() / "cells" / "overhead.yaml")
 ARM = build_kinematics(CONFIG)

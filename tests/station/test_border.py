@@ -60,7 +60,8 @@ def test_every_member_of_a_part_is_an_input_or_a_command() -> None:
     members = {
         f"{role}.{name}": value
         for role, protocol in protocols.items()
-        for name, value in vars(protocol).items()
+        for owner in protocol.__mro__
+        for name, value in vars(owner).items()
         if not name.startswith("_")
     }
     attributes = {path for path, value in members.items() if isinstance(value, property)}

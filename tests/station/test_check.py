@@ -14,7 +14,7 @@ from executive.cell.config import CellConfig
 from executive.mission.cell_file import load_cell, read_cell
 from executive.motion.joints import build_kinematics
 from executive.station.check import CellChecker, find_pose_errors, find_view_errors, load_checker
-from executive.text.yaml_files import get_shipped_folder
+from executive.text.files import get_shipped_folder
 from tests.motion.joint_states import reach
 
 CELLS = get_shipped_folder() / "cells"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from executive.cell.arm import Goal
 from executive.cell.device_config import Force, Length, MotionConfig
 from executive.cell.objects import ObjectClass, Target
-from executive.cell.tools import CONTACT_SPACING, OVERTRAVEL, GraspPose, ToolModel, ToolPart
+from executive.cell.tools import GraspAttempt, GraspPose, ToolModel, ToolPart
 
 if TYPE_CHECKING:
     from executive.drivers.sim.tool import SimTool
@@ -57,23 +57,14 @@ class Magnet(ToolModel):
         return "" if object_class.label == "cube" else f"the magnet cannot hold a {object_class.label}"
 
     def list_grasps(
-        self,
-        object_class: ObjectClass,
-        target: Target,
-        motion: MotionConfig,
-        *,
-        attempt: int = 0,
-        is_confirmed: bool = False,
-        overtravel: float = OVERTRAVEL,
-        spacing: float = CONTACT_SPACING,
+        self, object_class: ObjectClass, target: Target, motion: MotionConfig, attempt: GraspAttempt
     ) -> tuple[GraspPose]:
         """Return the grasp at the middle of the top, where the magnet stops on contact."""
-        del attempt, is_confirmed, spacing
         x, y, z = map(float, target.pose_at(target.stamp).position)
         top = z + object_class.height / 2
         goal = Goal(
-            (x, y, top - overtravel),
-            guarded_length=motion.descent + overtravel,
+            (x, y, top - attempt.overtravel),
+            guarded_length=motion.descent + attempt.overtravel,
             guarded_speed=motion.descent_speed,
         )
         return (GraspPose(goal, contact_height=top),)

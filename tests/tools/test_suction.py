@@ -10,7 +10,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.device_config import MotionConfig
 from executive.cell.objects import ObjectClass, Target
-from executive.cell.tools import ToolMeasurement
+from executive.cell.tools import GraspAttempt, ToolMeasurement
 from executive.geometry import make_tool_down_pose
 from executive.tools.suction import CupContact, Suction, compute_breakaway_force, measure_contact
 
@@ -123,9 +123,9 @@ def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> No
     washer = ObjectClass("washer", 0.006, 0.025, contact_radius=0.017)
     target = Target("washer-1", "washer", np.array([0.5, 0.1, 0.013]), 0.9, 1, 0, 0.0)  # on another one
     motion = MotionConfig(descent=0.02, descent_speed=0.05)
-    (grasp,) = TOOL.list_grasps(washer, target, motion)
+    (grasp,) = TOOL.list_grasps(washer, target, motion, GraspAttempt())
     assert grasp.goal.position == pytest.approx((0.517, 0.1, 0.013))
     assert (grasp.goal.guarded_length, grasp.goal.guarded_speed) == pytest.approx((0.003 + 0.02, 0.05))
-    (further,) = TOOL.list_grasps(washer, target, motion, attempt=1, overtravel=0.001)
+    (further,) = TOOL.list_grasps(washer, target, motion, GraspAttempt(1, overtravel=0.001))
     assert further.goal.position[2] == pytest.approx(0.015)
     assert math.dist(further.goal.position[:2], (0.5, 0.1)) == pytest.approx(0.017)

@@ -11,7 +11,7 @@ import pytest
 from executive.behaviours import load_skills
 from executive.mission.load import read_mission
 from executive.skill import In, Out, Skill, param, port
-from executive.text.yaml_files import find_mission, get_shipped_folder
+from executive.text.files import find_mission, get_shipped_folder
 from executive.view.btcpp import format_btcpp
 
 COUNTERPARTS = {

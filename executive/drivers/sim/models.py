@@ -27,8 +27,8 @@ from executive.geometry import Array, Pose
 from executive.physics import model_files
 from executive.physics.model_files import find_model, make_rotation
 from executive.processes import build_command
+from executive.text.files import get_shipped_folder
 from executive.text.validate import KeyPath
-from executive.text.yaml_files import get_shipped_folder
 
 DEFAULT_MESH_MASS = 0.05
 """Mass of a mesh for which the cell file declares no mass [kg]."""

@@ -45,9 +45,10 @@ from executive.perception.camera_model import (
     compute_field_of_view,
     intersect_plane,
 )
+from executive.text.files import read_source
 from executive.text.findings import Finding, MissionError, make_error, sort_findings, suggest_choice
 from executive.text.validate import KeyPath, find_span, validate
-from executive.text.yaml_files import YamlNode, parse_yaml, read_source
+from executive.text.yaml_files import YamlNode, parse_yaml
 
 ANY_CLASS = "any"
 """Key in `objects` of the section for all classes without their own section."""

@@ -1,0 +1,125 @@
+"""World of a cell without physics: objects that lie on the table or in bins, or that the tool holds."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from executive.cell.config import CellConfig
+from executive.cell.devices import TrueObject
+from executive.cell.objects import BIN_THICKNESS, Bin, ObjectClass
+from executive.geometry import Array, Pose
+
+MAX_GRIP_OFFSET = 0.012
+"""Maximum horizontal distance between the tool and the contact points of an object for a grip [m]."""
+TOUCH_DISTANCE = 0.002
+"""Maximum vertical distance between the tool and the top of an object for contact [m]."""
+
+
+@dataclass(eq=False)
+class FakeWorld:
+    """Objects and bins of a fake cell.
+
+    Attributes:
+        classes: Classes of the objects, by label.
+        bins: The bins of the cell.
+        objects: The objects, in the order in which they were added.
+        removed_objects: The objects that were removed from the world.
+        held_object: The object that the tool holds, or None.
+        is_commanded: True if arm or tool has received a command since the last control step.
+    """
+
+    classes: Mapping[str, ObjectClass]
+    bins: Collection[Bin] = ()
+    objects: list[TrueObject] = field(default_factory=list)
+    removed_objects: list[TrueObject] = field(default_factory=list)
+    held_object: TrueObject | None = None
+    is_commanded: bool = False
+
+    def put(self, label: str, x: float, y: float) -> TrueObject:
+        """Put a new object of a class on the table, with its centre at `x` and `y` [m], and return it."""
+        position = np.array([x, y, self.classes[label].height / 2])
+        body = len(self.objects) + len(self.removed_objects)
+        fake_object = TrueObject(label, Pose.of(position), body, [position.copy()])
+        self.objects.append(fake_object)
+        return fake_object
+
+    def remove(self, fake_object: TrueObject) -> None:
+        """Remove an object that is not held."""
+        self.objects.remove(fake_object)
+        self.removed_objects.append(fake_object)
+
+    def release(self, *, is_dropped: bool = False) -> None:
+        """Let the held object fall straight down; if it is dropped, it rolls to a free position."""
+        if (fake_object := self.held_object) is None:
+            return
+        self.held_object = None
+        fake_object.position[2] = self.classes[fake_object.label].height / 2
+        fake_object.is_dropped = is_dropped
+        if is_dropped:
+            self._roll_to_free_position(fake_object)
+        fake_object.rest_positions.append(fake_object.position.copy())
+
+    def _roll_to_free_position(self, fake_object: TrueObject) -> None:
+        """Move an object off each overlapping object in turn, or from the wall of a bin into the bin."""
+        radius = self.classes[fake_object.label].radius
+        for obstacle in self.objects if self.find_bin(fake_object) is None else ():
+            min_distance = radius + self.classes[obstacle.label].radius
+            direction = fake_object.position[:2] - obstacle.position[:2]
+            distance = float(np.linalg.norm(direction))
+            if obstacle is not fake_object and distance < min_distance:
+                direction = direction / distance if distance else np.array((1.0, 0.0))
+                fake_object.position[:2] = obstacle.position[:2] + min_distance * direction
+        if (bin := self.find_bin(fake_object)) is not None:
+            max_offset = np.maximum(bin.size[:2] / 2 - radius, 0.0)
+            offset = fake_object.position[:2] - bin.position[:2]
+            fake_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
+
+    def find_bin(self, fake_object: TrueObject) -> Bin | None:
+        """Return the bin that contains an object; if there is none, the bin on whose wall the object lies."""
+        wall_margin = BIN_THICKNESS + self.classes[fake_object.label].radius / 2
+        places = product((0.0, wall_margin), self.bins)
+        return next((bin for margin, bin in places if bin.contains(fake_object.position, margin)), None)
+
+    def find_touched_object(self, tip_position: Array) -> TrueObject | None:
+        """Return the object that a tool at `tip_position` `(3,)` [m] touches from above, or None."""
+        for fake_object in self.objects:
+            object_class = self.classes[fake_object.label]
+            distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))
+            offset = abs(distance - object_class.contact_radius)
+            gap = abs(float(fake_object.position[2]) + object_class.height / 2 - tip_position[2])
+            is_touched = offset <= MAX_GRIP_OFFSET and gap <= TOUCH_DISTANCE
+            if is_touched and fake_object is not self.held_object:
+                return fake_object
+        return None
+
+
+def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
+    """Put objects of random classes on random grid points, as many as the cell file permits."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(*config.table.objects, endpoint=True))
+    points = list_grid_points(config)
+    for index in rng.permutation(len(points))[:count]:
+        world.put(str(rng.choice(list(config.objects))), *points[index])
+
+
+def list_grid_points(config: CellConfig) -> list[tuple[float, float]]:
+    """Return the points on the table at which objects can lie beside each other [m]."""
+    distance = 2 * max(object_class.radius for object_class in config.objects.values()) + config.table.gap
+    sides = config.table.x, config.table.y
+    xs, ys = (np.linspace(low, high, 1 + int((high - low) / distance)) for low, high in sides)
+    return [(float(x), float(y)) for x in xs for y in ys]
+
+
+def encode_object(fake_object: TrueObject) -> list[object]:
+    """Return the arguments of `decode_object` after the number, for the log."""
+    return [fake_object.label, fake_object.is_dropped, fake_object.position, *fake_object.rest_positions]
+
+
+def decode_object(body: int, label: object, is_dropped: object, *positions: object) -> TrueObject:
+    """Return an object from the log: `positions` are the current position and the rest positions."""
+    position, *rest_positions = np.array(positions, dtype=float).reshape(-1, 3)
+    return TrueObject(str(label), Pose.of(position), body, rest_positions, bool(is_dropped))
