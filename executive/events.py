@@ -12,8 +12,8 @@ from typing import Annotated, ClassVar, Final, Literal, TypeAlias
 
 from pydantic import ConfigDict, Field, JsonValue
 
-JOURNAL_FORMAT: Final = 3
-"""Version of the journal format."""
+JOURNAL_FORMAT: Final = 4
+"""Version of the journal format. Runs of format 3 have other inputs, and can only be reported."""
 
 RunStatus: TypeAlias = Annotated[str, Field(pattern="^(SUCCESS|INCOMPLETE|FAILURE|FAULT|HALTED)$")]
 """Final status of a run; INCOMPLETE if the tree succeeded but items were rejected."""
@@ -242,7 +242,7 @@ class RunStarted(Event):
     base: str
     step: float
     versions: Mapping[str, str]
-    format: Literal[3] = JOURNAL_FORMAT
+    format: Literal[3, 4] = JOURNAL_FORMAT
     cell: str = ""
 
 

@@ -258,6 +258,7 @@ def read_journal(path: Path) -> list[TimedEvent]:
         content = path.read_bytes()
     timed_events: list[TimedEvent] = []
     control_period = 0.0
+    has_present_inputs = True
     clock_offsets = [(0, 0.0)]  # Tick and value of each reading of the clock, without discarded ticks.
     lines = content[: _measure_valid_length(content)].splitlines()
     for line_number, line in enumerate(lines, start=1):
@@ -266,6 +267,7 @@ def read_journal(path: Path) -> list[TimedEvent]:
             event = timed.event
             if isinstance(event, RunStarted):
                 control_period = event.step
+                has_present_inputs = event.format == JOURNAL_FORMAT
             elif isinstance(event, events.RunResumed):
                 kept_offsets = [reading for reading in clock_offsets if reading[0] < event.valid_ticks]
                 clock_offsets = kept_offsets or [(0, 0.0)]
@@ -276,7 +278,7 @@ def read_journal(path: Path) -> list[TimedEvent]:
                 if not isinstance(event.value, int | float):
                     raise ValueError(f"the clock is {event.value!r}, not a time in seconds")
                 clock_offsets.append((timed.tick, event.value))
-            elif isinstance(event, events.InputRead) and not event.exception:
+            elif isinstance(event, events.InputRead) and not event.exception and has_present_inputs:
                 check_input(event.name, event.value)
         except ValueError as error:
             problem = f"{path}:{line_number}: this line is no event ({error})"

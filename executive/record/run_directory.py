@@ -16,7 +16,7 @@ from executive.cell.arm_config import DEFAULT_ARM_FILE
 from executive.cell.config import CellConfig
 from executive.cell.devices import find_driver_options
 from executive.errors import InputError, explain_os_errors
-from executive.events import RunStarted
+from executive.events import JOURNAL_FORMAT, RunStarted
 from executive.mission.cell_file import CellFile
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.outline import OutlineNode
@@ -171,8 +171,12 @@ def read_mission_of_run(
 
     Raises:
         MissionError: The mission has errors, for instance because installed skills have changed.
-        InputError: A file in the directory cannot be read.
+        InputError: A file in the directory cannot be read, or an earlier version recorded the run.
     """
+    if start.format != JOURNAL_FORMAT:
+        limits = f"its journal has format {start.format} instead of {JOURNAL_FORMAT}"
+        advice = "it can be reported, but neither replayed nor resumed; run the mission again"
+        raise InputError(f'an earlier version recorded the run in "{path}", and {limits}; {advice}')
     # The recorded cell file already contains the overrides of the cell.
     overrides = {key: text for key, text in start.overrides.items() if not key.startswith("cell.")}
     cell_path = Path(start.base) / "cell.yaml"
@@ -192,7 +196,9 @@ def read_cell(path: Path) -> CellConfig:
         default_arm = yaml.safe_load((get_shipped_folder() / DEFAULT_ARM_FILE).read_text(encoding="utf-8"))
         return CellConfig(**{**content, "arm": {**default_arm, **content["arm"]}})
     except ValidationError as error:
-        problems = "; ".join(f"{'.'.join(map(str, each['loc']))}: {each['msg']}" for each in error.errors())
+        texts = (each["msg"].removeprefix("Value error, ") for each in error.errors())
+        keys = (".".join(map(str, each["loc"])) for each in error.errors())
+        problems = "; ".join(map(": ".join, zip(keys, texts, strict=True)))
         advice = "install the packages that the run used"
         raise InputError(
             f'the cell file in the run directory "{path}" is invalid: {problems}; {advice}'

@@ -200,7 +200,7 @@ HALTED = '{"kind": "RunHalted", "tick": 1, "clock": 0.1, "is_tree_ticked": true}
         (encode_event(at(1, read("clock", "now"))), "the clock is 'now'"),
         (encode_event(at(1, skill_ended("a"))).replace(b"SUCC", b"ODDN"), '"status" of NodeEnded'),
         (
-            encode_event(at(0, run_started())).replace(b'"format": 3', b'"format": 2'),
+            encode_event(at(0, run_started())).replace(b'"format": 4', b'"format": 2'),
             '"format" of RunStarted',
         ),
     ],
@@ -211,6 +211,12 @@ def test_a_line_that_is_no_event_is_an_error_with_its_number(path, line, why):
         read_journal(path)
     assert str(raised.value).startswith(f"{path}:2: this line is no event (")
     assert why in str(raised.value)
+
+
+def test_inputs_of_an_earlier_format_are_read_as_they_are(path: Path) -> None:
+    start = encode_event(at(0, run_started())).replace(b'"format": 4', b'"format": 3')
+    path.write_bytes(start + encode_event(at(1, read("observations", [["a value of five parts"]]))))
+    assert [type(timed.event).__name__ for timed in read_journal(path)] == ["RunStarted", "InputRead"]
 
 
 @pytest.mark.parametrize(

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
 import pytest
+from events import run_started
 
+from executive.behaviours import load_skills
 from executive.errors import InputError
 from executive.mission.outline import Connection, OutlineNode
 from executive.record.run_directory import (
     RunDirectory,
     format_tree,
     make_dated_folder,
+    read_mission_of_run,
     read_tree,
     write_atomically,
 )
@@ -81,3 +85,8 @@ def test_a_tree_is_read_as_it_was_written_and_values_that_json_lacks_as_text(tmp
     file.write_text("{}")
     with pytest.raises(InputError, match="contains no tree of a run"):
         read_tree(file)
+
+
+def test_the_run_of_an_earlier_version_is_neither_replayed_nor_resumed(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="can be reported, but neither replayed nor resumed"):
+        read_mission_of_run(tmp_path, replace(run_started(), format=3), load_skills())
