@@ -6,7 +6,7 @@ import difflib
 import inspect
 import re
 import threading
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
 from functools import cache, partial
@@ -33,7 +33,7 @@ from py_trees.common import Status
 from py_trees.ports import PortInformation, PortsMixin
 
 from executive.cell.protocols import BehaviourStep, Cell, Clock, Steps
-from executive.errors import Fault, InputError
+from executive.errors import Fault, InputError, Interrupted, to_text
 from executive.plugins import CLASS_PATH, PluginEntry, list_entries
 from executive.skill import Direction, Param, Port, Skill, get_attribute_name, param
 
@@ -331,24 +331,33 @@ def _explain_failure(behaviour: Behaviour) -> str:
     """Return the feedback message of a failed behaviour; if empty, the message of the failed descendant."""
     failed_node = behaviour.tip()
     if behaviour.feedback_message or failed_node in (None, behaviour):
-        return behaviour.feedback_message or "it has no feedback message"
-    return f"{failed_node.name}: {failed_node.feedback_message or 'no feedback message'}"
+        return to_text(behaviour.feedback_message or "it has no feedback message")
+    return to_text(f"{failed_node.name}: {failed_node.feedback_message or 'no feedback message'}")
 
 
 def _stop_and_shut_down(behaviour: Behaviour) -> None:
-    """Stop the running nodes of a behaviour, also after an exception of a node; then shut all nodes down."""
-    errors = []
-    for node in (behaviour, *behaviour.iterate()):
-        if node.status is Status.RUNNING:
-            try:
-                node.stop(Status.INVALID)
-            except Exception as error:
-                node.status = Status.INVALID
-                errors.append(error)
-    for node in behaviour.iterate():
-        node.shutdown()
+    """Stop the running nodes of a behaviour, and shut all nodes down, also after an exception of a node."""
+    errors: list[BaseException] = []
+    actions: list[Callable[[], None]] = [partial(_stop, node) for node in (behaviour, *behaviour.iterate())]
+    actions += [node.shutdown for node in behaviour.iterate()]
+    for action in actions:
+        try:
+            action()
+        except Interrupted:
+            raise
+        except BaseException as error:
+            errors.append(error)
     if errors:
-        raise errors[0]
+        # The halted generator would take a `GeneratorExit` for its own.
+        raise Fault("GeneratorExit") if isinstance(errors[0], GeneratorExit) else errors[0]
+
+
+def _stop(node: Behaviour) -> None:
+    if node.status is Status.RUNNING:
+        try:
+            node.stop(Status.INVALID)
+        finally:
+            node.status = Status.INVALID
 
 
 SKILL_GROUP = "executive.skills"

@@ -9,6 +9,8 @@ from enum import IntEnum
 
 MAX_QUOTATION_LENGTH = 200
 """Maximum length of a quotation or word in a message [characters]."""
+MAX_TEXT_LENGTH = 10_000
+"""Maximum length of a text in an event [characters]."""
 _CONTROL_CHARACTER = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff]"
 )
@@ -102,6 +104,33 @@ class Stopped(BaseException):
 
     A halt is not a failure, so `except Exception` in a skill does not catch this exception.
     """
+
+
+class Interrupted(KeyboardInterrupt):
+    """A signal that ends the process at once; a `KeyboardInterrupt` of a skill is a fault like any other."""
+
+
+class TickOverdue(BaseException):
+    """A control step does not end, for instance because of an endless loop in a skill.
+
+    The exception ends the loop also if the loop contains `except Exception`.
+    """
+
+
+def to_text(value: object) -> str:
+    """Return the text of any value, without its middle if it is longer than `MAX_TEXT_LENGTH`."""
+    try:
+        text = str(value)
+    except Exception:  # The value may be an object of another project.
+        return f"a {type(value).__name__} without text"
+    half_length = MAX_TEXT_LENGTH // 2
+    return text if len(text) <= MAX_TEXT_LENGTH else f"{text[:half_length]}…{text[1 - half_length :]}"
+
+
+def describe_error(error: BaseException) -> str:
+    """Return the message of an error of this project, or the class and the message of another exception."""
+    text = to_text(error)
+    return text if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {text}"
 
 
 def describe_os_error(error: OSError) -> str:

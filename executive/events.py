@@ -12,6 +12,8 @@ from typing import Annotated, ClassVar, Final, Literal, TypeAlias
 
 from pydantic import ConfigDict, Field, JsonValue
 
+from executive.errors import MAX_TEXT_LENGTH, to_text
+
 JOURNAL_FORMAT: Final = 4
 """Version of the journal format. Runs of format 3 have other inputs, and can only be reported."""
 
@@ -23,7 +25,9 @@ NodeStatus: TypeAlias = Annotated[str, Field(pattern="^(SUCCESS|FAILURE|INVALID)
 
 @dataclass(frozen=True)
 class Event:
-    """Base class of the events.
+    """Base class of the events; a value of any other type becomes a text where a text is declared.
+
+    The texts of an event may come from code of other projects, for instance the message of a failure.
 
     Attributes:
         is_recorded: True if events of this class are written to the journal.
@@ -33,6 +37,19 @@ class Event:
 
     # With `strict`, Pydantic rejects a value of the wrong type instead of converting it.
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(strict=True)
+
+    _text_names: ClassVar[tuple[str, ...]] = ()
+    """Names of the fields that are declared as texts."""
+
+    def __init_subclass__(cls) -> None:
+        cls._text_names = tuple(name for name, declared in cls.__annotations__.items() if declared == "str")
+
+    def __post_init__(self) -> None:
+        values = vars(self)
+        for name in self._text_names:
+            value = values[name]
+            if type(value) is not str or len(value) > MAX_TEXT_LENGTH:
+                values[name] = to_text(value)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from executive.errors import InputError, explain_os_errors
+from executive.errors import InputError, Interrupted, explain_os_errors, to_text
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -62,10 +62,12 @@ class PluginEntry:
         """
         try:
             return EntryPoint(self.name, self.value, "").load()
-        except Exception as error:  # The import runs third-party code, which may raise any exception.
+        except Interrupted:
+            raise
+        except BaseException as error:  # The import runs third-party code, which may raise any exception.
             raise InputError(
                 f'the {self.noun} "{self.name}" ({self.value}) cannot be loaded: {type(error).__name__}: '
-                f"{error}{_locate_error(error)}; correct it, or {self.remedy}"
+                f"{to_text(error)}{_locate_error(error)}; correct it, or {self.remedy}"
             ) from error
 
 
@@ -126,7 +128,7 @@ def _enable_project_entries(group: str, noun: str, project: Project | None) -> I
         yield PluginEntry(name, value, noun, f"remove it from {project.file}")
 
 
-def _locate_error(error: Exception) -> str:
+def _locate_error(error: BaseException) -> str:
     """Return the clause `, in FILE:LINE` about the plugin code that raised an error, or "" if not found."""
     if isinstance(error, SyntaxError):
         return ""  # The message of a syntax error already names file and line.

@@ -1,4 +1,7 @@
-"""Child processes: worker pools, commands that run a module, waits; and garbage collection of a process."""
+"""Processes and threads: worker pools, commands that run a module, waits, and ends of threads and processes.
+
+A thread that code of another project leaves behind never keeps a process alive.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,11 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from contextlib import contextmanager
+from multiprocessing import util as multiprocessing_util
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -22,6 +27,8 @@ THREAD_COUNT_VARIABLES = ("OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 MAX_BLOCKING_TIME = 0.05
 """Maximum uninterrupted wait for another thread [s]; within this time, Python handles a signal, for example
 a second Ctrl-C, which ends the process at once."""
+MAX_END_TIME = 5.0
+"""Maximum time for the end of threads, after which a process ends without the end of its threads [s]."""
 CONTROL_THRESHOLD = 700
 """Number of new objects after which Python collects garbage between control steps: the default of Python."""
 
@@ -79,6 +86,8 @@ def _initialize_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     threading.Thread(target=_exit_with_parent, name="exit with parent", daemon=True).start()
+    # A process of a pool calls its finalizers when it ends, before it waits for its threads.
+    multiprocessing_util.Finalize(None, limit_end_time, exitpriority=0)
 
 
 def _exit_with_parent() -> None:
@@ -88,6 +97,28 @@ def _exit_with_parent() -> None:
     # `join` waits for the parent process, not for the thread that started this process.
     parent.join()
     os._exit(1)
+
+
+def limit_end_time(exit_code: int = 0) -> None:
+    """Let this process, which is about to end, end after `MAX_END_TIME` although a thread still runs."""
+
+    def end_process() -> None:
+        time.sleep(MAX_END_TIME)
+        threads = {*threading.enumerate()} - {threading.main_thread()}
+        names = sorted(f'"{thread.name}"' for thread in threads if not thread.daemon)
+        problem = f"still running after {MAX_END_TIME:.0f} s: {', '.join(names)}"
+        sys.stderr.write(f"note: the process ends without waiting for its threads, {problem}\n")
+        sys.stderr.flush()
+        os._exit(exit_code)
+
+    threading.Thread(target=end_process, name="end process", daemon=True).start()
+
+
+def shut_down(pool: ThreadPoolExecutor) -> None:
+    """Cancel the pending calls of a pool, and wait at most `MAX_END_TIME` for the end of the running call."""
+    waiter = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
+    waiter.start()
+    waiter.join(MAX_END_TIME)
 
 
 def build_command(module: str, *arguments: str) -> list[str]:

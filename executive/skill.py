@@ -17,7 +17,7 @@ from enum import Enum
 from typing import Annotated, Any, ClassVar, TypeVar, get_args, get_origin, get_type_hints
 
 from executive.cell.protocols import Cell
-from executive.errors import InputError
+from executive.errors import InputError, to_text
 
 T = TypeVar("T")
 """Type of the value of a port."""
@@ -152,7 +152,8 @@ class SkillFailed(Exception):
     def __init__(self, reason: str, message: str) -> None:
         super().__init__(message)
         self.reason = reason
-        self.message = message
+        # A skill may give any object, for instance a measured value.
+        self.message = to_text(message)
 
 
 class Skill:

@@ -82,15 +82,17 @@ def test_drivers_and_kinds_of_detectors_are_found_likewise(project: Write) -> No
         ("detectors", "kind of detector", lambda: find_detector_kinds()["wave"].load()),
     ],
 )
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [("import nowhere\n", "ModuleNotFoundError"), ("raise SystemExit(0)\n", "SystemExit: 0")],
+)
 def test_what_cannot_be_loaded_is_named_with_place_and_file(
-    project: Write, group: str, kind: str, ask: Callable[[], object]
+    project: Write, group: str, kind: str, ask: Callable[[], object], text: str, error: str
 ) -> None:
-    file = project("hall_five", "import nowhere\n", **{group: 'wave = "hall_five.part:Wave"'})
+    file = project("hall_five", text, **{group: 'wave = "hall_five.part:Wave"'})
     with pytest.raises(InputError) as caught:
         ask()
-    assert f'the {kind} "wave" (hall_five.part:Wave) cannot be loaded: ModuleNotFoundError' in str(
-        caught.value
-    )
+    assert f'the {kind} "wave" (hall_five.part:Wave) cannot be loaded: {error}' in str(caught.value)
     assert f"in {file.parent}/hall_five/part.py:1; correct it, or remove it from {file}" in str(caught.value)
 
 

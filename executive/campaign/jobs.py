@@ -18,7 +18,7 @@ from typing import TypeVar
 
 from executive.behaviours import load_skills
 from executive.campaign.results import RunRecord, RunRow, SweepSettings, make_record
-from executive.errors import ExecutiveError, InputError
+from executive.errors import InputError, describe_error
 from executive.mission.load import LoadedMission, load_mission
 from executive.processes import WorkerPool, kill_workers
 from executive.record.recorded_run import RecordOptions, record_run
@@ -235,9 +235,13 @@ def run_job(job: SweepJob) -> RunRecord:
 
 def make_fault_record(job: SweepJob, error: BaseException) -> RunRecord:
     """Return the record of a run that raised an exception or whose processes died."""
-    text = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
     run = RunRow(
-        run_index=job.index, seed=job.seed, variant=job.variant, status="FAULT", reason="fault", message=text
+        run_index=job.index,
+        seed=job.seed,
+        variant=job.variant,
+        status="FAULT",
+        reason="fault",
+        message=describe_error(error),
     )
     return RunRecord(run)
 

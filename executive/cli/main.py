@@ -5,9 +5,9 @@ from __future__ import annotations
 import difflib
 import gc
 import io
-import signal
 import sys
 import tempfile
+import threading
 import traceback
 from collections.abc import Mapping, Sequence
 from importlib import import_module
@@ -16,8 +16,8 @@ from typing import Any
 import click
 
 from executive.cli.shared import use_tolerant_streams
-from executive.errors import ExecutiveError, ExitCode, shorten_quotations
-from executive.run.operator import TERMINATION_SIGNALS, handle_signals
+from executive.errors import ExecutiveError, ExitCode, shorten_quotations, to_text
+from executive.run.operator import HALT_SIGNALS, handle_signals, interrupt
 
 COMMANDS: Mapping[str, str] = {
     "run": "run",
@@ -76,9 +76,10 @@ class CommandGroup(click.Group):
         gc.set_threshold(START_THRESHOLD)
         with use_tolerant_streams():
             try:
-                with handle_signals(TERMINATION_SIGNALS, signal.default_int_handler):
+                with handle_signals(HALT_SIGNALS, interrupt):
                     exit_code = super().main(args, **{**options, "standalone_mode": False})
-            except (Exception, KeyboardInterrupt) as error:
+            except BaseException as error:
+                # Also a `SystemExit` of a plugin: the exit code is that of the command.
                 exit_code = _show_error(error, debug="--debug" in args)
         sys.exit(exit_code if isinstance(exit_code, int) else 0)
 
@@ -90,7 +91,7 @@ def _show_error(error: BaseException, *, debug: bool) -> ExitCode:
         error.show(message_buffer)
         click.echo(shorten_quotations(message_buffer.getvalue()), err=True, nl=False)
         return ExitCode.INVALID_INPUT
-    if isinstance(error, (click.Abort, KeyboardInterrupt)):
+    if isinstance(error, click.Abort | KeyboardInterrupt):
         click.echo("halted", err=True)
         return ExitCode.HALTED
     if debug:
@@ -112,7 +113,7 @@ def _save_traceback(error: BaseException) -> str:
         "w", prefix="executive-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
     ) as file:
         traceback.print_exception(error, file=file)
-    text = shorten_quotations(f"{type(error).__name__}: {error}")
+    text = shorten_quotations(f"{type(error).__name__}: {to_text(error)}")
     advice = f"{file.name} contains the traceback, and `executive --debug ...` prints it"
     return f"internal error ({text}); {advice}"
 
@@ -129,5 +130,18 @@ def main(debug: bool) -> None:
     del debug  # `CommandGroup.main` reads the option, because it also handles errors outside of commands.
 
 
+def run_command_line() -> None:
+    """Run the command in `sys.argv`, and end this process with its exit code."""
+    try:
+        main()
+    except SystemExit as end:
+        if threading.active_count() > 1:
+            # The import takes 15 ms, for which `--help` must not wait.
+            from executive.processes import limit_end_time
+
+            limit_end_time(int(end.code or 0))
+        raise
+
+
 if __name__ == "__main__":
-    main()
+    run_command_line()

@@ -14,7 +14,7 @@ from typing import Protocol
 import yaml
 
 from executive.cell.devices import find_driver_options
-from executive.errors import ExecutiveError
+from executive.errors import ExecutiveError, InputError, describe_error
 from executive.events import Observer, TimedEvent
 from executive.mission.load import LoadedMission
 from executive.mission.outline import make_outline
@@ -144,7 +144,10 @@ def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, fol
     }
     for option, value in options.driver_options.items():
         if find_driver_options(loaded.cell_config.kind)[option] == "file":
-            texts[f"{option}.yaml"] = read_source(Path(value)).text
+            file_name = f"{option}.yaml"
+            if file_name in texts:
+                raise InputError(f'an option of a driver may not be called "{option}"; rename it')
+            texts[file_name] = read_source(Path(value)).text
     name = f"{loaded.mission.name}_s{options.seed}"
     directory = RunDirectory(make_dated_folder(folder, name, datetime.now()))
     directory.save_inputs(texts, loaded.libraries)
@@ -187,7 +190,12 @@ def execute_recorded(
                 observer(timed)
         run.add_recorder(recorder)
         run_end = run.execute()
-        audit = run.station.audit()
+        audit = None
+        try:
+            audit = run.station.audit()
+        except Exception as error:  # The driver may be code of another project.
+            message = f"the true state of the world cannot be read: {describe_error(error)}"
+            run_end = replace(run_end, status="FAULT", reason="fault", message=message, node="")
     station = run.station
     path = recorder.directory.path
     item_counts = station.ledger.count_states()

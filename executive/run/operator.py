@@ -11,19 +11,17 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
-from executive.errors import InputError, Stopped
+from executive.errors import InputError, Interrupted, Stopped, TickOverdue
 
 if TYPE_CHECKING:
     from executive.events import Emit
 
 PAUSE_POLL_PERIOD = 0.05
 """Period at which a paused run handles signals and calls the callbacks of `call_between_ticks` [s]."""
-TERMINATION_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
-"""Signals other than SIGINT that request the end of a process."""
-HALT_SIGNALS = (signal.SIGINT, *TERMINATION_SIGNALS)
-"""Signals that halt a run."""
+HALT_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals that halt a run, and that end any other command."""
 
 
 class RunControl:
@@ -34,13 +32,15 @@ class RunControl:
     Attributes:
         is_stopped: True after the first call of `stop`.
         is_idle: True while `wait_while_paused` has nothing to do.
-        hold_time: Function that returns a context in which the clock of the run stands still.
+        is_time_held: True while the run waits for a person.
+        hold_clock: Function that returns a context in which the clock of the run stands still.
     """
 
     def __init__(self) -> None:
         self.is_stopped = False
         self.is_idle = True
-        self.hold_time: Callable[[], AbstractContextManager[None]] = nullcontext
+        self.is_time_held = False
+        self.hold_clock: Callable[[], AbstractContextManager[None]] = nullcontext
         self._is_paused = False
         self._remaining_ticks = 0
         """Number of ticks that `step` requested and that have not begun."""
@@ -93,6 +93,16 @@ class RunControl:
         self._callbacks.append(callback)
         self.is_idle = False
 
+    @contextmanager
+    def hold_time(self) -> Iterator[None]:
+        """Let the clock of the run stand still in the `with` block, in which the run waits for a person."""
+        self.is_time_held = True
+        try:
+            with self.hold_clock():
+                yield
+        finally:
+            self.is_time_held = False
+
     def wait_while_paused(self) -> None:
         """Call the callbacks; in a pause, wait for `resume` or `stop`, or begin a tick of `step`."""
         while True:
@@ -125,6 +135,12 @@ def handle_signals(
         yield previous_handlers.close
 
 
+def interrupt(number: int, frame: FrameType | None) -> NoReturn:
+    """Handle a signal: end the process at once."""
+    del number, frame
+    raise Interrupted
+
+
 @contextmanager
 def halt_on_signals(control: RunControl) -> Iterator[None]:
     """Stop the run at the first signal; a second signal goes to the handler from before the `with` block."""
@@ -136,6 +152,53 @@ def halt_on_signals(control: RunControl) -> Iterator[None]:
 
     with handle_signals(HALT_SIGNALS, stop_run) as restore:
         yield
+
+
+MAX_TICK_TIME = 60.0
+"""Maximum wall time of a control step, in which planner and detectors of a simulated cell may work [s]."""
+MAX_HALT_TIME = 5.0
+"""Maximum wall time of a control step in which the run is halted [s]."""
+TICK_CHECK_PERIOD = 0.5
+"""Time between two checks of the wall time of a control step [s]."""
+
+
+@contextmanager
+def limit_tick_time(control: RunControl, get_tick: Callable[[], int]) -> Iterator[None]:
+    """Raise `TickOverdue` in a control step that does not end; only in the main thread of a process.
+
+    The limit does not apply while the run waits for a person, or while a debugger stops the program.
+
+    Args:
+        control: Control of the run.
+        get_tick: Function that returns the number of the current control step.
+    """
+    checked_tick = -1
+    tick_time = 0.0
+    limit = MAX_TICK_TIME
+
+    def check_tick(*_: object) -> None:
+        nonlocal checked_tick, tick_time, limit
+        tick = get_tick()
+        if tick != checked_tick or control.is_time_held or sys.gettrace() is not None:
+            checked_tick = tick
+            tick_time = 0.0
+            return
+        tick_time += TICK_CHECK_PERIOD
+        if tick_time >= (MAX_HALT_TIME if control.is_stopped else limit):
+            tick_time = 0.0
+            # The skill is halted next, and its `finally` may not end either.
+            limit = MAX_HALT_TIME
+            raise TickOverdue(f"control step {tick} did not end; a skill must yield in every control step")
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with handle_signals([signal.SIGALRM], check_tick):
+        signal.setitimer(signal.ITIMER_REAL, TICK_CHECK_PERIOD, TICK_CHECK_PERIOD)
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 RESCAN = "rescan"

@@ -15,7 +15,7 @@ from executive import events
 from executive.cell.devices import sleep_on
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
-from executive.errors import ExecutiveError, Fault, Stopped
+from executive.errors import Fault, Interrupted, Stopped, describe_error
 from executive.events import (
     Event,
     Observer,
@@ -33,7 +33,7 @@ from executive.manipulation.tool_goals import (
     sort_pickable_targets,
 )
 from executive.processes import shorten_collections
-from executive.run.operator import RunControl, halt_on_signals
+from executive.run.operator import RunControl, halt_on_signals, limit_tick_time
 from executive.station.station import Station
 from executive.tree.tree_node import TreeNode, halt
 
@@ -139,7 +139,7 @@ class Run:
         self._planner = LookaheadPlanner(station.unrecorded_cell)
         self.add_observer(self._planner.on_event)
         self.clock = RunClock(control_period)
-        self.control.hold_time = self._hold_time
+        self.control.hold_clock = self._hold_clock
         self.cell = replace(station.cell, clock=self.clock)
 
     def set_tree(self, root: TreeNode) -> None:
@@ -182,7 +182,7 @@ class Run:
         clock.offset = border.read("clock", lambda: self.station.driver.clock.now - tick * clock.step)
 
     @contextmanager
-    def _hold_time(self) -> Iterator[None]:
+    def _hold_clock(self) -> Iterator[None]:
         """Let the clock of the devices continue after the `with` block at its time before the block."""
         if not self.station.border.is_live:
             yield
@@ -214,15 +214,21 @@ class Run:
         return run_end
 
     def close(self) -> None:
-        """Release the station."""
-        self.station.close()
+        """Release the station.
+
+        Raises:
+            Fault: A device or a detector could not be released.
+        """
+        if problems := _catch_problems(self.station.close):
+            raise Fault(f"the run has ended, but its cell could not be released: {problems[0]}")
 
     def _execute_tree(self) -> RunEnded:
         """Tick the tree until it ends, brake the arm, finalize the items, and return the end of the run.
 
         If the tree succeeds, the final states of the items determine the status of the run.
         """
-        with halt_on_signals(self.control), shorten_collections():
+        limit = limit_tick_time(self.control, lambda: self.tick)
+        with halt_on_signals(self.control), limit, shorten_collections():
             loop_end = self._tick_until_end()
             problems = halt(self.root) + _catch_problems(lambda: brake_arm(self.cell, self.advance))
         if loop_end.traceback:
@@ -274,10 +280,11 @@ class Run:
             loop_end = _HALTED
         except Stopped:
             loop_end = _HALTED
-        except Exception as error:
-            message = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
+        except Interrupted:
+            raise
+        except BaseException as error:
             node = error.node if isinstance(error, Fault) else ""
-            loop_end = _LoopEnd("FAULT", "fault", message, node, traceback.format_exc())
+            loop_end = _LoopEnd("FAULT", "fault", describe_error(error), node, traceback.format_exc())
         problems = _catch_problems(lambda: self.emit(events.RunHalted(is_tree_ticked)))
         if problems and loop_end.status != "FAULT":
             loop_end = _LoopEnd("FAULT", "fault", problems[0])
@@ -295,8 +302,10 @@ def _catch_problems(action: Callable[[], None]) -> list[str]:
     """Call `action`; return a list with the message of its exception, or an empty list."""
     try:
         action()
-    except Exception as error:
-        return [str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"]
+    except Interrupted:
+        raise
+    except BaseException as error:
+        return [describe_error(error)]
     return []
 
 
@@ -343,8 +352,10 @@ def brake_arm(cell: Cell, advance: Callable[[], None]) -> None:
             cell.arm.stop()
             while not (is_at_rest := cell.arm.at_rest) and cell.clock.now <= deadline:
                 advance()
-        except Exception as error:
-            problems.append(str(error))
+        except Interrupted:
+            raise
+        except BaseException as error:
+            problems.append(describe_error(error))
             continue
         if not is_at_rest:
             raise Fault(f"the arm is not at rest {MAX_BRAKING_TIME:.0f} s after the command to brake")

@@ -23,7 +23,7 @@ from pydantic_core import from_json, to_json
 from executive import errors
 from executive.cell.frame import Answer, Detection, ErrorRates, Observation
 from executive.cell.protocols import BehaviourStep
-from executive.errors import Stopped
+from executive.errors import ExecutiveError, Interrupted, Stopped, to_text
 from executive.events import Emit, InputRead, ToolCommanded
 from executive.geometry import Array, Yaw
 from executive.station.camera import decode_image, encode_image
@@ -340,8 +340,10 @@ class Border:
             return value
         try:
             value = query()
-        except (Exception, Stopped) as error:
-            self._emit(InputRead(name, read_count, str(error), type(error).__name__))
+        except Interrupted:
+            raise
+        except BaseException as error:
+            self._emit(InputRead(name, read_count, to_text(error), type(error).__name__))
             raise
         # Most values are read in every tick and need no conversion.
         is_encoded = codec is IDENTITY and not isinstance(value, np.generic)
@@ -370,10 +372,10 @@ class Border:
 
 def _make_exception(reading: InputRead) -> BaseException:
     """Return an exception with the recorded class name and message; an unknown class is created."""
-    exception_class = getattr(errors, reading.exception, None) or type(reading.exception, (Exception,), {})
-    error = exception_class(reading.value)
-    assert isinstance(error, BaseException)
-    return error
+    exception_class = getattr(errors, reading.exception, None)
+    if not (isinstance(exception_class, type) and issubclass(exception_class, ExecutiveError | Stopped)):
+        exception_class = type(reading.exception, (Exception,), {})
+    return exception_class(reading.value)
 
 
 class Recorded:

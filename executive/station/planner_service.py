@@ -19,7 +19,7 @@ from executive.events import Emit, MotionPlanned
 from executive.geometry import Array, Pose
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import Kinematics
-from executive.processes import wait_until_done
+from executive.processes import shut_down, wait_until_done
 
 DIFFERENTIATION_STEP = 1e-4
 """Time step of the numerical derivative of the tool position [s]."""
@@ -126,8 +126,8 @@ class PlannerService:
         return self._stored_plan
 
     def close(self) -> None:
-        """Cancel the plans that have not started, wait for the running plan, and end the planning thread."""
-        self._worker.shutdown(cancel_futures=True)
+        """Cancel the plans that have not started, and end the planning thread."""
+        shut_down(self._worker)
         self._release()
 
 

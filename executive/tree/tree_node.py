@@ -11,7 +11,7 @@ from pydantic import JsonValue
 from executive.cell.json_values import to_json_or_type_name
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell
-from executive.errors import Fault
+from executive.errors import Fault, Interrupted, Stopped, describe_error, to_text
 from executive.events import BranchChosen, Event, NodeEnded, NodeStarted
 from executive.skill import Direction, Skill, SkillFailed, get_attribute_name
 from executive.tree.blackboard import Failure, NodeContext, Wiring
@@ -81,9 +81,11 @@ def halt(root: Behaviour) -> list[str]:
         if node.status is Status.RUNNING:
             try:
                 node.stop(Status.INVALID)
-            except Exception as error:
+            except Interrupted:
+                raise
+            except BaseException as error:
                 node_name = (error.node if isinstance(error, Fault) else "") or node.name
-                problems.append(f"{node_name}: {error}")
+                problems.append(f"{node_name}: {describe_error(error)}")
                 # A node whose clean-up failed counts as ended: no node is halted twice.
                 node.status = Status.INVALID
     return problems
@@ -288,8 +290,10 @@ class SkillRun:
             return
         try:
             self._generator.close()
-        except Exception as error:
-            message = f"{type(error).__name__} while it was halted: {error}"
+        except Interrupted:
+            raise
+        except BaseException as error:
+            message = f"{type(error).__name__} while it was halted: {to_text(error)}"
             if isinstance(error, RuntimeError) and "GeneratorExit" in str(error):
                 message = 'it yielded while it was halted; "finally" must not contain a yield'
             raise _make_fault(message, error) from error
@@ -301,7 +305,7 @@ class SkillRun:
         return {port.name: get_attribute_name(port.name) for port in ports if port.direction is Direction.OUT}
 
 
-def _make_fault(message: str, error: Exception) -> Fault:
+def _make_fault(message: str, error: BaseException) -> Fault:
     """Return a fault whose traceback ends where the error was raised."""
     return Fault(message).with_traceback(error.__traceback__)
 
@@ -353,8 +357,11 @@ class SkillLeaf(TreeNode):
         except SkillFailed as error:
             status = self.fail(Failure(self.skill_name, error.reason, self.path, message=error.message))
             self._end(status, error.reason, error.message)
-        except Exception as error:
-            message = str(error) if isinstance(error, Fault) else f"{type(error).__name__}: {error}"
+        except (Stopped, Interrupted):
+            raise
+        except BaseException as error:
+            # Also `SystemExit`, the cancellation of a coroutine, or the panic of an extension.
+            message = str(error) if isinstance(error, Fault) else f"{type(error).__name__}: {to_text(error)}"
             raise self._end_with_fault(message) from error
         else:
             if has_succeeded:

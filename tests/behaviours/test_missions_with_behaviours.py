@@ -12,7 +12,7 @@ from guide_blocks import blocks
 from py_trees.blackboard import Blackboard
 
 from executive.behaviours import load_skills
-from executive.errors import InputError
+from executive.errors import InputError, Interrupted
 from executive.events import NodeEnded, TimedEvent
 from executive.mission.load import load_mission
 from executive.record.journal import read_journal
@@ -137,7 +137,7 @@ def test_ports_are_checked(tree: str, place: str, code: str, write: Write) -> No
     assert (place, code) in found, str(caught.value)
 
 
-class Cut(BaseException):
+class Cut(Interrupted):
     """End a run like a kill."""
 
 

@@ -172,11 +172,15 @@ def test_what_ends_a_run_is_its_text_and_nothing_else(project, error, code, said
     assert (shown.exit_code, shown.stdout, shown.stderr.lstrip("\n")) == (code, "", said)
 
 
-def test_a_bug_is_one_sentence_that_says_where_the_details_are(project):
-    project.run_error = ZeroDivisionError("division by zero")
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [(ZeroDivisionError("by zero"), "ZeroDivisionError: by zero"), (SystemExit(0), "SystemExit: 0")],
+)
+def test_a_bug_is_one_sentence_that_says_where_the_details_are(project, error, text):
+    project.run_error = error
     shown = invoke("run", "sort", "--quiet")
     assert (shown.exit_code, "Traceback" in shown.stderr) == (3, False)
-    assert "internal error (ZeroDivisionError: division by zero)" in shown.stderr
+    assert f"internal error ({text})" in shown.stderr
     path = Path(shown.stderr.split("; ")[1].split(" contains the traceback")[0])
     assert "Traceback" in path.read_text()
     path.unlink()

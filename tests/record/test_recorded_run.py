@@ -21,7 +21,7 @@ from executive.record.journal import Journal, read_journal
 from executive.record.picture_recorder import PictureRecorder
 from executive.record.recorded_run import GuardedView, RecordOptions, record_run
 from executive.run.assembly import RunOptions
-from executive.station.station import Station
+from executive.run.run import Run
 from executive.testing.fake_cell import FakeCell
 
 
@@ -90,7 +90,7 @@ def test_whatever_ends_a_run_early_view_journal_and_cell_are_closed(run, tmp_pat
     def fails(self):
         raise error
 
-    monkeypatch.setattr(Station, "audit", fails)
+    monkeypatch.setattr(Run, "execute", fails)
     view, other = Watcher(), Watcher()
     with pytest.raises(type(error)):
         run(view, other)

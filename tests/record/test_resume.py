@@ -15,7 +15,7 @@ import pytest
 
 from executive.behaviours import load_skills
 from executive.cell.json_values import to_json
-from executive.errors import InputError
+from executive.errors import InputError, Interrupted
 from executive.events import InputRead, ItemChanged, TimedEvent, ToolCommanded
 from executive.mission.load import LoadedMission, load_mission
 from executive.record.journal import read_journal
@@ -32,7 +32,7 @@ from executive.testing.run_mission import make_raising, run_mission
 SEED = 3
 
 
-class Cut(BaseException):
+class Cut(Interrupted):
     """Ends a run as a kill does, but for what Python itself closes."""
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from executive.behaviours import load_skills
+from executive.errors import Interrupted
 from executive.mission.load import load_mission
 from executive.record.recorded_run import record_run
 from executive.record.run_directory import find_run
@@ -36,7 +37,7 @@ tree:
 """
 
 
-class Cut(BaseException):
+class Cut(Interrupted):
     """Ends a run as a kill does, but for what Python itself closes."""
 
 

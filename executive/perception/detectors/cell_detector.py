@@ -29,7 +29,7 @@ from executive.perception.detectors.detector_registry import (
     make_installed_kind,
 )
 from executive.perception.detectors.envelope import find_envelopes, rate_frame
-from executive.processes import wait_until_done
+from executive.processes import shut_down, wait_until_done
 
 CLOCK_ROUNDING_ERROR = 1e-9
 """Maximum rounding error of a time on the clock [s]."""
@@ -120,7 +120,7 @@ class CellDetector:
             self._thread.shutdown(wait=False, cancel_futures=True)
         close_kind(self.kind)
         if self._thread is not None:
-            self._thread.shutdown()
+            shut_down(self._thread)
 
     def _search(self, frame: Frame, view: str) -> Answer:
         """Return the screened answer for a frame.
@@ -209,7 +209,7 @@ def _call_at_once(search: Callable[[], Answer]) -> Future[Answer]:
     future: Future[Answer] = Future()
     try:
         future.set_result(search())
-    except Exception as error:
+    except BaseException as error:
         future.set_exception(error)
     return future
 

@@ -12,7 +12,7 @@ import pytest
 from executive.behaviours import load_skills
 from executive.cell.device_config import STEP
 from executive.drivers.sim.driver import SimDriver
-from executive.errors import InputError
+from executive.errors import InputError, Interrupted
 from executive.events import discard_event
 from executive.mission.load import load_mission
 from executive.motion.joints import JointLimits
@@ -26,7 +26,7 @@ SEED = 3
 TICKS = (1, 400, 777)
 
 
-class Cut(BaseException):
+class Cut(Interrupted):
     """Ends a run as a kill does: nothing is cleaned up."""
 
 
