@@ -98,7 +98,11 @@ class MissionFiles:
 
 
 def read_mission(
-    path: Path, overrides: Mapping[str, str], skills: Skills, replacing_cell: str | CellFile = ""
+    path: Path,
+    overrides: Mapping[str, str],
+    skills: Skills,
+    replacing_cell: str | CellFile = "",
+    library_folder: Path | None = None,
 ) -> MissionFiles:
     """Return the content of a mission file, its libraries, and its cell file or the cell that replaces it.
 
@@ -113,7 +117,8 @@ def read_mission(
     parser = NodeParser(findings, skills, load_control_nodes())
     mission = parse_mission(root, overrides, parser)
     subtrees = dict(mission.subtrees)
-    texts = {str(file): _add_library(file, path.parent, parser, subtrees) for file in mission.libraries}
+    folder = library_folder or path.parent
+    texts = {str(file): _add_library(file, folder, parser, subtrees) for file in mission.libraries}
     libraries = {name: text for name, text in texts.items() if text is not None}
     mission = replace(mission, subtrees=subtrees, is_complete=len(libraries) == len(texts))
     cell: CellFile | None = None
@@ -235,6 +240,7 @@ def load_mission(
     overrides: Mapping[str, str] | None = None,
     find_checker: CheckerFinder | None = None,
     replacing_cell: str | CellFile = "",
+    library_folder: Path | None = None,
 ) -> LoadedMission:
     """Return a mission that has passed all checks.
 
@@ -245,13 +251,14 @@ def load_mission(
         find_checker: Function that returns the checker of cells with a driver; None to skip its checks.
         replacing_cell: Cell instead of the mission's cell: a cell file, the name of a shipped cell, or the
             cell of a recorded run; "" for the mission's cell.
+        library_folder: Folder of the libraries; None for the folder of the mission.
 
     Raises:
         MissionError: The mission or the cell has errors; the exception contains every finding.
         InputError: The mission or the cell does not exist.
     """
     mission_path = find_mission(path)
-    files = read_mission(mission_path, overrides or {}, skills, replacing_cell)
+    files = read_mission(mission_path, overrides or {}, skills, replacing_cell, library_folder)
     mission = files.mission
     cell = files.cell
     findings = list(files.findings)

@@ -42,6 +42,7 @@ class RunDirectory:
         report: HTML page that explains the run.
         result: File with the output of `executive run --json`.
         pictures: Folder with pictures of selections and failures.
+        libraries: Folder with the libraries of the mission, in which a library may have any name.
     """
 
     def __init__(self, path: Path) -> None:
@@ -52,6 +53,7 @@ class RunDirectory:
         self.report = path / "report.html"
         self.result = path / "result.json"
         self.pictures = path / "frames"
+        self.libraries = path / "libraries"
 
     def save_inputs(self, texts: Mapping[str, str], libraries: Mapping[str, str]) -> None:
         """Write and sync the inputs of the run, and let the link `runs/latest` point to this directory.
@@ -64,20 +66,24 @@ class RunDirectory:
             InputError: A file cannot be written; each existing file is complete.
         """
         with explain_os_errors(InputError, f'cannot write to the run directory "{self.path}"', FOLDER_ADVICE):
-            # The inputs are written after the libraries, so that no library replaces them.
-            for relative_path, text in libraries.items():
-                path = self.path / relative_path
-                if path not in (self.journal, self.result) and self.pictures not in path.parents:
-                    path.parent.mkdir(parents=True, exist_ok=True)
-                    write_atomically(path, text)
-            for name, text in texts.items():
-                write_atomically(self.path / name, text)
+            paths = {self.libraries / name: text for name, text in libraries.items()}
+            paths |= {self.path / name: text for name, text in texts.items()}
+            for path, text in paths.items():
+                path.parent.mkdir(parents=True, exist_ok=True)
+                write_atomically(path, text)
         runs = self.path.parents[1]
+        link = runs / LATEST_LINK
         temporary_link = runs / f".latest-{os.getpid()}"
-        # An error is ignored: a run needs no link, and some file systems do not support links.
-        with contextlib.suppress(OSError):
+        # An error is ignored: a run needs no link, and some file systems do not support links. But the link
+        # to an earlier run must not remain.
+        try:
+            temporary_link.unlink(missing_ok=True)
             temporary_link.symlink_to(self.path.relative_to(runs), target_is_directory=True)
-            temporary_link.replace(runs / LATEST_LINK)
+            temporary_link.replace(link)
+        except OSError:
+            for path in (temporary_link, link):
+                with contextlib.suppress(OSError):
+                    path.unlink()
 
 
 def make_dated_folder(runs: Path, name: str, start_time: datetime) -> Path:
@@ -103,6 +109,8 @@ def find_run(name: str, runs: Path) -> Path:
         InputError: There is no such run directory.
     """
     for path in (Path(name), runs / name):
+        if name == LATEST_LINK and not path.is_symlink():
+            continue
         # Path.is_file raises an error for a name that is too long.
         if os.path.isfile(path / "journal.jsonl"):
             return path.resolve()
@@ -181,7 +189,13 @@ def read_mission_of_run(
     overrides = {key: text for key, text in start.overrides.items() if not key.startswith("cell.")}
     cell_path = Path(start.base) / "cell.yaml"
     recorded_cell = CellFile(cell_path, read_cell(path), Source(str(cell_path), ""))
-    return load_mission(mission or path / "mission.yaml", skills, overrides, replacing_cell=recorded_cell)
+    libraries = RunDirectory(path).libraries
+    # Earlier versions stored the libraries beside the mission.
+    library_folder = libraries if mission is None and libraries.is_dir() else None
+    mission = mission or path / "mission.yaml"
+    return load_mission(
+        mission, skills, overrides, replacing_cell=recorded_cell, library_folder=library_folder
+    )
 
 
 def read_cell(path: Path) -> CellConfig:

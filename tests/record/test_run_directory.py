@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
+import shutil
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -16,6 +18,7 @@ from executive.errors import InputError
 from executive.mission.outline import Connection, OutlineNode
 from executive.record.run_directory import (
     RunDirectory,
+    find_run,
     format_tree,
     make_dated_folder,
     read_mission_of_run,
@@ -45,17 +48,35 @@ def test_latest_points_to_the_last_run_and_survives_moving_the_folder(tmp_path):
     assert (tmp_path / "moved" / "latest" / "mission.yaml").read_text() == "mission: 1"
 
 
-def test_what_repeats_a_run_is_on_the_disk_and_libraries_lie_where_the_mission_looks(tmp_path, monkeypatch):
+@pytest.mark.parametrize("is_copy", [False, True])
+def test_latest_is_never_an_earlier_run(is_copy: bool, tmp_path: Path) -> None:
+    earlier_run = create(tmp_path)
+    earlier_run.journal.touch()
+    # A killed process leaves its temporary link; a copy of the folder contains a folder instead of the link.
+    if is_copy:
+        shutil.copytree(earlier_run.path, tmp_path / "latest")
+    else:
+        earlier_run.save_inputs({}, {})
+        (tmp_path / f".latest-{os.getpid()}").symlink_to(earlier_run.path)
+    later_run = create(tmp_path)
+    later_run.journal.touch()
+    later_run.save_inputs({}, {})
+    with contextlib.suppress(InputError):
+        assert find_run("latest", tmp_path) == later_run.path.resolve()
+
+
+def test_what_repeats_a_run_is_on_the_disk_and_a_library_may_have_any_name(tmp_path, monkeypatch):
     synced = []
     monkeypatch.setattr(os, "fsync", lambda file: synced.append(os.fstat(file).st_ino))
     directory = create(tmp_path)
-    libraries = {"library/sorting.yaml": "library: sorting\n", "own.yaml": "library: own\n"}
+    names = ("library/sorting.yaml", "mission.yaml", "result.json", "frames/000001_cube.jpg")
+    libraries = {name: f"library: {name}\n" for name in names}
     texts = {"mission.yaml": "mission: größe\n", "cell.yaml": "size: [1, 2]\n"}
-    directory.save_inputs(texts, {**libraries, "result.json": "no library replaces a result"})
-    left = {**libraries, **texts}
+    directory.save_inputs(texts, libraries)
+    left = {f"libraries/{name}": text for name, text in libraries.items()} | texts
     assert {name: (directory.path / name).read_text() for name in left} == left
     assert synced == [(directory.path / name).stat().st_ino for name in left]
-    assert not directory.result.exists()
+    assert {path.name for path in directory.path.iterdir()} == {"libraries", *texts}
 
 
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
