@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
-from executive.errors import RecordLost
+from executive.errors import Interrupted, RecordLost, describe_error
 from executive.events import RunEnded
 from executive.mission.load import LoadedMission
 from executive.record.picture_recorder import find_picture
@@ -221,9 +221,11 @@ def _format_source_location(node: Node) -> str:
 def _describe_arm(is_at_rest: Callable[[], bool]) -> str:
     try:
         return "at rest" if is_at_rest() else "it is not at rest after the command to brake"
-    except Exception as error:
+    except Interrupted:
+        raise
+    except BaseException as error:
         # A broken arm may raise an exception.
-        return f"the state of the arm cannot be read ({type(error).__name__}: {error})"
+        return f"the state of the arm cannot be read ({describe_error(error)})"
 
 
 def _find_exception_location(traceback: str) -> str:

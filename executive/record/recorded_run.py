@@ -14,7 +14,7 @@ from typing import Protocol
 import yaml
 
 from executive.cell.devices import find_driver_options
-from executive.errors import ExecutiveError, InputError, describe_error
+from executive.errors import ExecutiveError, InputError, Interrupted, describe_error
 from executive.events import Observer, TimedEvent
 from executive.mission.load import LoadedMission
 from executive.mission.outline import make_outline
@@ -193,7 +193,9 @@ def execute_recorded(
         audit = None
         try:
             audit = run.station.audit()
-        except Exception as error:  # The driver may be code of another project.
+        except Interrupted:
+            raise
+        except BaseException as error:  # The driver may be code of another project.
             message = f"the true state of the world cannot be read: {describe_error(error)}"
             run_end = replace(run_end, status="FAULT", reason="fault", message=message, node="")
     station = run.station
