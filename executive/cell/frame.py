@@ -260,3 +260,7 @@ class Observation:
     is_confident: bool = True
     contradiction: str = ""
     yaw: Yaw | None = None
+
+    def __post_init__(self) -> None:
+        # The ledger keeps the same array, which no skill may change.
+        self.position.flags.writeable = False

@@ -54,6 +54,10 @@ class Target:
     yaw: Yaw | None = None
     omits_none: ClassVar[bool] = True
 
+    def __post_init__(self) -> None:
+        # The ledger keeps the same array, which no skill may change.
+        self.position.flags.writeable = False
+
     def pose_at(self, time: float) -> Pose:  # noqa: ARG002
         """Return the pose of the object at a time [s], without a rotation if its yaw is unknown.
 
@@ -89,6 +93,10 @@ class KnownItem:
     drops: int
     deferrals: int
     deferral_rank: int
+
+    def __post_init__(self) -> None:
+        # The ledger keeps the same array, which no skill may change.
+        self.position.flags.writeable = False
 
     @property
     def is_open(self) -> bool:

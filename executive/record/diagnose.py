@@ -231,8 +231,9 @@ def _describe_arm(is_at_rest: Callable[[], bool]) -> str:
 def _find_exception_location(traceback: str) -> str:
     """Return the source location of the first exception: `skills/grasp.py:45, in run`; "" if unknown."""
     cause = traceback.partition("\nThe above exception was the direct cause")[0]
-    # The caller of `Skill.failure` is more informative than the method itself.
-    calls = [call for call in _TRACEBACK_LINE.findall(cause) if not call[0].endswith("executive/skill.py")]
+    # The caller of `Skill.failure`, or the line that a signal interrupts, is more informative.
+    omitted_files = ("executive/skill.py", "executive/run/operator.py")
+    calls = [call for call in _TRACEBACK_LINE.findall(cause) if not call[0].endswith(omitted_files)]
     if not calls:
         return ""
     file, line, function = calls[-1]

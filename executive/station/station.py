@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -213,9 +214,10 @@ class Station:
                 },
                 ledger=self.ledger,
                 operator=self.border.wrap("operator", options.operator),
-                bins=bins,
-                classes=classes,
-                routes=self.routes,
+                # No skill may change the mappings of the station.
+                bins=MappingProxyType(bins),
+                classes=MappingProxyType(classes),
+                routes=MappingProxyType(self.routes),
                 localizer=self.border.wrap("localizer", localizer),
                 safe_place=np.array(config.safe_place),
                 tool_model=config.tool,

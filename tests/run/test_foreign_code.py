@@ -95,6 +95,12 @@ def test_whatever_foreign_code_raises_is_a_fault(place: str, effect: str, run_wi
     check_fault(run_with(place, odd_parts.EFFECTS[effect]))
 
 
+def test_the_diagnosis_names_the_line_of_an_endless_loop(run_with: RunWith) -> None:
+    diagnosis = run_with("moving", odd_parts.EFFECTS["loop"]).diagnosis
+    assert diagnosis is not None
+    assert "odd_parts.py" in diagnosis.raised_at
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("place", "effect"), ENDS + LOOPS)
 def test_every_odd_end_at_every_place_is_a_fault(place: str, effect: str, run_with: RunWith) -> None:
