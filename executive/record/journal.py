@@ -25,6 +25,8 @@ from executive.station.border import check_input
 
 MAX_TICK = 10**9
 """Maximum number of control steps of a run; 48 days at 240 control steps per second."""
+MAX_LINE_LENGTH = 4_000_000
+"""Maximum length of an event in a journal [byte]; the largest events of a run without errors have 2000."""
 CLOCK_TOLERANCE = 1e-5
 """Maximum difference between the clock of an event and the time of its control step [s]."""
 
@@ -74,15 +76,20 @@ def encode_event(timed: TimedEvent) -> bytes:
     """Return the line of a journal that contains an event, in UTF-8 with a line feed.
 
     Raises:
-        Fault: JSON cannot represent a value of the event.
+        Fault: JSON cannot represent a value of the event, or the line would be too long.
     """
     kind = type(timed.event).__name__
     entry = {"kind": kind, "tick": timed.tick, "clock": timed.clock, **vars(timed.event)}
     try:
         # A file name that is not UTF-8 contains lone surrogates, which become question marks.
-        return (_ENCODER.encode(entry) + "\n").encode(errors="replace")
+        line = (_ENCODER.encode(entry) + "\n").encode(errors="replace")
     except (TypeError, ValueError, RecursionError) as error:
         raise Fault(f"JSON cannot represent an event of kind {kind}: {error}") from error
+    if len(line) > MAX_LINE_LENGTH:
+        source = getattr(timed.event, "skill", "") or getattr(timed.event, "name", "")
+        limit = f"at most {MAX_LINE_LENGTH} are allowed"
+        raise Fault(f"an event {kind} of {source or 'the run'} has {len(line)} bytes; {limit}")
+    return line
 
 
 def decode_event(line: bytes) -> TimedEvent:

@@ -213,6 +213,11 @@ def test_a_line_that_is_no_event_is_an_error_with_its_number(path, line, why):
     assert why in str(raised.value)
 
 
+def test_an_event_that_is_too_long_for_a_journal_is_a_fault() -> None:
+    with pytest.raises(Fault, match="InputRead of tool.load has 5000.* bytes; at most 4000000 are allowed"):
+        encode_event(at(1, read("tool.load", "x" * 5_000_000)))
+
+
 def test_inputs_of_an_earlier_format_are_read_as_they_are(path: Path) -> None:
     start = encode_event(at(0, run_started())).replace(b'"format": 4', b'"format": 3')
     path.write_bytes(start + encode_event(at(1, read("observations", [["a value of five parts"]]))))
