@@ -214,7 +214,7 @@ def test_a_line_that_is_no_event_is_an_error_with_its_number(path, line, why):
 
 
 def test_an_event_that_is_too_long_for_a_journal_is_a_fault() -> None:
-    with pytest.raises(Fault, match="InputRead of tool.load has 5000.* bytes; at most 4000000 are allowed"):
+    with pytest.raises(Fault, match=r"InputRead of tool\.load has .* at most 4000000 are allowed"):
         encode_event(at(1, read("tool.load", "x" * 5_000_000)))
 
 
