@@ -19,8 +19,8 @@ import tempfile
 import threading
 import uuid
 import zipfile
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass, replace
 from importlib.metadata import distributions
@@ -31,19 +31,21 @@ from packaging.utils import canonicalize_name
 
 import executive
 from executive import plugins
-from executive.behaviours import SKILL_GROUP
+from executive.behaviours import SKILL_GROUP, load_skills
 from executive.campaign.jobs import MAX_CRASHES, JobOptions, SweepJob, make_fault_record, run_job
-from executive.campaign.results import RunRecord
+from executive.campaign.results import RunRecord, SweepSettings
 from executive.cell.devices import DRIVER_GROUP
 from executive.cell.tools import TOOL_GROUP
 from executive.errors import InputError, explain_os_errors
+from executive.mission.load import load_mission
 from executive.motion.joints import IK_SOLVER_GROUP
 from executive.perception.detectors.detector_registry import DETECTOR_GROUP
 from executive.perception.detectors.envelope import MEASUREMENT_SUFFIX
+from executive.physics.model_files import list_model_files
 from executive.processes import WorkerPool
 from executive.record.run_directory import FOLDER_ADVICE, make_unique_folder
 from executive.run.operator import HALT_SIGNALS, handle_signals
-from executive.text.files import find_cell, find_mission, get_shipped_folder
+from executive.text.files import find_file_below, get_shipped_folder, has_outside_link
 from executive.tree.node import ENTRY_POINT_GROUP as CONTROL_NODE_GROUP
 
 CONNECTION_TIMEOUT = 10.0
@@ -52,10 +54,14 @@ POLLING_PERIOD = 0.1
 """Time between two requests for the results of finished jobs [s]."""
 PACKAGES_FOLDER = ".packages"
 """Folder of the packages with plugins (`PLUGIN_GROUPS`), in an unpacked bundle."""
-TEXT_SUFFIXES = (".yaml", ".yml", ".urdf", ".obj", ".mtl")
-"""Suffixes of files that name further files: libraries, cells, weights, labels, meshes and textures."""
-_FILE_NAME_PATTERN = re.compile(r""""([^"\n]+)"|'([^'\n]+)'|([^\s"'<>,\[\]{}]+)""")
-"""Pattern of a possible file name in a text: a quoted text or a word."""
+_ADDRESS = re.compile(r"((?:tcp|tls)://)?(\[[\da-fA-F:.]+\]|[^\s:/\[\]]+):\d{1,5}")
+"""Addresses of a scheduler; ucx:// needs hardware and a configuration of its own."""
+MAX_SUBMITTED_COUNT = 1000
+"""Maximum number of jobs that the scheduler knows at one time."""
+MAX_RUN_SIZE = 300_000_000
+"""Maximum size of the files of a run that a worker returns [byte]."""
+MAX_LINE_LENGTH = 10_000_000
+"""Maximum length of a line in which paths are replaced at once [byte]."""
 PLUGIN_GROUPS = (
     SKILL_GROUP, CONTROL_NODE_GROUP, DETECTOR_GROUP, DRIVER_GROUP, IK_SOLVER_GROUP, TOOL_GROUP,
 )  # fmt: skip
@@ -73,7 +79,9 @@ HASHED_SUFFIXES = (".py", ".yaml", ".onnx", ".urdf")
 INSTALLATION_ADVICE = "install the same versions there, and start the scheduler and its workers again"
 """Advice to the user of a worker with other software."""
 RUN_TEXT_SUFFIXES = (".html", ".json", ".jsonl", ".yaml")
-"""Suffixes of the files that may contain paths."""
+"""Suffixes of the files of a run that may contain paths."""
+RUN_FILE = re.compile(r"(?:[^./\\][^/\\]*/)*[^./\\][^/\\]*\.(?:html|jsonl?|ya?ml|log|jpg|png)")
+"""Relative paths of the files of a run; no part begins with a dot."""
 
 
 def run_jobs_on_cluster(
@@ -91,12 +99,15 @@ def run_jobs_on_cluster(
         InputError: The scheduler cannot be reached, has no workers or was lost, or the software of a worker
             differs.
     """
+    if not jobs:
+        return
     crash_counts: Counter[int] = Counter()
+    waiting_indices = deque(range(len(jobs)))
     unfinished_jobs: dict[distributed.Future, int] = {}
     signal_event = threading.Event()
     with handle_signals(HALT_SIGNALS, lambda *_: signal_event.set()), _connect(address) as client:
         _check_workers(client, address)
-        plugin = BundlePlugin(make_bundle(jobs), describe_environment())
+        plugin = BundlePlugin(make_bundle(jobs[0].settings), describe_environment())
         client.register_plugin(plugin)
 
         def submit(index: int) -> distributed.Future:
@@ -105,12 +116,13 @@ def run_jobs_on_cluster(
             return future
 
         try:
-            completions = distributed.as_completed(list(map(submit, range(len(jobs)))), loop=client.loop)
+            first_indices = [waiting_indices.popleft() for _ in jobs[:MAX_SUBMITTED_COUNT]]
+            completions = distributed.as_completed(list(map(submit, first_indices)), loop=client.loop)
             while unfinished_jobs and not signal_event.is_set():
                 for future in completions.next_batch(block=False):
                     index = unfinished_jobs.pop(future)
                     try:
-                        record = unpack_run(future.result())
+                        record = unpack_run(future.result(), jobs[index])
                     except distributed.CancelledError:
                         message = "the scheduler ended or forgot the jobs; continue with --resume"
                         raise InputError(message) from None
@@ -122,9 +134,13 @@ def run_jobs_on_cluster(
                             if crash_counts[index] < MAX_CRASHES:
                                 completions.add(submit(index))
                                 continue
+                        else:
+                            _check_workers(client, address)  # A worker may have joined later.
                         record = make_fault_record(jobs[index], error)
                     on_result(index, record, crash_counts[index])
-                    options.on_progress(len(jobs) - len(unfinished_jobs), len(jobs))
+                    if waiting_indices:
+                        completions.add(submit(waiting_indices.popleft()))
+                    options.on_progress(len(jobs) - len(waiting_indices) - len(unfinished_jobs), len(jobs))
                 signal_event.wait(POLLING_PERIOD)
             if signal_event.is_set():
                 options.on_halt()
@@ -135,22 +151,28 @@ def run_jobs_on_cluster(
 
 
 def _connect(address: str) -> distributed.Client:
+    advice = "start it with `dask scheduler`, and give the address that it prints, like tcp://host:8786"
     try:
+        if (match := _ADDRESS.fullmatch(address)) is None:
+            raise ValueError("the address is not tcp://HOST:PORT or tls://HOST:PORT")
+        if match[1] == "tls://" and not distributed.Security().get_connection_args("client")["ssl_context"]:
+            raise ValueError("tls:// needs certificates, `distributed.comm.tls` in the configuration of dask")
         return distributed.Client(address, timeout=CONNECTION_TIMEOUT, set_as_default=False)
-    except (OSError, ValueError) as error:
-        advice = "start it with `dask scheduler`, and give the address that it prints, like tcp://host:8786"
+    except (OSError, ValueError, TypeError, RuntimeError) as error:
         raise InputError(f'the scheduler "{address}" cannot be reached: {error}; {advice}') from error
 
 
 def _check_workers(client: distributed.Client, address: str) -> None:
     """Raise InputError unless there are workers, and all have the software of this computer."""
-    try:
-        results = client.run(check_environment, describe_environment())
-    except (ImportError, AttributeError) as error:
-        message = f"a worker cannot import this project: {error}; {INSTALLATION_ADVICE}"
-        raise InputError(message) from error
+    results = client.run(check_environment, describe_environment(), on_error="return")
     if not results:
         raise InputError(f"the scheduler has no workers; start one: `dask worker {address} --nthreads 1`")
+    for worker_address, error in results.items():
+        if error is not None:
+            problem = (
+                f"the worker {worker_address} cannot import this project: {error}; {INSTALLATION_ADVICE}"
+            )
+            raise error if isinstance(error, InputError) else InputError(problem)
 
 
 class BundlePlugin(distributed.WorkerPlugin):
@@ -209,8 +231,10 @@ def execute_on_worker(plugin_name: str, job: SweepJob) -> ReturnedRun:
         InputError: The software of this worker differs from the software of the client.
     """
     worker = distributed.get_worker()
-    plugin = worker.plugins[plugin_name]
-    assert isinstance(plugin, BundlePlugin)
+    plugin = worker.plugins.get(plugin_name)
+    if not isinstance(plugin, BundlePlugin):
+        problem = f"the worker {worker.address} has not unpacked the files of the sweep; look into its log"
+        raise InputError(f"{problem}; {INSTALLATION_ADVICE}")
     check_environment(plugin.client_versions, worker)
     return plugin.execute(job)
 
@@ -243,25 +267,9 @@ def _make_worker_path(root: Path, path: Path) -> Path:
     return root / path.relative_to(path.anchor) if path.is_absolute() else path
 
 
-def make_bundle(jobs: Sequence[SweepJob]) -> bytes:
-    """Return a zip file with the files that jobs read, and of the packages with plugins.
-
-    Each file of a mission, cell or scene has its absolute path, so that all relative paths stay valid. A
-    shipped file that is named in another folder is not included, because each worker has the same version
-    of this project. Equal files have an equal zip file.
-
-    Raises:
-        InputError: A file names another file by its absolute path, or the module of a plugin does not exist.
-    """
-    settings = [job.settings for job in jobs]
-    paths = {find_mission(each.mission) for each in settings}
-    paths |= {find_cell(each.replacing_cell) for each in settings if each.replacing_cell}
-    paths |= {each.scene for each in settings if each.scene}
-    values = {text for job in jobs for text in (*job.settings.overrides.values(), *job.variant.values())}
-    files = {f"{PACKAGES_FOLDER}/{name}": content for name, content in _list_plugin_files()}
-    files |= {str(path): path.read_bytes() for path in _find_named_files(paths, values)}
-    if project := plugins.find_project():
-        files[str(project.file)] = project.file.read_bytes()
+def make_bundle(settings: SweepSettings) -> bytes:
+    """Return a zip file with the files of `list_bundle`; equal files have an equal zip file."""
+    files = list_bundle(settings)
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name in sorted(files):
@@ -270,29 +278,29 @@ def make_bundle(jobs: Sequence[SweepJob]) -> bytes:
     return buffer.getvalue()
 
 
-def _find_named_files(paths: Iterable[Path], values: Iterable[str]) -> set[Path]:
-    """Return the absolute paths of the given files and of all files that these files name.
+def list_bundle(settings: SweepSettings) -> dict[str, bytes]:
+    """Return the files that the runs of a sweep read, and those of the packages with plugins, by path.
 
-    A named file may name further files. The measurement files in the folder of a file with names are
-    included. A name is a path relative to the folder of the file that contains the name. Each value of an
-    override may also be a name.
+    The files of the runs have absolute paths, so that all relative paths stay valid.
+
+    Raises:
+        InputError: The mission is invalid, a file names a file outside of its folder, or the module of a
+            plugin does not exist.
     """
-    files: set[Path] = set()
-    pending_paths = list(paths)
-    while pending_paths:
-        path = Path(os.path.abspath(pending_paths.pop()))
-        if path in files:
-            continue
-        files.add(path)
-        if path.suffix in TEXT_SUFFIXES:
-            matches = _FILE_NAME_PATTERN.findall(path.read_text(encoding="utf-8", errors="replace"))
-            names = {"".join(match) for match in matches}.union(values)
-            for name in (name for name in names if os.path.isfile(path.parent / name)):
-                if os.path.isabs(name):
-                    advice = f"write a path relative to {path.parent}"
-                    raise InputError(f'{path} names "{name}", a path that workers may not have; {advice}')
-                pending_paths.append(path.parent / name)
-            pending_paths += path.parent.glob(f"*{MEASUREMENT_SUFFIX}")
+    paths = {settings.scene} if settings.scene else set()
+    for variant in settings.variants:
+        overrides = {**settings.overrides, **variant}
+        loaded = load_mission(settings.mission, load_skills(), overrides, None, settings.replacing_cell)
+        paths.update(*map(list_model_files, loaded.files))
+        folder = loaded.cell_path.parent
+        options = [value for one in loaded.cell_config.detectors.values() for value in one.options.values()]
+        names = [name for name in options if isinstance(name, str) and os.path.isfile(folder / name)]
+        names += [path.name for path in folder.glob(f"*{MEASUREMENT_SUFFIX}")]
+        paths.update(find_file_below(folder, name) for name in names)
+    files = {f"{PACKAGES_FOLDER}/{name}": content for name, content in _list_plugin_files()}
+    files |= {os.path.abspath(path): path.read_bytes() for path in paths}
+    if project := plugins.find_project():
+        files[str(project.file)] = project.file.read_bytes()
     return files
 
 
@@ -324,8 +332,12 @@ def _list_module_files(module: str) -> Iterator[tuple[str, bytes]]:
         raise InputError(f'the module "{module}" of an entry point does not exist; install its package again')
     for folder in map(Path, spec.submodule_search_locations or ()):
         for path in sorted(folder.rglob("*")):
-            if path.is_file() and "__pycache__" not in path.parts:
-                yield f"{module}/{path.relative_to(folder)}", path.read_bytes()
+            name = str(path.relative_to(folder))
+            # Hidden files are no data of a package, but may contain secrets.
+            if path.is_file() and not re.search(r"(^|/)(\.|__pycache__)", name):
+                if has_outside_link(folder, name):
+                    raise InputError(f'"{path}" is a link to a file outside of the package; copy the file')
+                yield f"{module}/{name}", path.read_bytes()
     if spec.submodule_search_locations is None and spec.origin:
         yield Path(spec.origin).name, Path(spec.origin).read_bytes()
 
@@ -384,24 +396,33 @@ class ReturnedRun:
 
 def pack_run(record: RunRecord, root: Path) -> ReturnedRun:
     """Return a run, and delete its run directory on the worker."""
-    content = b""
+    buffer = io.BytesIO()
     if record.run.run_directory:
-        archive = Path(shutil.make_archive(record.run.run_directory, "zip", record.run.run_directory))
-        content = archive.read_bytes()
-        archive.unlink()
-        shutil.rmtree(record.run.run_directory)
-    return ReturnedRun(str(root), record, content)
+        folder = Path(record.run.run_directory)
+        # The clock of a worker may be before 1980, the first year of a zip file.
+        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, strict_timestamps=False) as archive:
+            for path in (path for path in sorted(folder.rglob("*")) if path.is_file()):
+                archive.write(path, path.relative_to(folder))
+        shutil.rmtree(folder)
+    return ReturnedRun(str(root), record, buffer.getvalue())
 
 
-def unpack_run(returned: ReturnedRun) -> RunRecord:
-    """Write the run directory, and return the record; both contain the paths on the client.
+def unpack_run(returned: ReturnedRun, job: SweepJob) -> RunRecord:
+    """Write the run directory of a job, and return the record; both contain the paths on the client.
 
     Raises:
-        InputError: A file cannot be written.
+        InputError: The run is no run of the job, its files are not those of a run, or a file cannot be
+            written.
     """
     run = returned.record.run
     message = run.message.replace(returned.root, "")
     path = Path(run.run_directory.replace(returned.root, ""))
+    runs_folder = Path(os.path.abspath(job.runs_folder))
+    # The folder of a day contains the folder of the run.
+    is_inside = not run.run_directory or Path(os.path.abspath(path)).parents[1:2] == (runs_folder,)
+    if (run.run_index, run.seed, run.variant) != (job.index, job.seed, job.variant) or not is_inside:
+        problem = f'a worker returned the run {run.run_index} (seed {run.seed}, folder "{path}")'
+        raise InputError(f"{problem} for the run {job.index} below {runs_folder}; check the workers")
     if run.run_directory:
         folder = path
         with explain_os_errors(InputError, f'cannot write the run directory "{folder}"', FOLDER_ADVICE):
@@ -409,10 +430,24 @@ def unpack_run(returned: ReturnedRun) -> RunRecord:
             # Runs of two workers may have the same name.
             path = make_unique_folder(folder.parent, folder.name)
             with zipfile.ZipFile(io.BytesIO(returned.run_directory)) as archive:
-                archive.extractall(path)
-            for file in (file for file in path.rglob("*") if file.suffix in RUN_TEXT_SUFFIXES):
-                content = file.read_bytes().replace(returned.root.encode(), b"")
-                file.write_bytes(content.replace(bytes(folder), bytes(path)))
+                _unpack_files(archive, path, {returned.root.encode(): b"", bytes(folder): bytes(path)})
         message = message.replace(str(folder), str(path))
     directory = str(path) if run.run_directory else ""
     return replace(returned.record, run=replace(run, message=message, run_directory=directory))
+
+
+def _unpack_files(archive: zipfile.ZipFile, folder: Path, replacements: Mapping[bytes, bytes]) -> None:
+    """Write files into a folder, and replace bytes in each line of the texts."""
+    size = sum(file.file_size for file in archive.infolist())
+    unknown_names = [name for name in archive.namelist() if not RUN_FILE.fullmatch(name)]
+    if unknown_names or size > MAX_RUN_SIZE:
+        problem = f"a worker returned {size} bytes, with files that no run has: {unknown_names[:3]}"
+        raise InputError(f"{problem}; at most {MAX_RUN_SIZE} bytes are stored; check the workers")
+    for name in archive.namelist():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with archive.open(name) as source, path.open("wb") as target:
+            while line := source.readline(MAX_LINE_LENGTH):
+                for old, new in replacements.items() if path.suffix in RUN_TEXT_SUFFIXES else ():
+                    line = line.replace(old, new)
+                target.write(line)

@@ -52,6 +52,7 @@ class CellFile:
         source: Text of the cell file.
         root: Merged YAML tree, for positions of findings; None for invalid YAML and for a recorded cell.
         findings: Errors in the file, its bases and its arm file.
+        files: Paths of the cell file, its bases, its arm file, its calibrations and its own models.
     """
 
     path: Path
@@ -59,6 +60,7 @@ class CellFile:
     source: Source
     root: YamlNode | None = None
     findings: tuple[Finding, ...] = ()
+    files: tuple[Path, ...] = ()
 
     def find_span(self, key_path: KeyPath, *, at_key: bool = False) -> Span:
         """Return the position of the value at `key_path`, or of its key; the file for a recorded cell."""
@@ -102,23 +104,24 @@ def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
         return file
     overlap_errors = (file.make_error(keys, "layout", message) for keys, message in find_overlaps(config))
     name_errors = (*_find_unknown_poses(file, config), *_find_wrong_looks(file, config))
-    resolved_config, outside_errors = _resolve_model_files(file, config, reader.folders)
+    resolved_config, outside_errors, models = _resolve_model_files(file, config, reader.paths)
     findings = (*findings, *name_errors, *outside_errors, *overlap_errors)
     # If a model file lies outside the folder, `config` is None, so that no caller opens that file.
-    return replace(file, config=None if outside_errors else resolved_config, findings=findings)
+    files = (*reader.paths.values(), *models)
+    return replace(file, config=None if outside_errors else resolved_config, findings=findings, files=files)
 
 
 class _CellFileReader:
     """Reader of a cell file, its bases and its arm file.
 
     Attributes:
-        folders: Folder of each file that was read.
+        paths: Path of each file that was read.
         findings: Syntax errors of the files, errors of the values of `base` and `file`, and all errors of the
             arm file.
     """
 
     def __init__(self) -> None:
-        self.folders: dict[Source, Path] = {}
+        self.paths: dict[Source, Path] = {}
         self.findings: list[Finding] = []
 
     def read_tree(self, path: Path, source: Source, previous_files: tuple[Path, ...]) -> YamlNode | None:
@@ -126,7 +129,7 @@ class _CellFileReader:
 
         `previous_files` is the chain of bases from the cell file to the file that names `path` as its base.
         """
-        self.folders[source] = path.parent
+        self.paths[source] = path
         root, findings = parse_yaml(source)
         self.findings += findings
         if not isinstance(root, YamlMapping):
@@ -215,14 +218,14 @@ class _CellFileReader:
 
     def _read_named_file(self, file: YamlScalar, shipped_subfolder: str, code: str) -> Source | None:
         """Return the text of the file that a value names, or None after an error with this code."""
-        folder = self.folders.get(file.span.source, next(iter(self.folders.values())))
+        folder = self.paths.get(file.span.source, next(iter(self.paths.values()))).parent
         try:
             path = find_file_below(folder, file.text, (shipped_subfolder,))
             source = read_source(path)
         except InputError as problem:
             self.findings.append(make_error(file.span, code, str(problem)))
             return None
-        self.folders[source] = path.parent
+        self.paths[source] = path
         return source
 
     def _insert_file(self, calibration: YamlMapping) -> YamlMapping:
@@ -318,16 +321,17 @@ def _get_size(section: ObjectConfig) -> tuple[float, float, float]:
 
 
 def _resolve_model_files(
-    file: CellFile, config: CellConfig, folders: Mapping[Source, Path]
-) -> tuple[CellConfig, list[Finding]]:
-    """Return the cell with absolute paths of existing model files, and errors about files outside the folder.
+    file: CellFile, config: CellConfig, paths: Mapping[Source, Path]
+) -> tuple[CellConfig, list[Finding], list[Path]]:
+    """Return the cell with absolute paths of existing models, errors about files outside, and the models.
 
     A path is relative to the folder of the cell file, base or arm file that contains the path.
     """
     errors = []
+    models: list[Path] = []
 
     def resolve(path: str, *key_path: str) -> str:
-        folder = folders.get(file.find_span(key_path).source, folders[file.source])
+        folder = paths.get(file.find_span(key_path).source, paths[file.source]).parent
         if is_outside_path(path):
             message = f'"{path}" must be a relative path without ".."'
             errors.append(file.make_error(key_path, "outside", message))
@@ -335,6 +339,7 @@ def _resolve_model_files(
             if has_outside_link(folder, path):
                 message = f'"{path}" is a link to a file outside {folder}'
                 errors.append(file.make_error(key_path, "outside", message))
+            models.append(folder / path)
             return str((folder / path).resolve())
         return path
 
@@ -344,7 +349,7 @@ def _resolve_model_files(
         mesh = resolve(model.mesh, "objects", label, "mesh")
         objects[label] = model.model_copy(update={"urdf": urdf, "mesh": mesh})
     arm = config.arm.model_copy(update={"urdf": resolve(config.arm.urdf, "arm", "urdf")})
-    return config.model_copy(update={"objects": objects, "arm": arm}), errors
+    return config.model_copy(update={"objects": objects, "arm": arm}), errors, models
 
 
 MAX_OVERLAP = 0.0005

@@ -200,6 +200,7 @@ class LoadedMission:
         overrides: Values of `--set` as text, by name of a param or by `cell.<key>.<key>`.
         skills: Installed skills by name, and skills for the py_trees behaviours in the mission by class name.
         replacing_cell: Cell file or name of the shipped cell that replaces the mission's cell, or "".
+        files: Paths of the mission file, its libraries, the cell file, and the files that the cell names.
     """
 
     mission: Mission
@@ -214,6 +215,7 @@ class LoadedMission:
     overrides: Mapping[str, str]
     skills: Skills
     replacing_cell: str
+    files: tuple[Path, ...]
 
     @property
     def params(self) -> dict[str, JsonValue]:
@@ -305,10 +307,12 @@ def load_mission(
         folders = (cell.path.parent, get_shipped_folder() / "cells")
         for keys, message in find_unmeasured_detectors(config, cell.path.parent, folders):
             findings.append(make_warning(cell.find_span(keys, at_key=True), "not-measured", message))
+    libraries = [find_file_below(mission_path.parent, library) for library in files.libraries]
     return LoadedMission(
         mission, tree, config, files.source.text, mission_path, cell.path, files.libraries,
         find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
         dict(overrides or {}), skills, replacing_cell if isinstance(replacing_cell, str) else "",
+        (mission_path, *libraries, *cell.files),
     )  # fmt: skip
 
 

@@ -35,6 +35,8 @@ MAX_TRIANGLE_COUNT = 20_000
 """Maximum number of triangles of a mesh: a collision in PyBullet takes 3 s with 20,000, 60 s with 300,000."""
 FIXED_JOINTS = "joint[@type='fixed'][parent]"
 """Path of the fixed joints of a URDF."""
+_NAMED_FILE = re.compile(r"^\s*(?:mtllib|map_\w+|bump|disp|decal|refl)\s+(.*\S)", re.MULTILINE)
+"""Name of a further file in a Wavefront mesh or its materials."""
 MESH_KINDS = {".obj": "Wavefront", ".stl": "STL", ".dae": "COLLADA"}
 """Formats of mesh files by suffix."""
 
@@ -205,6 +207,27 @@ def find_mesh(urdf: Path, mesh: Element) -> Path:
         InputError: The mesh is no file in the folder of the URDF, or is too large.
     """
     return find_model(str(urdf.parent / _normalize_name(urdf, mesh.get("filename", ""))))
+
+
+def list_model_files(model: Path) -> list[Path]:
+    """Return a URDF or mesh, and the existing files that it names: meshes, materials and textures.
+
+    Raises:
+        InputError: A URDF is invalid, or a file is outside of the folder of the file that names it.
+    """
+    files = [model]
+    for path in files:  # The loop goes on with the files that it appends.
+        find_model(str(path.absolute()))  # It limits the size.
+        names: list[str] = []
+        if path.suffix.lower() in (".obj", ".mtl"):
+            values = _NAMED_FILE.findall(path.read_text(encoding="utf-8", errors="replace"))
+            # Options may precede the name.
+            names = [name for value in values for name in (value, value.split()[-1])]
+        elif path.suffix.lower() == ".urdf":
+            names = [element.get("filename", "") for element in read_robot(path).iter()]
+        named_files = [path.parent / _normalize_name(path, name) for name in filter(None, names)]
+        files += [file for file in dict.fromkeys(named_files) if file.is_file() and file not in files]
+    return files
 
 
 def _normalize_name(urdf: Path, name: str) -> str:

@@ -23,13 +23,17 @@ from executive.campaign.cluster import (
     FILES_KEY,
     PACKAGES_FOLDER,
     BundlePlugin,
+    ReturnedRun,
     check_environment,
     describe_environment,
+    list_bundle,
     make_bundle,
+    pack_run,
+    run_jobs_on_cluster,
     unpack_run,
 )
 from executive.campaign.jobs import JobOptions, SweepJob, list_jobs, run_job
-from executive.campaign.results import RunRow
+from executive.campaign.results import RunRecord, RunRow
 from executive.campaign.sweep import create_sweep, make_settings, run_sweep
 from executive.errors import InputError
 
@@ -45,7 +49,7 @@ class Wave(Skill):
         """Wait for a step."""
         yield
 '''
-MISSION = "mission: wave\ncell: cells/mine.yaml\nroutes: {cube: red_bin}\ntree: Wave\n"
+MISSION = "mission: wave\ncell: cells/mine.yaml\nroutes: {cube: red_bin}\ntree: Wave  # cells/unused.txt\n"
 
 
 @pytest.fixture
@@ -58,12 +62,21 @@ def project(tmp_path: Path, missions: Path, monkeypatch: pytest.MonkeyPatch) -> 
         "mine_wave/__init__.py": "",
         "mine_wave/wave.py": WAVE,
         "wave.yaml": MISSION,
-        "cells/mine.yaml": "base: bases/first.yaml\ncell: mine\nkind: fake\n# labels: 'my labels.txt'\n",
+        "cells/mine.yaml": "base: bases/first.yaml\ncell: mine\nkind: fake\n# .env, unused.txt, ../.env\n"
+        "objects: {cube: {urdf: models/cube.urdf, height: 0.05, radius: 0.0354}}\n"
+        "detectors: {own: {kind: rfdetr, model_path: m.onnx, labels: my labels.txt}}\n",
+        "cells/models/cube.urdf": "<robot><!-- 'cells/unused.txt' --><mesh filename='cube.obj'/></robot>",
+        "cells/models/cube.obj": "# unused.txt\nmtllib cube.mtl\n",
+        "cells/models/cube.mtl": "map_Kd -s 1 1 1 wood.png\n",
+        "cells/models/wood.png": "",
+        "cells/m.onnx": "",
         "cells/bases/first.yaml": (missions / "cells" / "overhead.yaml").read_text(encoding="utf-8"),
         "cells/bases/arms/iiwa14.yaml": (missions / "arms" / "iiwa14.yaml").read_text(encoding="utf-8"),
         "cells/mine.measured.json": "[]",
         "cells/my labels.txt": "cube\n",
         "cells/unused.txt": "",
+        ".env": "",
+        "mine_wave/.env": "",
     }
     for name, text in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -83,21 +96,26 @@ def list_sweep_jobs(folder: Path, cell: str = "") -> list[SweepJob]:
 
 
 def test_all_files_of_the_runs_travel_and_no_others(project: Path) -> None:
-    bundle = make_bundle(list_sweep_jobs(Path("runs")))
+    settings = list_sweep_jobs(Path("runs"))[0].settings
+    bundle = make_bundle(settings)
     names = set(zipfile.ZipFile(io.BytesIO(bundle)).namelist())
-    expected = {str(file) for file in project.rglob("*.*") if file.suffix not in (".py", ".sqlite")}
-    expected.remove(f"{project}/cells/unused.txt")
+    files = {file for file in project.rglob("*.*") if file.suffix not in (".py", ".sqlite")}
+    expected = {str(file) for file in files if file.name not in ("unused.txt", ".env")}
     assert {name for name in names if name.startswith(str(project))} == expected
-    assert {f"{PACKAGES_FOLDER}/mine_wave/{name}.py" for name in ("__init__", "wave")} <= names
-    assert make_bundle(list_sweep_jobs(Path("runs"))) == bundle
+    packages = {name for name in names if name.startswith(f"{PACKAGES_FOLDER}/mine_wave")}
+    assert packages == {f"{PACKAGES_FOLDER}/mine_wave/{name}.py" for name in ("__init__", "wave")}
+    assert make_bundle(settings) == bundle
 
 
-def test_an_absolute_path_to_a_file_is_refused(project: Path) -> None:
-    jobs = list_sweep_jobs(Path("runs"))
-    cell = project / "cells" / "mine.yaml"
-    cell.write_text(f"{cell.read_text()}# {project}/cells/unused.txt\n")
-    with pytest.raises(InputError, match=r"mine.yaml names .*unused.txt\", a path that workers may not"):
-        make_bundle(jobs)
+@pytest.mark.parametrize(
+    "name", ["cells/m.onnx", "cells/models/cube.mtl", "cells/mine.measured.json", "mine_wave/more.txt"]
+)
+def test_a_link_to_a_file_outside_is_refused(name: str, project: Path) -> None:
+    settings = list_sweep_jobs(Path("runs"))[0].settings
+    (project / name).unlink(missing_ok=True)
+    (project / name).symlink_to(project / ".env")
+    with pytest.raises(InputError, match="outside"):
+        list_bundle(settings)
 
 
 @pytest.mark.slow
@@ -106,7 +124,7 @@ def test_a_worker_runs_a_skill_of_another_package_on_another_cell(project: Path,
     stand.write_text("base: overhead.yaml\ncell: stand\nkind: fake\n")
     jobs = list_sweep_jobs(tmp_path / "runs", str(stand))
     local = run_job(jobs[0])
-    plugin = BundlePlugin(make_bundle(jobs), describe_environment())
+    plugin = BundlePlugin(make_bundle(jobs[0].settings), describe_environment())
     worker = SimpleNamespace(local_directory=str(tmp_path))
     plugin.setup(worker)  # type: ignore[arg-type]
     shutil.rmtree(project / "mine_wave")
@@ -114,14 +132,57 @@ def test_a_worker_runs_a_skill_of_another_package_on_another_cell(project: Path,
         first, second = (plugin.execute(jobs[0]) for _ in range(2))
     finally:
         plugin.teardown(worker)  # type: ignore[arg-type]
-    remote = unpack_run(first)
+    remote = unpack_run(first, jobs[0])
     assert local.run.status == "SUCCESS"
     assert "cell: stand\n" in (Path(remote.run.run_directory) / "cell.yaml").read_text()
     assert (remote.run.status, remote.run.decision_hash) == (local.run.status, local.run.decision_hash)
     journals = {(Path(one.run.run_directory) / "journal.jsonl").read_bytes() for one in (local, remote)}
     assert len(journals) == 1
     # Both runs of the worker may have the name of the local run.
-    assert len({local.run.run_directory, remote.run.run_directory, unpack_run(second).run.run_directory}) == 3
+    again = unpack_run(second, jobs[0])
+    assert len({local.run.run_directory, remote.run.run_directory, again.run.run_directory}) == 3
+
+
+def make_job(runs_folder: Path) -> Any:
+    return SimpleNamespace(index=0, seed=0, variant={}, runs_folder=runs_folder)
+
+
+@pytest.mark.parametrize(
+    ("file", "folder"),
+    [("result.json", folder) for folder in ("../../day/run", "run", "../b/day/run", "a/day/run", ".", "..")]
+    + [(file, "day/run") for file in ("../x.json", "/x.json", ".bashrc", "a/.b/x.json", "x.py", "a\\b.json")]
+    + [(file, "day/run") for file in ("a/../../x.json", "x.json/", "x", "x.html.sh", "huge.json")],
+)
+def test_a_returned_run_stays_in_its_folder(
+    file: str, folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("executive.campaign.cluster.MAX_RUN_SIZE", 10)
+    job = make_job(tmp_path / "a" / "runs")
+    run = RunRow(run_index=0, seed=0, status="SUCCESS", run_directory=f"/root{job.runs_folder}/{folder}")
+    with zipfile.ZipFile(tmp_path / "zip", "w") as archive:
+        archive.writestr(file, b" " * (11 if file == "huge.json" else 5))
+    with pytest.raises(InputError, match="a worker returned"):
+        unpack_run(ReturnedRun("/root", RunRecord(run), (tmp_path / "zip").read_bytes()), job)
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["zip"]
+
+
+def test_a_run_from_before_1980_comes_back_with_the_paths_of_this_computer(tmp_path: Path) -> None:
+    job = make_job(tmp_path / "runs")
+    folder = Path(f"{tmp_path}/root{job.runs_folder}/day/run")
+    folder.mkdir(parents=True)
+    (folder / "result.json").write_text(str(folder))
+    os.utime(folder / "result.json", (0, 0))
+    run = RunRow(run_index=0, seed=0, status="SUCCESS", run_directory=str(folder))
+    unpacked = unpack_run(pack_run(RunRecord(run), tmp_path / "root"), job).run.run_directory
+    assert (Path(unpacked) / "result.json").read_text() == unpacked == f"{job.runs_folder}/day/run"
+
+
+@pytest.mark.parametrize(
+    "address", ["ucx://a:1", "tls://a:1", "foo://a:1", "a", "", "tcp://a:b", "tcp://[::1"]
+)
+def test_an_address_without_a_known_protocol_and_port_is_refused(address: str) -> None:
+    with pytest.raises(InputError, match=r"cannot be reached: (the address is not tcp|tls:// needs certi)"):
+        run_jobs_on_cluster([make_job(Path())], address, JobOptions(), lambda *_: None)
 
 
 def test_a_worker_with_other_software_is_described() -> None:
