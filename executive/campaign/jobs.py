@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import functools
 import multiprocessing
 import os
+import re
 import signal
 import threading
+import traceback
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
-from dataclasses import dataclass
-from itertools import product
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
 from executive.behaviours import load_skills
-from executive.campaign.results import RunRecord, RunRow, SweepSettings, make_record
+from executive.campaign.results import ENVIRONMENT_REASON, RunRecord, RunRow, SweepSettings, make_record
 from executive.errors import InputError, describe_error
 from executive.mission.load import LoadedMission, load_mission
 from executive.processes import WorkerPool, kill_workers
@@ -36,6 +38,10 @@ MAX_HALT_DELAY = 0.1
 """Maximum time between a signal to this process and the signals to its workers [s]."""
 MAX_CRASHES = 2
 """A job fails as soon as this many worker processes have died while they executed it."""
+_SYSTEM_ERRORS = map(os.strerror, (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE))
+_OTHER_ERRORS = ("MemoryError", "bad_alloc", "RecordLost", "BrokenProcessPool", "KilledWorker", "BadZipFile")
+_ENVIRONMENT_FAULT = re.compile("|".join((*_SYSTEM_ERRORS, *_OTHER_ERRORS)), re.IGNORECASE)
+"""Text of a fault whose cause is the disk, the memory or a killed process, not the run."""
 
 
 @dataclass(frozen=True)
@@ -211,10 +217,9 @@ class SweepJob:
 
 def list_jobs(settings: SweepSettings, runs_folder: Path) -> list[SweepJob]:
     """Return all jobs of a sweep, variant by variant and seed by seed."""
-    combinations = product(settings.variants, range(settings.first_seed, settings.last_seed + 1))
     return [
         SweepJob(settings, index, variant, seed, runs_folder)
-        for index, (variant, seed) in enumerate(combinations)
+        for index, (variant, seed) in enumerate(settings.combinations)
     ]
 
 
@@ -228,6 +233,9 @@ def run_job(job: SweepJob) -> RunRecord:
     record_options = RecordOptions(saves_pictures=settings.saves_images, timeline=timeline)
     result = record_run(loaded, options, job.runs_folder, record_options)
     record = make_record(job.index, job.variant, result, timeline)
+    if record.run.status == "FAULT":
+        reason = find_fault_reason(f"{result.message}\n{timeline.traceback}")
+        record = replace(record, run=replace(record.run, reason=reason))
     if record.run.problem:
         try_write_report(result.run)
     return record
@@ -236,14 +244,18 @@ def run_job(job: SweepJob) -> RunRecord:
 def make_fault_record(job: SweepJob, error: BaseException) -> RunRecord:
     """Return the record of a run that raised an exception or whose processes died."""
     run = RunRow(
-        run_index=job.index,
-        seed=job.seed,
-        variant=job.variant,
-        status="FAULT",
-        reason="fault",
-        message=describe_error(error),
-    )
+        run_index=job.index, seed=job.seed, variant=job.variant, status="FAULT", message=describe_error(error),
+        reason=find_fault_reason("".join(traceback.format_exception(error))),
+    )  # fmt: skip
     return RunRecord(run)
+
+
+def find_fault_reason(text: str) -> str:
+    """Return the reason of a fault whose messages and traceback are `text`.
+
+    The text is searched, because an exception loses its causes between processes, but not its traceback.
+    """
+    return ENVIRONMENT_REASON if _ENVIRONMENT_FAULT.search(text) else "fault"
 
 
 @functools.lru_cache(maxsize=4)

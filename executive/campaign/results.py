@@ -8,7 +8,9 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import json
+import math
 import os
+import re
 import sqlite3
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, is_dataclass
@@ -20,7 +22,7 @@ from pydantic import TypeAdapter
 
 from executive.cell.json_values import DECIMAL_PLACES, to_json
 from executive.errors import InputError
-from executive.events import ItemChanged
+from executive.events import ItemChanged, RunStatus
 from executive.record.result import Audit, ItemCounts, Result, describe_disagreement
 from executive.record.timeline import PlanningTotals, Timeline
 from executive.view.terminal import format_repeat_command
@@ -29,12 +31,24 @@ FILE_NAME = "results.sqlite"
 """Name of the database in the folder of a sweep."""
 SCHEMA_PATH = Path(__file__).with_name("schema.sql")
 """Statements that create the tables."""
-SCHEMA_VERSION = 1
-"""Version of the tables, stored as `user_version` of the file."""
 BUSY_TIMEOUT = 60.0
 """Maximum time for which a transaction waits for another program that reads the file [s]."""
 JSON_COLUMNS = ("overrides", "variations", "versions", "variant")
 """Columns with the JSON text of a mapping."""
+MAX_RUN_COUNT = 50_000
+"""Maximum number of runs of a sweep; all rows are in memory while a sweep is summarized."""
+MAX_VARIANT_COUNT = 500
+"""Maximum number of variants of a sweep; each variant is checked before the first run."""
+MAX_ROW_COUNT = 2_000_000
+"""Maximum number of rows of a table that are read."""
+MAX_FILE_SIZE = 200_000_000
+"""Maximum size of a database that is read [byte]."""
+MAX_TEXT_LENGTH = 1_000_000
+"""Maximum length of a text that is read [characters]."""
+MAX_NUMBER = 1e15
+"""Maximum of the numbers that are read; their sums are finite and exact."""
+ENVIRONMENT_REASON = "environment"
+"""Reason of a run that ended because of the disk, the memory or a killed process; it is repeated."""
 RowT = TypeVar("RowT")
 
 
@@ -54,6 +68,26 @@ class SweepSettings:
     saves_images: bool
     inputs_hash: str
     versions: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        """Raise InputError if the sweep has no run, or more runs or variants than can be summarized."""
+        variant_count = math.prod(map(len, self.variations.values()))
+        if not 0 < self.run_count <= MAX_RUN_COUNT or variant_count > MAX_VARIANT_COUNT:
+            raise InputError(
+                f"the sweep has {self.run_count} runs of {variant_count} variants; a sweep has 1 to "
+                f"{MAX_RUN_COUNT} runs of at most {MAX_VARIANT_COUNT} variants; change the seeds or --vary"
+            )
+
+    @property
+    def run_count(self) -> int:
+        """Number of runs of the complete sweep."""
+        seed_count = self.last_seed - self.first_seed + 1
+        return math.prod(map(len, self.variations.values())) * seed_count
+
+    @property
+    def combinations(self) -> list[tuple[dict[str, str], int]]:
+        """Variant and seed of each run, variant by variant and seed by seed."""
+        return list(product(self.variants, range(self.first_seed, self.last_seed + 1)))
 
     @property
     def variants(self) -> list[dict[str, str]]:
@@ -80,7 +114,7 @@ class RunRow:
     run_index: int
     seed: int
     variant: Mapping[str, str] = field(default_factory=dict)
-    status: str
+    status: RunStatus
     reason: str = ""
     message: str = ""
     node: str = ""
@@ -204,25 +238,32 @@ class ResultsDatabase:
     def __init__(self, path: Path, settings: SweepSettings | None = None) -> None:
         self.path = path
         self._lock_descriptor: int | None = None
-        if settings is None and not path.is_file():
+        if settings is None and not (path.is_file() and path.stat().st_size <= MAX_FILE_SIZE):
             raise InputError(
-                f'there is no file "{path}"; name the file {FILE_NAME} of a sweep, or its folder'
+                f'there is no file "{path}", or it has more than {MAX_FILE_SIZE // 1_000_000} MB; '
+                f"name the file {FILE_NAME} of a sweep, or its folder"
             )
-        with self._convert_sqlite_errors():
+        schema = SCHEMA_PATH.read_text(encoding="utf-8")
+        with self._convert_errors():
             self._connection = sqlite3.connect(path, timeout=BUSY_TIMEOUT)
             self._connection.row_factory = sqlite3.Row
             if settings is not None:
                 with self._connection as connection:
                     # Tables and settings are written in one transaction.
-                    connection.executescript(f"BEGIN; {SCHEMA_PATH.read_text(encoding='utf-8')}")
+                    connection.executescript(f"BEGIN; {schema}")
                     self._insert("settings", encode_row(settings))
             (version,) = self._connection.execute("PRAGMA user_version").fetchone()
-        if version != SCHEMA_VERSION:
-            raise InputError(
-                f'"{path}" is no database of a sweep, or has the schema version {version}; '
-                f"this program reads version {SCHEMA_VERSION}; start a new sweep"
-            )
-        (self.settings,) = self._select(SweepSettings, "settings")
+            (state,) = self._connection.execute("PRAGMA quick_check(1)").fetchone()
+            rows = self._connection.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL").fetchall()
+            # Views and computed columns of a foreign file could take any time and memory.
+            found = ";".join((f"PRAGMA user_version = {version}", *(sql for (sql,) in rows), ""))
+            # Comments and blanks do not count.
+            if len({re.sub(r"--.*|\s+", "", text) for text in (found, schema)}) > 1 or state != "ok":
+                raise InputError(
+                    f'"{path}" is no database of a sweep: it has schema version {version} or other tables '
+                    f"than this program writes, or is damaged ({state}); start a new sweep"
+                )
+            (self.settings,) = self._select(SweepSettings, "settings")
         if settings is not None:
             self.lock()
 
@@ -247,7 +288,7 @@ class ResultsDatabase:
         Raises:
             InputError: The file cannot be written, or contains the run already.
         """
-        with self._convert_sqlite_errors(), self._connection:
+        with self._convert_errors(), self._connection:
             self._insert("runs", encode_row(record.run))
             for item, time in record.items:
                 self._insert("items", {
@@ -258,9 +299,25 @@ class ResultsDatabase:
             for skill in record.skills:
                 self._insert("skills", encode_row(skill))
 
+    def delete_environment_faults(self) -> None:
+        """Delete all rows of the runs that ended because of disk, memory or a killed process."""
+        query = f"SELECT run_index FROM runs WHERE reason = '{ENVIRONMENT_REASON}'"
+        with self._convert_errors(), self._connection as connection:
+            for table in ("items", "skills", "runs"):
+                connection.execute(f"DELETE FROM {table} WHERE run_index IN ({query})")
+
     def read_runs(self) -> list[RunRow]:
-        """Return the rows of all runs, in the order of the jobs."""
-        return self._select(RunRow, "runs ORDER BY run_index")
+        """Return the rows of all runs, in the order of the jobs.
+
+        Raises:
+            InputError: A row is damaged, or is no run of this sweep.
+        """
+        runs = self._select(RunRow, "runs ORDER BY run_index")
+        combinations = dict(enumerate(self.settings.combinations))
+        for run in runs:
+            if combinations.get(run.run_index) != (run.variant, run.seed):
+                raise InputError(f'"{self.path}" is damaged: run {run.run_index} is no run of the sweep')
+        return runs
 
     def read_skills(self) -> list[SkillRow]:
         """Return the rows of all skills, sorted by run."""
@@ -279,20 +336,21 @@ class ResultsDatabase:
         self._connection.execute(statement, tuple(columns.values()))
 
     def _select(self, row_class: type[RowT], source: str) -> list[RowT]:
-        with self._convert_sqlite_errors():
-            rows = self._connection.execute(f"SELECT * FROM {source}").fetchall()
         # The adapter also converts the numbers of SQLite, which has no Boolean type.
         adapter = TypeAdapter(row_class)
-        return [adapter.validate_python(_decode_columns(row)) for row in rows]
+        with self._convert_errors():
+            cursor = self._connection.execute(f"SELECT * FROM {source} LIMIT {MAX_ROW_COUNT}")
+            return [adapter.validate_python(_decode_columns(row)) for row in cursor]
 
     @contextlib.contextmanager
-    def _convert_sqlite_errors(self) -> Iterator[None]:
-        """Convert an error of SQLite to an InputError with the path of the file."""
+    def _convert_errors(self) -> Iterator[None]:
+        """Convert an error of SQLite or of a damaged value to an InputError with the path of the file."""
         try:
             yield
-        except sqlite3.Error as error:
+        except (sqlite3.Error, ValueError, RecursionError, MemoryError) as error:
+            problem = "; ".join(str(error).split("\n")[:3]) or type(error).__name__
             raise InputError(
-                f'the results "{self.path}" cannot be read or written: {error}; '
+                f'the results "{self.path}" cannot be read or written: {problem}; '
                 "runs that were stored before this error may still be in the file"
             ) from error
 
@@ -312,14 +370,22 @@ def encode_row(row: SweepSettings | RunRow | SkillRow) -> dict[str, Any]:
 
 
 def _decode_columns(row: sqlite3.Row) -> dict[str, Any]:
-    """Return the values of a row by field, without the columns that are NULL."""
+    """Return the values of a row by field, without the columns that are NULL.
+
+    Raises:
+        ValueError: A number is negative, too large or not finite, or a text is too long or no JSON.
+    """
     values: dict[str, Any] = {}
     for column, value in dict(row).items():
         part, _, name = column.partition("_")
         if value is None:
             continue
+        if isinstance(value, (int, float)) and not 0 <= value <= MAX_NUMBER:
+            raise ValueError(f"{column} is {value:g}; the numbers are 0 to {MAX_NUMBER:g}")
+        if not isinstance(value, (int, float)) and (len(value) > MAX_TEXT_LENGTH or "\0" in str(value)):
+            raise ValueError(f"{column} is too long, or contains a null character")
         if part in ("items", "audit", "planning"):
             values.setdefault(part, {})[name] = value
         else:
-            values[column] = json.loads(value) if column in JSON_COLUMNS else value
+            values[column] = json.loads(str(value)) if column in JSON_COLUMNS else value
     return values

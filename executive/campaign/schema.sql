@@ -22,7 +22,7 @@ CREATE TABLE runs ( -- A run. All columns except `wall_time_s`, `run_directory` 
   seed INTEGER, -- Random seed.
   variant TEXT, -- Values of the varied params and keys of the cell, by name.
   status TEXT, -- Final status: SUCCESS, INCOMPLETE, FAILURE or FAULT.
-  reason TEXT, -- Reason of the failure, for instance `Transit.dropped`; "" on success.
+  reason TEXT, -- Reason of the failure, for instance `Transit.dropped`; `environment` if the disk, the memory or a killed process caused a FAULT; "" on success.
   message TEXT, -- Sentence that explains the status, or "".
   node TEXT, -- Path of the node that caused the status, or "".
   items_seen INTEGER, -- Number of items by final state, from the ledger.

@@ -12,6 +12,7 @@ from contextlib import ExitStack, closing
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from types import ModuleType
 
 from executive.behaviours import load_skills
 from executive.campaign.jobs import JobOptions, list_jobs, make_fault_record, run_job, run_jobs
@@ -141,13 +142,15 @@ def open_comparison(folder: Path) -> list[ResultsDatabase]:
 def run_sweep(database: ResultsDatabase, options: JobOptions, cluster: str | None = None) -> None:
     """Execute the missing runs of a sweep, and store the record of each run as soon as the run ends.
 
-    A run gets the status `FAULT` after two of its worker processes died. After Ctrl-C or SIGTERM no further
-    run starts, and current runs are halted; halted runs are not stored. `cluster` is the address of a dask
-    scheduler, whose workers execute the runs, or None.
+    Stored runs that ended because of disk, memory or a killed process are executed again. A run gets the
+    status `FAULT` after two of its worker processes died. After Ctrl-C or SIGTERM no further run starts, and
+    current runs are halted; halted runs are not stored. `cluster` is the address of a dask scheduler, whose
+    workers execute the runs, or None.
 
     Raises:
         InputError: The jobs cannot be executed on the cluster.
     """
+    database.delete_environment_faults()
     stored_indices = {run.run_index for run in database.read_runs()}
     jobs = list_jobs(database.settings, database.path.parent)
     missing_jobs = [job for job in jobs if job.index not in stored_indices]
@@ -159,13 +162,26 @@ def run_sweep(database: ResultsDatabase, options: JobOptions, cluster: str | Non
     if cluster is None:
         run_jobs(missing_jobs, run_job, make_fault_record, options, store)
         return
+    _import_cluster().run_jobs_on_cluster(missing_jobs, cluster, options, store)
+
+
+def list_cluster_files(settings: SweepSettings) -> list[str]:
+    """Return the paths of the files that travel to the workers of a cluster.
+
+    Raises:
+        InputError: A file is outside of the folder of the file that names it.
+    """
+    return sorted(_import_cluster().list_bundle(settings))
+
+
+def _import_cluster() -> ModuleType:
     try:
         # The packages of the extra `cluster` are optional.
-        from executive.campaign.cluster import run_jobs_on_cluster
+        import executive.campaign.cluster as cluster
     except ImportError:
         advice = f'install them with `uv sync --extra cluster` or `pip install "{DISTRIBUTION}[cluster]"`'
         raise InputError(f'--cluster needs the packages of the extra "cluster"; {advice}') from None
-    run_jobs_on_cluster(missing_jobs, cluster, options, store)
+    return cluster
 
 
 def read_results(database: ResultsDatabase, side: str = "") -> SweepResults:

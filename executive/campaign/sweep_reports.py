@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -39,6 +40,8 @@ PAGE_NAME = "results.html"
 """Name of the page in the folder of a sweep or a comparison."""
 MAX_LISTED_RUNS = 500
 """Maximum number of runs in a table of the page."""
+MAX_REQUIREMENT_LENGTH = 1000
+"""Maximum length of a requirement [characters]; each condition goes through all runs."""
 METRICS = ("success", "agreement", "objects_per_hour")
 """Metrics of a variant: names of attributes of `VariantSummary` with the type `Estimate`."""
 PERCENTILES: Mapping[str, float] = {"min": 0, "median": 50, "p50": 50, "p95": 95, "p99": 99, "max": 100}
@@ -64,7 +67,7 @@ def render_summary(sweep: SweepResults) -> Iterator[RenderableType]:
         yield f"{success_count} of {run_count} runs succeeded"
     else:
         successes = f"; {success_count} of the {run_count} succeeded" if run_count else ""
-        yield f"halted after {run_count} of {sweep.planned_run_count} runs{successes}"
+        yield f"halted after {run_count} of {sweep.settings.run_count} runs{successes}"
     if not sweep.summaries:
         return
     table = Table(box=SIMPLE_HEAD, padding=(0, 1))
@@ -228,13 +231,12 @@ class Condition:
     symbol: str
     limit: float
 
-    def compute_value(self, runs: Sequence[RunRow], summary: VariantSummary) -> float | None:
-        """Return the value of the metric for the runs of a variant; None without data."""
+    def compute_value(self, rows: Sequence[Mapping[str, Any]], summary: VariantSummary) -> float | None:
+        """Return the value of the metric for the encoded runs of a variant; None without data."""
         if not self.column:
             value: float | None = getattr(summary, self.metric).value
             return value
-        columns = map(encode_row, runs)
-        numbers = [float(each[self.column]) for each in columns if self.column in each]
+        numbers = [float(row[self.column]) for row in rows if self.column in row]
         if not numbers:
             return None
         percentile = PERCENTILES.get(self.metric)
@@ -250,8 +252,11 @@ def parse_requirement(text: str) -> tuple[Condition, ...]:
     """Parse conditions that are separated by `and`.
 
     Raises:
-        InputError: A part is no condition, or has an unknown metric, statistic or column.
+        InputError: The text is too long, or a part is no condition, or has an unknown metric, statistic or
+            column.
     """
+    if len(text) > MAX_REQUIREMENT_LENGTH:
+        raise InputError(f"--require has {len(text)} characters; the maximum is {MAX_REQUIREMENT_LENGTH}")
     return tuple(map(_parse_condition, re.split(r"\band\b", text)))
 
 
@@ -275,10 +280,10 @@ def describe_unmet_conditions(conditions: Sequence[Condition], sweep: SweepResul
     """Return a message for each condition that the runs of a variant do not meet."""
     messages = [] if sweep.summaries else ["no run has ended"]
     for summary in sweep.summaries:
-        variant_runs = [run for run in sweep.runs if run.variant == summary.variant]
+        rows = [encode_row(run) for run in sweep.runs if run.variant == summary.variant]
         name = describe_variant(summary.variant)
         for condition in conditions:
-            value = condition.compute_value(variant_runs, summary)
+            value = condition.compute_value(rows, summary)
             if value is None or not OPERATORS[condition.symbol](value, condition.limit):
                 found = "no run has a value" if value is None else f"the value is {value:.6g}"
                 messages.append(f"{condition} is not met{name and f' with {name}'}: {found}")

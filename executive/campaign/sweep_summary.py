@@ -140,15 +140,9 @@ class SweepResults:
     summaries: Sequence[VariantSummary]
 
     @property
-    def planned_run_count(self) -> int:
-        """Number of runs of the complete sweep."""
-        seed_count = self.settings.last_seed - self.settings.first_seed + 1
-        return len(self.settings.variants) * seed_count
-
-    @property
     def is_incomplete(self) -> bool:
         """True if runs are missing."""
-        return len(self.runs) < self.planned_run_count
+        return len(self.runs) < self.settings.run_count
 
 
 def summarize_runs(
@@ -158,17 +152,22 @@ def summarize_runs(
     runs_by_variant: dict[tuple[tuple[str, str], ...], list[RunRow]] = defaultdict(list)
     for run in runs:
         runs_by_variant[tuple(run.variant.items())].append(run)
-    return [_summarize_variant(group, skills, settings) for group in runs_by_variant.values()]
+    skills_by_run: dict[int, list[SkillRow]] = defaultdict(list)
+    for row in skills:
+        skills_by_run[row.run_index].append(row)
+    return [
+        _summarize_variant(group, [row for run in group for row in skills_by_run[run.run_index]], settings)
+        for group in runs_by_variant.values()
+    ]
 
 
 def _summarize_variant(
     runs: Sequence[RunRow], skills: Sequence[SkillRow], settings: SweepSettings
 ) -> VariantSummary:
-    """Return the summary of the runs of one variant; `skills` contains the rows of all variants."""
+    """Return the summary of the runs of one variant, of which there must be at least one."""
     audits = [run.audit for run in runs if run.audit]
     plannings = [astuple(run.planning) for run in runs]
     object_count = sum(audit.right + audit.wrong_bin + audit.left + audit.elsewhere for audit in audits)
-    run_indices = {run.run_index for run in runs}
     hours = [run.robot_time_s / SECONDS_PER_HOUR for run in runs]
     return VariantSummary(
         variant=runs[0].variant,
@@ -179,7 +178,7 @@ def _summarize_variant(
         robot_time_s=SummaryStatistics.from_values([run.robot_time_s for run in runs]),
         wall_time_s=SummaryStatistics.from_values([run.wall_time_s for run in runs]),
         planning=PlanningTotals(*map(sum, zip(*plannings, strict=True))),
-        skills=_summarize_skills([row for row in skills if row.run_index in run_indices], len(runs)),
+        skills=_summarize_skills(skills, len(runs)),
         failure_groups=_group_failures(runs, settings),
     )
 

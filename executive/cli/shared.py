@@ -54,7 +54,7 @@ def _parse_variations(
     for key, text in _parse_overrides(ctx, param, values).items():
         try:
             nodes = yaml.compose(text, yaml.SafeLoader)
-        except yaml.YAMLError:
+        except (yaml.YAMLError, RecursionError):
             nodes = None
         if not isinstance(nodes, yaml.SequenceNode) or not nodes.value:
             message = f'"{key}={text}" is not of the form KEY=[VALUE, ...], for example attempts=[1, 3]'
@@ -155,6 +155,7 @@ _SWEEP_OPTIONS = (
         "--cluster", metavar="ADDRESS",
         help="Run on the workers of a dask scheduler, for example tcp://scheduler:8786 (extra: cluster).",
     ),
+    click.option("--dry-run", is_flag=True, help="Print the number of runs, and the files for --cluster."),
     click.option(
         "--frames", "save_images", is_flag=True,
         help="Save the camera images on which decisions are based.",

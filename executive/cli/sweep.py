@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from executive.cli import shared
 from executive.errors import ExitCode
+
+if TYPE_CHECKING:
+    from executive.campaign.results import SweepSettings
+    from executive.campaign.sweep_summary import SweepResults
 
 
 @click.command(name="sweep")
@@ -29,8 +34,9 @@ from executive.errors import ExitCode
 @click.pass_context
 def sweep_command(
     ctx: click.Context, mission: str | None, seeds: range | None, variations: dict[str, tuple[str, ...]],
-    resume: Path | None, workers: int, cluster: str | None, save_images: bool, overrides: dict[str, str],
-    cell: str, scene: Path | None, runs_folder: Path, require: str | None, junit: Path | None, as_json: bool,
+    resume: Path | None, workers: int, cluster: str | None, dry_run: bool, save_images: bool,
+    overrides: dict[str, str], cell: str, scene: Path | None, runs_folder: Path, require: str | None,
+    junit: Path | None, as_json: bool,
 ) -> int:  # fmt: skip
     """Run a mission once for every seed and variant, and summarize the runs.
 
@@ -46,6 +52,7 @@ def sweep_command(
     shared.check_usage(
         (lacks_input, "give a MISSION and --seeds, or --resume SWEEP"),
         (has_settings, "--resume takes mission, seeds and settings from the sweep; omit them"),
+        (dry_run and (resume or as_json), "--dry-run prints a text; omit --resume and --json"),
     )
     shared.check_disjoint(overrides, "--vary", variations)
     with shared.keep_stdout_clean():
@@ -62,6 +69,8 @@ def sweep_command(
             assert mission is not None
             assert seeds is not None
             settings = make_settings(mission, seeds, overrides, variations, scene, save_images, cell)
+            if dry_run:
+                return _print_plan([settings], cluster)
             database = create_sweep(settings, runs_folder)
         with closing(database):
             click.echo(f"results: {database.path}", err=True)
@@ -79,10 +88,31 @@ def sweep_command(
     if as_json:
         shared.print_json(to_json({
             "settings": results.settings, "results": str(database.path), "page": str(page),
-            "planned_run_count": results.planned_run_count, "is_incomplete": results.is_incomplete,
+            "planned_run_count": results.settings.run_count, "is_incomplete": results.is_incomplete,
             "variants": results.summaries, "unmet_conditions": unmet_conditions, "runs": results.runs,
         }))  # fmt: skip
-    return ExitCode.HALTED if results.is_incomplete else ExitCode(int(bool(unmet_conditions)))
+    return _find_exit_code([results]) or ExitCode(int(bool(unmet_conditions)))
+
+
+def _print_plan(sweeps: Sequence[SweepSettings], cluster: str | None) -> ExitCode:
+    """Print the number of runs of each sweep, and the files that would travel to a cluster."""
+    from executive.campaign.sweep import list_cluster_files
+
+    for settings in sweeps:
+        files = list_cluster_files(settings) if cluster else []
+        lines = [f"{settings.run_count} runs of {settings.mission}; {len(files)} files travel", *files]
+        shared.print_report(lines)
+    return ExitCode.SUCCESS
+
+
+def _find_exit_code(sweeps: Sequence[SweepResults]) -> ExitCode:
+    """Return HALTED if runs are missing, and FAULT if runs failed because of their environment."""
+    if count := sum(run.reason == "environment" for sweep in sweeps for run in sweep.runs):
+        causes = "disk, memory or a killed process"
+        click.echo(f"runs that failed because of {causes}: {count}; --resume repeats them", err=True)
+    if any(sweep.is_incomplete for sweep in sweeps):
+        return ExitCode.HALTED
+    return ExitCode.FAULT if count else ExitCode.SUCCESS
 
 
 @click.command(name="compare")
@@ -100,8 +130,8 @@ def sweep_command(
 def compare_command(
     ctx: click.Context, missions: tuple[str, ...], seeds: range | None, overrides_a: dict[str, str],
     overrides_b: dict[str, str], cell_a: str, cell_b: str, resume: Path | None, workers: int,
-    cluster: str | None, save_images: bool, overrides: dict[str, str], cell: str, scene: Path | None,
-    runs_folder: Path, as_json: bool,
+    cluster: str | None, dry_run: bool, save_images: bool, overrides: dict[str, str], cell: str,
+    scene: Path | None, runs_folder: Path, as_json: bool,
 ) -> int:  # fmt: skip
     """Run the missions A and B once for every seed, and estimate the differences.
 
@@ -119,6 +149,7 @@ def compare_command(
     shared.check_usage(
         (lacks_input, "give one or two missions and --seeds, or --resume FOLDER"),
         (has_settings, "--resume takes missions, seeds and settings from the comparison; omit them"),
+        (dry_run and (resume or as_json), "--dry-run prints a text; omit --resume and --json"),
         (cell and (cell_a or cell_b), "--cell is for A and B; omit it, or omit --cell-a and --cell-b"),
     )
     shared.check_disjoint(overrides, "--set-a or --set-b", {**overrides_a, **overrides_b})
@@ -126,7 +157,7 @@ def compare_command(
         # The imports take half a second, for which `--help` and wrong options must not wait.
         from executive.campaign import sweep, sweep_reports
         from executive.campaign.jobs import JobOptions
-        from executive.campaign.sweep_summary import SweepResults, compute_differences, pair_runs
+        from executive.campaign.sweep_summary import compute_differences, pair_runs
         from executive.cell.json_values import to_json
 
         if resume is not None:
@@ -138,6 +169,8 @@ def compare_command(
                 sweep.make_settings(name, seeds, overrides | own, {}, scene, save_images, own_cell or cell)
                 for name, own, own_cell in sides
             ]
+            if dry_run:
+                return _print_plan(settings, cluster)
             databases = sweep.create_comparison(settings, runs_folder)
         results: list[SweepResults] = []
         for side, database in zip("AB", databases, strict=True):
@@ -160,7 +193,7 @@ def compare_command(
             "pair_count": len(pairs), "differences": differences, "changed_pairs": changed_pairs,
             "summaries": [summary for result in results for summary in result.summaries],
         }))  # fmt: skip
-    return ExitCode.HALTED if any(result.is_incomplete for result in results) else ExitCode.SUCCESS
+    return _find_exit_code(results)
 
 
 def parse_fault_numbers(text: str) -> tuple[int, ...]:

@@ -2,7 +2,7 @@
 
 One run of a mission is recorded; all damaged records are copies of it. A copy is damaged at random; or its
 journal is cut off, while the world went on; or the run is killed, and the last blocks of its logs are
-removed. Each command runs in a forked child.
+removed. The database of a sweep is damaged in the same way. Each command runs in a forked child.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ import json
 import math
 import os
 import shutil
+import sqlite3
 from collections import Counter
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -19,7 +21,9 @@ from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from executive.campaign.jobs import MissionUnderTest
+from executive.campaign.jobs import JobOptions, MissionUnderTest
+from executive.campaign.results import FILE_NAME
+from executive.campaign.sweep import create_comparison, make_settings, run_sweep
 from executive.cli.main import main
 from executive.drivers.world_log import FILE_HEADER
 from executive.errors import InputError
@@ -47,6 +51,18 @@ ODD_VALUES = (
     {"a": 1},
 )  # fmt: skip
 """Values that replace a value of an event."""
+SQL_VALUES = (
+    "NULL", "-1", "9e999", "1e308", str(2**63 - 1), "''", "x'ff00fe'", "CAST(x'ff' AS TEXT)", "char(0)",
+    "char(27) || '[31m'", "hex(zeroblob(30000000))", "replace(hex(zeroblob(9999)), '0', '[')", "'[]'",
+)  # fmt: skip
+"""Values, as SQL, that replace a value of a database."""
+SQL_STATEMENTS = (
+    "DROP TABLE {0}", "DELETE FROM {0}", "DELETE FROM {0} WHERE rowid = 2", "PRAGMA user_version = 2",
+    "ALTER TABLE {0} DROP COLUMN {1}", "ALTER TABLE {0} ADD COLUMN x", "UPDATE {0} SET rowid = rowid + 2",
+    "DROP TABLE {0}; CREATE VIEW {0} AS WITH RECURSIVE x(i) AS (VALUES(1) UNION ALL SELECT i + 1 FROM x) "
+    "SELECT i AS {1} FROM x", "INSERT INTO settings (mission, mission_name) VALUES ('x', 'y')",
+)  # fmt: skip
+"""Statements that damage a database; the arguments are a table and a column."""
 OTHER_FILES = ("tree.json", "cell.yaml", "mission.yaml", "params.yaml", "result.json", "world.log", "frames")
 """Files of a run directory besides its journal."""
 
@@ -74,6 +90,25 @@ def damage_run(rng: Random, path: Path) -> str:
     file.unlink()
     file.write_bytes(content)
     return f"{kind} in {file.name}"
+
+
+def damage_database(rng: Random, file: Path) -> str:
+    """Damage a value, the tables or the bytes of the database of a sweep; return the damage in words."""
+    kind = rng.choice(("value", "value", "statement", "bytes", "end"))
+    if kind in ("bytes", "end"):
+        content = file.read_bytes()
+        cut = content[: rng.randrange(len(content))]
+        file.write_bytes(cut if kind == "end" else _damage_bytes(rng, content))
+        return kind
+    with closing(sqlite3.connect(file)) as connection, connection:
+        table = rng.choice(("settings", "settings", "runs", "runs", "items", "skills"))
+        _, column, *_ = rng.choice(connection.execute(f"PRAGMA table_info({table})").fetchall())
+        statement = f"UPDATE {table} SET {column} = {rng.choice(SQL_VALUES)} WHERE rowid = 1"
+        if kind == "statement":
+            statement = rng.choice(SQL_STATEMENTS).format(table, column)
+        with suppress(sqlite3.Error):  # For instance, no column of a key can be dropped.
+            connection.executescript(statement)
+    return statement
 
 
 def _damage_event(rng: Random, content: bytes, kind: str) -> bytes:
@@ -145,8 +180,10 @@ def measure(
     others: int = 200,
     truncations: int = 300,
     kills: int = 100,
+    databases: int = 130,
+    first_case: int = 0,
 ) -> Figures:
-    """Damage records of a run of MISSION, and read, replay and resume them."""
+    """Damage records of a run of MISSION and databases of a comparison, and read, replay and resume them."""
     runs_folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix=".damaged-", dir=runs_folder) as folder:
         base = Path(folder).resolve()  # The children have another working directory.
@@ -156,12 +193,21 @@ def measure(
         whole = find_run(LATEST_LINK, base / "whole")
         rows = []
         problems = []
-        commands = {"report": ["report"], "replay": ["replay"], "resume": ["run", "--quiet", "--resume"]}
-        for name, words in commands.items():
+        sides = _record_comparison(subject, base / "comparison") if databases else whole
+        commands = {
+            "report": (["report"], whole, reports), "replay": (["replay"], whole, others),
+            "resume": (["run", "--quiet", "--resume"], whole, others),
+            "sweep": (["sweep", "--resume"], sides / "b", databases // 2),
+            "compare": (["compare", "--resume"], sides, databases - databases // 2),
+        }  # fmt: skip
+        for name, (words, source, count) in commands.items():
             results = []
-            for seed in show_progress(range(reports if name == "report" else others), name):
-                path = _copy_run(whole, base / "copy")
-                damage = damage_run(Random(seed), path)
+            for seed in show_progress(range(first_case, first_case + count), name):
+                path = _copy_run(source, base / "copy")
+                database = next(path.rglob(FILE_NAME), None)
+                damage = (
+                    damage_database(Random(seed), database) if database else damage_run(Random(seed), path)
+                )
                 with TemporaryDirectory() as logs:
                     act = partial(main, [*words, str(path)])
                     results.append(run_in_child(act, base, Path(logs)))
@@ -194,6 +240,17 @@ def _record_whole(subject: MissionUnderTest, runs: Path) -> Snapshots:
     options = RunOptions(subject.seed, subject.requests, make_cell=subject.make_cell)
     record_run(subject.loaded, options, runs, RecordOptions([snapshots]))
     return snapshots
+
+
+def _record_comparison(subject: MissionUnderTest, runs: Path) -> Path:
+    """Compare the mission with itself, and return the folder of the comparison."""
+    mission = str(subject.loaded.path)
+    settings = make_settings(mission, range(2), subject.loaded.overrides, {}, None, saves_images=False)
+    databases = create_comparison([settings] * 2, runs)
+    for database in databases:
+        with closing(database):
+            run_sweep(database, JobOptions())
+    return databases[0].path.parents[1]
 
 
 def _copy_run(source: Path, target: Path) -> Path:

@@ -32,7 +32,7 @@ from tests.benchmarks.report import Figures, run_command, show_progress
 MAX_CPU_TIME = 5.0
 """Largest accepted CPU time of a command, without the import of Python modules [s]."""
 MAX_MEMORY = 300.0
-"""Largest accepted resident memory of `check` [MB]."""
+"""Largest accepted resident memory of `check`, `sweep` and `compare` [MB]."""
 MAX_WALL_TIME = 60
 """Wall time after which a command is killed [s]."""
 EXIT_CODES = (0, 1, 2, 4)
@@ -303,7 +303,7 @@ def find_problems(arguments: Arguments, result: CommandResult) -> list[str]:
         problems.append(f"exit code {result.exit_code}: {text[-300:]}")
     if result.cpu_time > MAX_CPU_TIME:
         problems.append(f"{result.cpu_time:.1f} s of CPU time; {MAX_CPU_TIME:g} s are allowed")
-    if result.memory > MAX_MEMORY and arguments[0] == "check":
+    if result.memory > MAX_MEMORY and arguments[0] in ("check", "sweep", "compare"):
         problems.append(f"{result.memory:.0f} MB of memory; {MAX_MEMORY:g} MB are allowed")
     if found := FORBIDDEN.search(text):
         problems.append(f"prints {found[0][:20]!r}: {text[max(found.start() - 60, 0) : found.end()][:300]!r}")

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sqlite3
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
+from random import Random
 from typing import Any
 from xml.etree import ElementTree
 
@@ -38,6 +39,7 @@ from executive.errors import InputError
 from executive.events import ItemChanged, NodeEnded, NodeStarted, RunEnded, TargetSelected, TimedEvent
 from executive.record.result import Audit, ItemCounts, Result
 from executive.record.timeline import PlanningTotals, Timeline
+from tests.benchmarks.damaged_records import damage_database
 
 SETTINGS = SweepSettings(
     mission="sort.yaml", mission_name="sort", cell="cells/fruit.yaml", overrides={"attempts": "3"},
@@ -108,7 +110,7 @@ def test_an_item_takes_the_time_from_its_selections_to_its_end() -> None:
 
 
 def test_all_rows_are_read_as_they_were_stored(tmp_path: Path) -> None:
-    plain = RunRow(run_index=0, seed=0, status="SUCCESS")
+    plain = RunRow(run_index=0, seed=0, variant={"speed": "1"}, status="SUCCESS")
     with closing(ResultsDatabase(tmp_path / FILE_NAME, SETTINGS)) as database:
         database.append(RECORD)
         database.append(RunRecord(plain))
@@ -140,13 +142,31 @@ def test_a_run_is_stored_completely_or_not_at_all(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [(None, "there is no file"), ("text " * 99, "file is not a database"), ("", "the schema version 0")],
+    [(None, "there is no file"), ("text " * 99, "file is not a database"), ("", "has schema version 0")],
 )
 def test_another_file_is_refused(content: str | None, message: str, tmp_path: Path) -> None:
     if content is not None:
         (tmp_path / "file").write_text(content)
     with pytest.raises(InputError, match=message):
         ResultsDatabase(tmp_path / "file")
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_damaged_database_is_read_or_refused(seed: int, tmp_path: Path) -> None:
+    with closing(ResultsDatabase(tmp_path / FILE_NAME, SETTINGS)) as database:
+        database.append(RECORD)
+    damage_database(Random(seed), tmp_path / FILE_NAME)
+    with suppress(InputError), closing(ResultsDatabase(tmp_path / FILE_NAME)) as database:
+        make_results(*database.read_runs())
+        database.read_skills()
+
+
+@pytest.mark.parametrize(
+    "changes", [{"last_seed": 2**32 - 2}, {"variations": {name: tuple("abcdefghij") for name in "xyz"}}]
+)
+def test_a_sweep_of_too_many_runs_or_variants_is_refused_at_once(changes: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=r"a sweep has 1 to 50000 runs of at most 500 variants"):
+        replace(SETTINGS, **changes)
 
 
 @pytest.fixture(scope="module")
@@ -292,6 +312,7 @@ def test_every_variant_must_meet_the_requirement() -> None:
             "speed>1",
             r'there is no metric "speed"; the metrics are success, agreement, objects_per_hour, mean\(',
         ),
+        ("success>1 and " * 999, "has 13986 characters; the maximum is"),
         ("p98(ticks)>1", r"p95\(COLUMN\), p99\(COLUMN\), max\(COLUMN\)$"),
         ("p95(seed)>1", "is no numeric column of the runs; these are ticks, robot_time_s, .*items_seen"),
     ],

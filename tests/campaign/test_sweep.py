@@ -8,6 +8,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -157,6 +158,18 @@ def test_a_run_whose_process_died_is_repeated_once_and_costs_no_other_run(
     ]  # fmt: skip
     assert "BrokenProcessPool" in rows[0].message
     assert [row.message for row in rows[2:]] == ["1", "there is no place for seed three"]
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (OSError(28, os.strerror(28)), "environment"), (MemoryError(), "environment"),
+        (BrokenProcessPool(), "environment"), (ValueError(), "fault"),
+        (InputError("no run directory: no space left on device"), "environment"),
+    ],
+)  # fmt: skip
+def test_the_reason_of_a_fault_says_whether_the_run_is_repeated(error: Exception, reason: str) -> None:
+    assert make_fault_record(list_jobs(SETTINGS, Path())[0], error).run.reason == reason
 
 
 def halt_second(job: SweepJob) -> RunRecord:

@@ -20,6 +20,7 @@ from executive.record.result import Audit, ItemCounts
 def make_record(job: SweepJob, status: str = "SUCCESS") -> RunRecord:
     failure = ("Grasp.missed", "no seal", "tree/Grasp")
     reason, message, node = ("", "", "") if status == "SUCCESS" else failure
+    status, reason = ("FAULT", "environment") if status == "DISK" else (status, reason)
     run = RunRow(
         run_index=job.index, seed=job.seed, variant=job.variant, status=status, reason=reason,
         message=message, node=node, items=ItemCounts(seen=2, placed=2), audit=Audit(right=2),
@@ -85,6 +86,24 @@ def test_an_unmet_requirement_is_the_reason_of_exit_code_1(sweep: Callable[..., 
     assert (shown.exit_code, message in shown.stderr) == (1, True)
     assert sweep("SUCCESS SUCCESS", *words).exit_code == 0
     assert sweep("SUCCESS", *words).exit_code == 130, "a halt is more important"
+
+
+def test_a_run_that_failed_because_of_the_disk_is_repeated(
+    sweep: Callable[..., Result], tmp_path: Path
+) -> None:
+    assert sweep("SUCCESS DISK", "--seeds", "0:2").exit_code == 3
+    (folder,) = (tmp_path / "runs").glob("*/*_sweep_sort_fruit")
+    assert sweep("SUCCESS", "--resume", str(folder)).exit_code == 0
+
+
+def test_a_dry_run_lists_the_files_that_would_travel(sweep: Callable[..., Result], tmp_path: Path) -> None:
+    first, *files = sweep("", "--seeds", "0:2", "--dry-run", "--cluster", "tcp://a:1").stderr.splitlines()
+    assert first == f"2 runs of sort_fruit; {len(files)} files travel"
+    assert any(file.endswith("cells/fruit.yaml") for file in files) and not (tmp_path / "runs").exists()
+
+
+def test_nested_values_of_vary_are_refused(sweep: Callable[..., Result]) -> None:
+    assert sweep("", "--seeds", "0:2", "--vary", f"attempts={'[' * 5_000}").exit_code == 2
 
 
 def test_a_resumed_sweep_reports_all_runs(sweep: Callable[..., Result], tmp_path: Path) -> None:
