@@ -19,7 +19,7 @@ import tempfile
 import threading
 import uuid
 import zipfile
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass, replace
@@ -56,8 +56,6 @@ PACKAGES_FOLDER = ".packages"
 """Folder of the packages with plugins (`PLUGIN_GROUPS`), in an unpacked bundle."""
 _ADDRESS = re.compile(r"((?:tcp|tls)://)?(\[[\da-fA-F:.]+\]|[^\s:/\[\]]+):\d{1,5}")
 """Addresses of a scheduler; ucx:// needs hardware and a configuration of its own."""
-MAX_SUBMITTED_COUNT = 1000
-"""Maximum number of jobs that the scheduler knows at one time."""
 MAX_RUN_SIZE = 300_000_000
 """Maximum size of the files of a run that a worker returns [byte]."""
 MAX_LINE_LENGTH = 10_000_000
@@ -102,7 +100,6 @@ def run_jobs_on_cluster(
     if not jobs:
         return
     crash_counts: Counter[int] = Counter()
-    waiting_indices = deque(range(len(jobs)))
     unfinished_jobs: dict[distributed.Future, int] = {}
     signal_event = threading.Event()
     with handle_signals(HALT_SIGNALS, lambda *_: signal_event.set()), _connect(address) as client:
@@ -116,8 +113,7 @@ def run_jobs_on_cluster(
             return future
 
         try:
-            first_indices = [waiting_indices.popleft() for _ in jobs[:MAX_SUBMITTED_COUNT]]
-            completions = distributed.as_completed(list(map(submit, first_indices)), loop=client.loop)
+            completions = distributed.as_completed(list(map(submit, range(len(jobs)))), loop=client.loop)
             while unfinished_jobs and not signal_event.is_set():
                 for future in completions.next_batch(block=False):
                     index = unfinished_jobs.pop(future)
@@ -138,9 +134,7 @@ def run_jobs_on_cluster(
                             _check_workers(client, address)  # A worker may have joined later.
                         record = make_fault_record(jobs[index], error)
                     on_result(index, record, crash_counts[index])
-                    if waiting_indices:
-                        completions.add(submit(waiting_indices.popleft()))
-                    options.on_progress(len(jobs) - len(waiting_indices) - len(unfinished_jobs), len(jobs))
+                    options.on_progress(len(jobs) - len(unfinished_jobs), len(jobs))
                 signal_event.wait(POLLING_PERIOD)
             if signal_event.is_set():
                 options.on_halt()

@@ -347,7 +347,7 @@ class ResultsDatabase:
         """Convert an error of SQLite or of a damaged value to an InputError with the path of the file."""
         try:
             yield
-        except (sqlite3.Error, ValueError, RecursionError, MemoryError) as error:
+        except (sqlite3.Error, ValueError, TypeError, AttributeError, RecursionError, MemoryError) as error:
             problem = "; ".join(str(error).split("\n")[:3]) or type(error).__name__
             raise InputError(
                 f'the results "{self.path}" cannot be read or written: {problem}; '
@@ -387,5 +387,5 @@ def _decode_columns(row: sqlite3.Row) -> dict[str, Any]:
         if part in ("items", "audit", "planning"):
             values.setdefault(part, {})[name] = value
         else:
-            values[column] = json.loads(str(value)) if column in JSON_COLUMNS else value
+            values[column] = json.loads(value) if column in JSON_COLUMNS else value
     return values

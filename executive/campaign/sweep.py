@@ -162,19 +162,15 @@ def run_sweep(database: ResultsDatabase, options: JobOptions, cluster: str | Non
     if cluster is None:
         run_jobs(missing_jobs, run_job, make_fault_record, options, store)
         return
-    _import_cluster().run_jobs_on_cluster(missing_jobs, cluster, options, store)
+    import_cluster().run_jobs_on_cluster(missing_jobs, cluster, options, store)
 
 
-def list_cluster_files(settings: SweepSettings) -> list[str]:
-    """Return the paths of the files that travel to the workers of a cluster.
+def import_cluster() -> ModuleType:
+    """Return the module `executive.campaign.cluster`.
 
     Raises:
-        InputError: A file is outside of the folder of the file that names it.
+        InputError: The extra `cluster` is not installed.
     """
-    return sorted(_import_cluster().list_bundle(settings))
-
-
-def _import_cluster() -> ModuleType:
     try:
         # The packages of the extra `cluster` are optional.
         import executive.campaign.cluster as cluster

@@ -96,10 +96,10 @@ def sweep_command(
 
 def _print_plan(sweeps: Sequence[SweepSettings], cluster: str | None) -> ExitCode:
     """Print the number of runs of each sweep, and the files that would travel to a cluster."""
-    from executive.campaign.sweep import list_cluster_files
+    from executive.campaign.sweep import import_cluster
 
     for settings in sweeps:
-        files = list_cluster_files(settings) if cluster else []
+        files = sorted(import_cluster().list_bundle(settings)) if cluster else []
         lines = [f"{settings.run_count} runs of {settings.mission}; {len(files)} files travel", *files]
         shared.print_report(lines)
     return ExitCode.SUCCESS

@@ -218,14 +218,14 @@ def list_model_files(model: Path) -> list[Path]:
     files = [model]
     for path in files:  # The loop goes on with the files that it appends.
         find_model(str(path.absolute()))  # It limits the size.
-        names: list[str] = []
+        values: list[str] = []
         if path.suffix.lower() in (".obj", ".mtl"):
             values = _NAMED_FILE.findall(path.read_text(encoding="utf-8", errors="replace"))
-            # Options may precede the name.
-            names = [name for value in values for name in (value, value.split()[-1])]
         elif path.suffix.lower() == ".urdf":
-            names = [element.get("filename", "") for element in read_robot(path).iter()]
-        named_files = [path.parent / _normalize_name(path, name) for name in filter(None, names)]
+            values = [element.attrib["filename"] for element in read_robot(path).findall(".//*[@filename]")]
+        # Options of a material may precede the name.
+        names = [name for value in values for name in dict.fromkeys((value, *value.split()[-1:]))]
+        named_files = [path.parent / _normalize_name(path, name) for name in names]
         files += [file for file in dict.fromkeys(named_files) if file.is_file() and file not in files]
     return files
 

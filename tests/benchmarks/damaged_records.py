@@ -57,7 +57,7 @@ SQL_VALUES = (
 )  # fmt: skip
 """Values, as SQL, that replace a value of a database."""
 SQL_STATEMENTS = (
-    "DROP TABLE {0}", "DELETE FROM {0}", "DELETE FROM {0} WHERE rowid = 2", "PRAGMA user_version = 2",
+    "DROP TABLE {0}", "DELETE FROM settings", "DELETE FROM {0} WHERE rowid = 2", "PRAGMA user_version = 2",
     "ALTER TABLE {0} DROP COLUMN {1}", "ALTER TABLE {0} ADD COLUMN x", "UPDATE {0} SET rowid = rowid + 2",
     "DROP TABLE {0}; CREATE VIEW {0} AS WITH RECURSIVE x(i) AS (VALUES(1) UNION ALL SELECT i + 1 FROM x) "
     "SELECT i AS {1} FROM x", "INSERT INTO settings (mission, mission_name) VALUES ('x', 'y')",
