@@ -63,7 +63,9 @@ def test_halts_of_a_fake_cell_are_in_order_and_a_wrong_ledger_is_found() -> None
 def test_killed_and_damaged_runs_are_resumed(tmp_path: Path) -> None:
     figures = kills.measure(load(), tmp_path / "kills", kills=4, changed=2)
     assert (figures["problems"], figures["kills"]) == ([], 4)
-    figures = damaged_records.measure(load(), tmp_path, reports=12, others=6, truncations=6, kills=2)
+    figures = damaged_records.measure(
+        load(), tmp_path, reports=12, others=6, truncations=6, kills=2, databases=4
+    )
     assert (figures["problems"], [row["agree"] for row in figures["resumed"]]) == ([], [6, 2])
 
 
