@@ -78,7 +78,9 @@ INSTALLATION_ADVICE = "install the same versions there, and start the scheduler 
 """Advice to the user of a worker with other software."""
 RUN_TEXT_SUFFIXES = (".html", ".json", ".jsonl", ".yaml")
 """Suffixes of the files of a run that may contain paths."""
-RUN_FILE = re.compile(r"(?:[^./\\][^/\\]*/)*[^./\\][^/\\]*\.(?:html|jsonl?|ya?ml|log|jpg|png)")
+RUN_FILE = re.compile(
+    r"(?:libraries/|(?=.*\.(html|jsonl?|yaml|log|jpg|png)$))(?:[^./\\][^/\\]*/)*[^./\\][^/\\]*"
+)
 """Relative paths of the files of a run; no part begins with a dot."""
 
 

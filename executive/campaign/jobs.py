@@ -244,8 +244,8 @@ def run_job(job: SweepJob) -> RunRecord:
 def make_fault_record(job: SweepJob, error: BaseException) -> RunRecord:
     """Return the record of a run that raised an exception or whose processes died."""
     run = RunRow(
-        run_index=job.index, seed=job.seed, variant=job.variant, status="FAULT", message=describe_error(error),
-        reason=find_fault_reason("".join(traceback.format_exception(error))),
+        run_index=job.index, seed=job.seed, variant=job.variant, status="FAULT",
+        reason=find_fault_reason("".join(traceback.format_exception(error))), message=describe_error(error),
     )  # fmt: skip
     return RunRecord(run)
 

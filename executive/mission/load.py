@@ -307,7 +307,9 @@ def load_mission(
         folders = (cell.path.parent, get_shipped_folder() / "cells")
         for keys, message in find_unmeasured_detectors(config, cell.path.parent, folders):
             findings.append(make_warning(cell.find_span(keys, at_key=True), "not-measured", message))
-    libraries = [find_file_below(mission_path.parent, library) for library in files.libraries]
+    libraries = [
+        find_file_below(library_folder or mission_path.parent, library) for library in files.libraries
+    ]
     return LoadedMission(
         mission, tree, config, files.source.text, mission_path, cell.path, files.libraries,
         find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
