@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import gzip
 import json
 import socket
 import threading
-from collections.abc import Callable, Mapping, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from itertools import chain, repeat
 from typing import Any
 
 import cv2
@@ -106,6 +109,8 @@ class _Handler(BaseHTTPRequestHandler):
             # A server may say anything: this one tells the key that it was given.
             key = self.headers.get("Authorization", "").removeprefix("Bearer ")
             self._json({"message": f"key {key} is no good"}, int(fault))
+        elif fault in FLOODS:
+            self._flood(*FLOODS[fault])
         elif fault in BODIES:
             self._send(BODIES[fault].encode(), "text/html" if fault == "html" else "application/json")
         else:
@@ -122,6 +127,17 @@ class _Handler(BaseHTTPRequestHandler):
         # A picture is larger than anything that the detector hands on.
         picture = {"type": "base64", "value": "A" * (2 << 20)}
         return {"outputs": [{"picture": picture, "boxes": boxes}], "profiler_trace": []}
+
+    def _flood(self, status: int, headers: Mapping[str, str], parts: Callable[[], Iterator[bytes]]) -> None:
+        """Send headers and every part of a body for as long as somebody listens."""
+        self.send_response(status)
+        for name, value in headers.items():
+            self.send_header(name, value)
+        self.end_headers()
+        for part in parts():
+            self.wfile.write(part)
+            if self.stub.over.wait(0.1 if len(part) < 4 else 0.0):
+                return
 
     def _json(self, answer: Any, status: int = 200) -> None:
         self._send(json.dumps(answer).encode(), "application/json", status)
@@ -147,6 +163,33 @@ def _other_size(found: list[dict[str, Any]], answer: dict[str, Any]) -> Any:
     answer["image"] = {"width": 1, "height": 1}
     return found
 
+
+PACKER = zlib.compressobj(wbits=31)
+START, BLOCK = (PACKER.compress(b" " * (1 << 20)) + PACKER.flush(zlib.Z_FULL_FLUSH) for _ in range(2))
+"""Start of a compressed body, and a block that can be repeated, of 1 MB of blanks each."""
+BOMB = START + BLOCK * 1000
+LONG = {"Content-Length": "3000000000"}
+CHUNKED = {"Transfer-Encoding": "chunked"}
+GZIP = {"Content-Encoding": "gzip"}
+FLOODS: dict[str, tuple[int, dict[str, str], Callable[[], Iterator[bytes]]]] = {
+    "oversized": (200, LONG, lambda: repeat(b" " * (1 << 20))),
+    "oversized error": (404, LONG, lambda: repeat(b"e" * (1 << 20))),
+    "no end": (200, {}, lambda: repeat(b"[" * (1 << 20))),
+    "chunks": (200, CHUNKED, lambda: repeat(b"10000\r\n" + b" " * 65536 + b"\r\n")),
+    "chunk size": (200, CHUNKED, lambda: repeat(b"1;" + b"x" * (1 << 20))),
+    "trailers": (200, CHUNKED, lambda: chain([b"1\r\n1\r\n0\r\n"], repeat(b"a: b\r\n" * 10_000))),
+    "headers": (200, {f"h{n}": "x" * 65_000 for n in range(90)}, lambda: iter([b"null"])),
+    "drip": (200, LONG, lambda: repeat(b" ")),
+    "bomb": (200, GZIP, lambda: iter([BOMB])),
+    "double bomb": (200, {"Content-Encoding": "gzip, gzip"}, lambda: iter([gzip.compress(BOMB)])),
+    "empty members": (200, GZIP, lambda: repeat(gzip.compress(b"") * 50_000)),
+    "cut gzip": (200, GZIP, lambda: iter([BOMB[:500]])),
+    "truncated": (200, LONG, lambda: iter([b'{"predictions": []}'])),
+    "many values": (200, {}, lambda: chain([b"["], repeat(b"[]," * (1 << 18), 10), [b"0]"])),
+    "codec": (404, {"Content-Type": "text/plain; charset=punycode"}, lambda: repeat(b"-a" * 100_000, 40)),
+    "loop": (307, {"Location": "/model/add", "Content-Length": "0"}, lambda: iter(())),
+}
+"""Status, headers and parts of the body of answers that are too long, in one way or another."""
 
 BODIES = {
     "broken json": '{"predictions": [{"x": 1',

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gzip
 import json
 import os
 import re
@@ -13,7 +14,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from stub_server import BODIES, MODEL, SPOILT, WORKFLOW, StubServer
+from stub_server import BODIES, FLOODS, MODEL, SPOILT, WORKFLOW, StubServer
 
 from executive.cell.config import DetectorConfig
 from executive.errors import DeadlinePassed, Unavailable
@@ -163,6 +164,46 @@ FAULTS = {
 def test_every_fault_of_the_server_is_unavailable_with_what_to_do(make, server, fault, api):
     server.faults = lambda look: fault
     assert_unavailable(make(**APIS[api]), f"^{server.url}|no answer within", FAULTS[fault])
+
+
+def measure_helper(detector):
+    """Return the peak memory of the helper process [MB]."""
+    status = Path(f"/proc/{detector._process._process.pid}/status").read_text()
+    return int(re.search(r"VmHWM:\s+(\d+)", status)[1]) / 1e3
+
+
+@pytest.mark.slow
+def test_an_answer_without_bounds_is_not_read_to_its_end(make, server):
+    detector = make(**APIS["workflow"])
+    for fault in FLOODS:
+        server.faults = lambda look, fault=fault: fault
+        assert_unavailable(detector, f"^{server.url}|no answer within")
+        detector._process.wait_until_ready()
+        assert measure_helper(detector) < 500, fault
+
+
+@pytest.mark.parametrize("fault", ["bomb", "oversized", "chunks"])
+def test_a_bounded_part_of_a_long_answer_is_read(make, server, fault):
+    detector = make(**V1)
+    server.faults = lambda look: fault
+    assert_unavailable(detector, f"^{server.url} sent an answer .* of more than 8388608 bytes")
+    assert measure_helper(detector) < 300
+
+
+def test_an_image_is_not_sent_to_the_address_of_a_redirect(make, server):
+    server.faults = lambda look: "redirect"
+    other = StubServer(lambda image: [])
+    FLOODS["redirect"] = 307, {"Location": f"{other.url}/infer", "Content-Length": "0"}, lambda: iter(())
+    assert_unavailable(make(**V1), f"a redirect to {other.url}/infer, another server")
+    other.stop()
+    assert other.asked == []
+
+
+def test_a_compressed_answer_is_read(make, server):
+    server.faults = lambda look: "gzip"
+    body = gzip.compress(b'{"predictions": []}')
+    FLOODS["gzip"] = 200, {"Content-Encoding": "gzip", "Content-Length": str(len(body))}, lambda: iter([body])
+    assert make(**V1).detect(show_spot(), "table") == []
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ ready, one for each retry, and one answer per image. The program exits at the en
 
 from __future__ import annotations
 
+import io
 import json
 import logging
 import os
@@ -16,6 +17,7 @@ import socket
 import ssl
 import sys
 import threading
+import zlib
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, BinaryIO
@@ -27,6 +29,12 @@ from executive.perception.detectors.roboflow.inference_process import KEY_VARIAB
 
 MAX_ANSWER_LENGTH = 1 << 20
 """Maximum number of characters of an answer, about 20 times the length of 300 predictions."""
+MAX_BODY_SIZE = 8 << 20
+"""Maximum size of the body of an HTTP response [byte], compressed or not; workflows also return images."""
+CHUNK_SIZE = 1 << 16
+"""Number of bytes of a response that are read at once."""
+MAX_DETAIL_LENGTH = 10_000
+"""Maximum number of characters of the message of an error."""
 
 WriteMessage = Callable[..., None]
 """Function that writes its keyword arguments as one line of JSON."""
@@ -84,6 +92,7 @@ def _make_inference_function(settings: dict[str, Any]) -> InferenceFunction:
     # The import takes 2 s, and the executive reports its errors.
     from inference_sdk import InferenceConfiguration, InferenceHTTPClient
 
+    _bound_responses(settings["url"])
     key = os.environ.get(KEY_VARIABLE, "").strip() or None
     client = InferenceHTTPClient(settings["url"].rstrip("/"), key)
     # By default, inference-sdk puts the key into URLs, and the URLs into error messages.
@@ -107,6 +116,48 @@ def _make_inference_function(settings: dict[str, Any]) -> InferenceFunction:
     return infer
 
 
+def _bound_responses(url: str) -> None:
+    """Limit all HTTP responses in this process to `MAX_BODY_SIZE`, and all requests to the server at `url`.
+
+    inference-sdk uses the library requests, which reads responses of any size, and follows redirects to any
+    server; afterwards, such a request raises ValueError.
+    """
+    import urllib3
+    from requests.adapters import HTTPAdapter
+
+    server = urllib3.connection_from_url(url)
+    send = HTTPAdapter.send
+
+    def send_within_limits(adapter: HTTPAdapter, request: Any, **options: Any) -> Any:
+        if not server.is_same_host(request.url):
+            raise ValueError(f"a redirect to {request.url}, another server")
+        request.headers["Accept-Encoding"] = "gzip"
+        response = send(adapter, request, **{**options, "stream": True})
+        response.raw = io.BytesIO(_read_body(response.raw))
+        response.encoding = "utf-8"  # The encoding of JSON; the detection of another one would take long.
+        return response
+
+    HTTPAdapter.send = send_within_limits  # type: ignore[assignment, method-assign]
+
+
+def _read_body(response: Any) -> bytearray | bytes:
+    """Return the decompressed body of a response of urllib3; raise ValueError above `MAX_BODY_SIZE`."""
+    problem = f"an answer of more than {MAX_BODY_SIZE} bytes"
+    body = bytearray()
+    while chunk := response.read(CHUNK_SIZE, decode_content=False):
+        body += chunk
+        if len(body) > MAX_BODY_SIZE:
+            response.close()
+            raise ValueError(problem)
+    if response.headers.get("Content-Encoding", "identity") == "identity":
+        return body
+    decoder = zlib.decompressobj(wbits=zlib.MAX_WBITS | 32)  # The number 32 selects the format by its header.
+    content = decoder.decompress(body, MAX_BODY_SIZE)
+    if not decoder.eof:
+        raise ValueError(f"{problem}, or an incomplete one")
+    return content
+
+
 def _process_image(infer: InferenceFunction, image: NDArray[np.uint8], write: WriteMessage) -> None:
     """Send an image to the server, and write the answer or the failure."""
     try:
@@ -115,7 +166,8 @@ def _process_image(infer: InferenceFunction, image: NDArray[np.uint8], write: Wr
             answer = {key: answer[key] for key in ("image", "predictions") if key in answer}
         text = json.dumps(answer)
     except Exception as error:
-        write(**_describe_error(error))
+        failure = _describe_error(error)
+        write(**{**failure, "detail": failure["detail"][:MAX_DETAIL_LENGTH]})
         return
     if len(text) > MAX_ANSWER_LENGTH:
         write(failure="invalid", detail=f"an answer of {len(text)} characters")
@@ -127,6 +179,7 @@ def _describe_error(error: Exception) -> dict[str, Any]:
     """Return the kind of failure and the message of an exception of inference-sdk."""
     # Both packages are installed with inference-sdk, whose import has succeeded.
     import requests
+    import urllib3
     from inference_sdk.http import errors as sdk_errors
 
     if isinstance(error, sdk_errors.HTTPCallErrorError):
@@ -140,8 +193,11 @@ def _describe_error(error: Exception) -> dict[str, Any]:
         ("refused", (ConnectionRefusedError,)),
         ("unknown host", (socket.gaierror,)),
         ("tls", (ssl.SSLError,)),
-        ("invalid", (ValueError, LookupError, AttributeError, TypeError, RecursionError)),
-        ("lost", (OSError, requests.RequestException, sdk_errors.HTTPClientError)),
+        ("invalid", (ValueError, LookupError, AttributeError, TypeError, RecursionError, zlib.error)),
+        (
+            "lost",
+            (OSError, requests.RequestException, urllib3.exceptions.HTTPError, sdk_errors.HTTPClientError),
+        ),
     )
     for failure, exception_types in failures:
         for cause in _iterate_causes(error):
