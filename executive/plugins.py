@@ -23,7 +23,8 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from executive.errors import InputError, Interrupted, explain_os_errors, to_text
+from executive.errors import InputError, Interrupted, to_text
+from executive.text.files import read_source
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -32,6 +33,8 @@ else:
 
 DISTRIBUTION = "pick-place-executive"
 """Name of the distribution of this project; `executive` in the package index is another project."""
+MAX_DOT_COUNT = 5_000
+"""Maximum number of dots in a pyproject.toml."""
 CLASS_PATH = re.compile(r"\w+(\.\w+)*:\w+(\.\w+)*")
 """Import path of a class: `module:Class`."""
 _EXAMPLE_LINE = 'Wave = "my_package.wave:Wave"'
@@ -204,12 +207,13 @@ def _is_shared(folder: Path) -> bool:
 
 def _read_project(file: Path) -> Project:
     """Return the project with the given pyproject.toml."""
+    text = read_source(file).text
+    # The time of the parser grows with the square of the number of parts of a dotted key.
+    if text.count(".") > MAX_DOT_COUNT:
+        raise InputError(f"{file} contains more than {MAX_DOT_COUNT} dots; the file registers plugins")
     try:
-        with explain_os_errors(InputError, f"{file} cannot be read", "the file registers plugins"):
-            content = tomllib.loads(file.read_bytes().decode("utf-8"))
-    except UnicodeDecodeError as error:
-        raise InputError(f"{file} is not UTF-8 text: byte {error.start} is invalid") from None
-    except tomllib.TOMLDecodeError as error:
+        content = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{file} is not valid TOML: {error}; the file registers plugins") from None
     table = content.get("project", {})
     if not isinstance(table, dict):

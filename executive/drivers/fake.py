@@ -30,6 +30,7 @@ from executive.geometry import GRAVITY, Array, Pose
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.joints import build_planning_kinematics
 from executive.perception.camera_model import compute_calibration
+from executive.text.files import MAX_RECORD_SIZE, read_file
 from executive.text.validate import KeyPath
 
 MAX_STEP_ERROR = 1e-6
@@ -311,7 +312,9 @@ class FakeDriver:
 
     def rebuild(self, path: Path) -> int:
         try:
-            ticks, last_command_tick, q, held, objects, removed_objects = json.loads(path.read_bytes())
+            ticks, last_command_tick, q, held, objects, removed_objects = json.loads(
+                read_file(path, MAX_RECORD_SIZE)
+            )
             self.clock.tick_count = int(ticks)
             self.last_command_tick = int(last_command_tick)
             self.arm.q = np.array(q, dtype=float).reshape(self.arm.q.shape)
@@ -319,7 +322,7 @@ class FakeDriver:
             self.world.objects = restored[: len(objects)]
             self.world.removed_objects = restored[len(objects) :]
             self.world.held_object = None if held is None else self.world.objects[held]
-        except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
+        except (ValueError, TypeError, LookupError, RecursionError) as error:
             raise InputError(f'the world in "{path}" is damaged: {error}; run the mission again') from error
         self._step_count = round(self.clock.now / STEP)
         self.log_to(path)

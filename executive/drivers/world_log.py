@@ -18,6 +18,10 @@ import numpy as np
 
 from executive.errors import Fault, InputError, describe_os_error, explain_os_errors
 from executive.motion.trajectory import Trajectory
+from executive.text.files import read_file
+
+MAX_LOG_SIZE = 100_000_000
+"""Maximum size of a log [byte]; the log of a run of 2,000 objects has 1 MB."""
 
 
 class LogFile:
@@ -151,9 +155,7 @@ def read_commands(path: Path) -> Iterator[Command]:
 
 
 def _read_complete_lines(path: Path) -> bytes:
-    consequence = "without it a simulated run can neither be resumed nor shown in a video"
-    with explain_os_errors(InputError, f'cannot read the log of the world "{path}"', consequence):
-        content = path.read_bytes()
+    content = read_file(path, MAX_LOG_SIZE)
     if not content.startswith(FILE_HEADER):
         header = FILE_HEADER.decode().strip()
         raise InputError(f'"{path}" is no log of a world: it does not begin with "{header}"')

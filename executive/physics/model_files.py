@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from executive.cell.arm_config import TOOL_LINK, ArmFile
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
-from executive.text.files import has_outside_link, is_outside_path
+from executive.text.files import get_shipped_folder, has_outside_link, is_outside_path, read_image_header
 from executive.text.findings import suggest_choice
 from executive.text.validate import KeyPath
 
@@ -33,6 +33,10 @@ MAX_MODEL_SIZE = 20_000_000
 """Maximum size of a model file [byte], to limit the duration of the check."""
 MAX_TRIANGLE_COUNT = 20_000
 """Maximum number of triangles of a mesh: a collision in PyBullet takes 3 s with 20,000, 60 s with 300,000."""
+MAX_GROUP_COUNT = 1_000
+"""Maximum number of groups and objects of a Wavefront file, of each of which PyBullet makes a convex hull."""
+MAX_FILE_NAME_COUNT = 100
+"""Maximum number of files that a Wavefront or material file may name."""
 FIXED_JOINTS = "joint[@type='fixed'][parent]"
 """Path of the fixed joints of a URDF."""
 _NAMED_FILE = re.compile(r"^\s*(?:mtllib|map_\w+|bump|disp|decal|refl)\s+(.*\S)", re.MULTILINE)
@@ -59,6 +63,12 @@ def find_model(name: str) -> Path:
     raise InputError(f"there is no model {name}, neither beside the cell file nor in pybullet_data")
 
 
+def is_shipped(path: Path) -> bool:
+    """Return True if a model belongs to pybullet_data or to the executive."""
+    folders = (Path(pybullet_data.getDataPath()), get_shipped_folder() / "cells" / "fasteners")
+    return any(path.is_relative_to(folder.resolve()) for folder in folders)
+
+
 def read_robot(path: Path) -> Element:
     """Return the root element of a URDF.
 
@@ -81,15 +91,24 @@ def read_urdf(path: Path) -> Element:
         InputError: The file is no URDF, refers to a file outside of its folder, or has an invalid mesh.
     """
     root = read_robot(path)
+    check_files(path, root)
+    _merge_links(path, root)
+    return root
+
+
+def check_files(path: Path, root: Element, max_triangle_count: float = MAX_TRIANGLE_COUNT) -> None:
+    """Check every file that a URDF names; `root` is the root element of the URDF.
+
+    Raises:
+        InputError: The URDF has a namespace, or a mesh or texture is invalid, or outside of its folder.
+    """
     for element in root.iter():
         if element.tag.startswith("{"):
             raise InputError(f"the model {path.name} has an XML namespace, {element.tag}; remove it")
-        if "filename" in element.attrib:
-            _normalize_name(path, element.attrib["filename"])
         if element.tag == "mesh":
-            read_mesh(find_mesh(path, element))
-    _merge_links(path, root)
-    return root
+            read_mesh(find_mesh(path, element), max_triangle_count)
+        elif "filename" in element.attrib:
+            read_image_header(find_mesh(path, element))
 
 
 def _merge_links(path: Path, root: Element) -> None:
@@ -201,10 +220,10 @@ def _make_folder() -> tempfile.TemporaryDirectory[str]:
 
 
 def find_mesh(urdf: Path, mesh: Element) -> Path:
-    """Return the path of the mesh file of a `mesh` element of a URDF.
+    """Return the path of the file of a `mesh` or `texture` element of a URDF.
 
     Raises:
-        InputError: The mesh is no file in the folder of the URDF, or is too large.
+        InputError: It is no file in the folder of the URDF, or is too large.
     """
     return find_model(str(urdf.parent / _normalize_name(urdf, mesh.get("filename", ""))))
 
@@ -249,11 +268,12 @@ def _normalize_name(urdf: Path, name: str) -> str:
 
 
 @lru_cache(maxsize=64)
-def read_mesh(path: Path) -> Triangles:
+def read_mesh(path: Path, max_triangle_count: float = MAX_TRIANGLE_COUNT) -> Triangles:
     """Return vertices and triangles of a Wavefront, STL or COLLADA file; polygons are split into triangles.
 
     Raises:
-        InputError: The file has another suffix, contains no valid mesh, or has too many triangles.
+        InputError: The file has another suffix, contains no valid mesh, has too many triangles, or names an
+            invalid material or texture.
     """
     suffix = path.suffix.lower()
     if suffix not in MESH_KINDS:
@@ -271,16 +291,38 @@ def read_mesh(path: Path) -> Triangles:
     except Exception as error:  # trimesh raises errors of many types
         reason = "it has no scene, or a wrong reference" if isinstance(error, AttributeError) else error
         raise InputError(f"the model {path.name} is no {MESH_KINDS[suffix]} mesh: {reason}") from None
-    if len(faces) > MAX_TRIANGLE_COUNT:
-        problem = f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles"
+    if len(faces) > max_triangle_count:
+        problem = f"the model {path.name} has more than {max_triangle_count} triangles"
         raise InputError(f"{problem}; simplify the mesh")
+    if suffix == ".obj":
+        for material in _list_named_files(path, rb"mtllib[ \t]+(\S+)"):
+            for texture in _list_named_files(material, rb"map_Kd[ \t](.*)"):
+                read_image_header(texture)
     return points, faces
+
+
+def _list_named_files(path: Path, pattern: bytes) -> Iterator[Path]:
+    """Yield the existing files in the lines of a Wavefront or material file that match `pattern`.
+
+    PyBullet opens these files; it leaves out missing materials and textures.
+    """
+    names = set(re.findall(rb"(?m)^[ \t]*" + pattern, path.read_bytes()))
+    if len(names) > MAX_FILE_NAME_COUNT:
+        raise InputError(f"the model {path.name} names more than {MAX_FILE_NAME_COUNT} files; join them")
+    for name in map(os.fsdecode, map(bytes.strip, sorted(names))):
+        if os.path.lexists(path.parent / name):
+            yield find_model(str(path.parent / _normalize_name(path, name)))
 
 
 def _read_wavefront(path: Path) -> tuple[ArrayLike, ArrayLike]:
     vertices: list[list[float]] = []
     triangles: list[tuple[int, int, int]] = []
-    for line in path.read_text(encoding="utf-8").splitlines():
+    text = path.read_text(encoding="utf-8")
+    if len(re.findall(r"(?m)^[ \t]*[go][ \t]", text)) > MAX_GROUP_COUNT:
+        raise ValueError(
+            f"it has more than {MAX_GROUP_COUNT} groups (lines beginning with g or o); join them"
+        )
+    for line in text.splitlines():
         keyword, *words = line.split() or [""]
         if keyword == "v":
             vertices.append([float(word) for word in words[:3]])
@@ -305,7 +347,7 @@ def _read_with_trimesh(path: Path, suffix: str) -> tuple[ArrayLike, ArrayLike]:
         raise ValueError("it is an archive, or contains NaN")
     with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.simplefilter("error", DeprecationWarning)  # NumPy warns about text that is no number
-        scene = trimesh.load_scene(io.BytesIO(content), suffix[1:], process=False)
+        scene = trimesh.load_scene(io.BytesIO(content), suffix[1:], process=False, ignore_broken=False)
         if scene.units:
             scene = scene.convert_units("meters")
         corners = scene.to_mesh().triangles.reshape(-1, 3)
@@ -344,7 +386,10 @@ def parse_numbers(
 def find_arm_model_errors(arm: ArmFile) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message for each error in the model of the arm: missing links, wrong joints."""
     try:
-        robot = read_robot(find_model(arm.urdf))
+        path = find_model(arm.urdf)
+        robot = read_robot(path)
+        if not is_shipped(path):
+            check_files(path, robot, math.inf)
     except InputError as error:
         yield ("arm", "urdf"), str(error)
         return

@@ -22,6 +22,7 @@ from executive.record.run_directory import RunDirectory, find_recorded_options, 
 from executive.record.timeline import get_skill_name
 from executive.run.assembly import RunOptions
 from executive.run.replay import InputLog, ResumedRun, assemble_replay, assemble_resumed
+from executive.text.files import read_source
 
 EVENTS_WITHOUT_REPLAY = (RunStarted, MotionPlanned, RequestGiven)
 """Kinds of events that a replay does not emit."""
@@ -90,7 +91,7 @@ def replay_run(
     if start is None or not log.inputs:
         raise InputError(f'"{path}" contains no run that can be replayed: its journal has no inputs of a run')
     loaded = read_mission_of_run(path, start, skills, mission)
-    edited = mission is not None and loaded.text != (path / "mission.yaml").read_text(encoding="utf-8")
+    edited = mission is not None and loaded.text != read_source(path / "mission.yaml").text
     return replay_and_compare(loaded, log, start.seed, edited=edited)
 
 

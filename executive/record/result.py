@@ -13,12 +13,13 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from executive.cell.json_values import to_json
-from executive.errors import ExecutiveError, ExitCode, explain_os_errors
+from executive.errors import ExecutiveError, ExitCode, InputError, explain_os_errors
 from executive.events import RunResumed, RunStatus, TimedEvent
 from executive.record.journal import find_run_end
 from executive.record.run_directory import RunDirectory, write_atomically
 from executive.record.timeline import ItemHistory, Look, PlanningTotals, Timeline
 from executive.station.station import AUDIT_KEYS
+from executive.text.files import MAX_RECORD_SIZE, read_file
 
 QUIT_REQUEST = "quit"
 """Request of the operator to end the run."""
@@ -223,8 +224,8 @@ def write_result(path: Path, result: Result) -> None:
 def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result | None:
     """Return the result of a run; None if the file is missing, damaged, or older than the last resumption."""
     try:
-        result = TypeAdapter(Result).validate_json(directory.result.read_bytes())
-    except (OSError, ValueError):
+        result = TypeAdapter(Result).validate_json(read_file(directory.result, MAX_RECORD_SIZE))
+    except (InputError, ValueError):
         return None
     end = find_run_end(events)
     if end is not None:

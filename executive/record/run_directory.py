@@ -7,9 +7,10 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
+from typing import Annotated
 
 import yaml
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic import ConfigDict, FailFast, TypeAdapter, ValidationError
 
 from executive.behaviours import Skills
 from executive.cell.arm_config import DEFAULT_ARM_FILE
@@ -20,14 +21,17 @@ from executive.events import JOURNAL_FORMAT, RunStarted
 from executive.mission.cell_file import CellFile
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.outline import OutlineNode
-from executive.text.files import get_shipped_folder
+from executive.text.files import MAX_RECORD_SIZE, get_shipped_folder, read_file, read_source
 from executive.text.findings import Source
+from executive.text.yaml_files import load_yaml
 
 FOLDER_ADVICE = "name another folder with --runs DIR"
 """Advice if a run directory cannot be made or written."""
 LATEST_LINK = "latest"
 """Name of the link to the last run directory."""
-_NODES_ADAPTER = TypeAdapter(list[OutlineNode], config=ConfigDict(ser_json_inf_nan="strings"))
+_NODES_ADAPTER = TypeAdapter(
+    Annotated[list[OutlineNode], FailFast()], config=ConfigDict(ser_json_inf_nan="strings")
+)
 """Encoder and decoder of `tree.json`."""
 
 
@@ -205,9 +209,9 @@ def read_cell(path: Path) -> CellConfig:
         InputError: The cell file cannot be read.
     """
     try:
-        content = yaml.safe_load((path / "cell.yaml").read_text(encoding="utf-8"))
+        content = load_yaml(read_source(path / "cell.yaml"))
         # Earlier records contain only model, limits and poses of their arm, which was always the default arm.
-        default_arm = yaml.safe_load((get_shipped_folder() / DEFAULT_ARM_FILE).read_text(encoding="utf-8"))
+        default_arm = load_yaml(read_source(get_shipped_folder() / DEFAULT_ARM_FILE))
         return CellConfig(**{**content, "arm": {**default_arm, **content["arm"]}})
     except ValidationError as error:
         texts = (each["msg"].removeprefix("Value error, ") for each in error.errors())
@@ -217,7 +221,7 @@ def read_cell(path: Path) -> CellConfig:
         raise InputError(
             f'the cell file in the run directory "{path}" is invalid: {problems}; {advice}'
         ) from error
-    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError) as error:
+    except (ValueError, TypeError, KeyError, yaml.YAMLError) as error:
         raise InputError(f'cannot read the cell file in the run directory "{path}": {error}') from error
 
 
@@ -245,9 +249,7 @@ def read_tree(path: Path) -> list[OutlineNode]:
     Raises:
         InputError: The file cannot be read or contains no outline.
     """
-    with explain_os_errors(InputError, f'cannot read the tree "{path}"'):
-        content = path.read_bytes()
     try:
-        return _NODES_ADAPTER.validate_json(content)
+        return _NODES_ADAPTER.validate_json(read_file(path, MAX_RECORD_SIZE))
     except ValidationError as error:
         raise InputError(f'"{path}" contains no tree of a run: {error.errors()[0]["msg"].lower()}') from error

@@ -1,4 +1,4 @@
-"""Search for the files of missions and cells, and their text."""
+"""Search for files, and their content within limits: text, and the headers of images."""
 
 from __future__ import annotations
 
@@ -10,8 +10,12 @@ import executive
 from executive.errors import InputError
 from executive.text.findings import Source, suggest_choice
 
-_MAX_FILE_SIZE = 1_000_000
-"""Maximum size of a mission or cell file [byte]."""
+MAX_TEXT_SIZE = 1_000_000
+"""Maximum size of a mission, a cell or another file that people write [byte]."""
+MAX_RECORD_SIZE = 10_000_000
+"""Maximum size of a file of a run that is read as a whole: tree, result, state of the world [byte]."""
+MAX_PIXEL_COUNT = 25_000_000
+"""Maximum number of pixels of an image file."""
 
 
 def is_outside_path(path_text: str) -> bool:
@@ -101,6 +105,25 @@ def find_file_below(folder: Path, reference: str, shipped_subfolders: Sequence[s
     raise InputError(f'there is no file "{reference}" in {folders}. {hint}')
 
 
+def read_file(path: Path, max_size: int = MAX_TEXT_SIZE) -> bytes:
+    """Return the content of a file of at most `max_size` [byte].
+
+    Raises:
+        InputError: The file is missing, a folder, a pipe or a device, too large, or cannot be read.
+    """
+    try:
+        # Opening a pipe would wait for a writer.
+        if os.path.exists(path) and not os.path.isfile(path):
+            raise InputError(f"{path} is {_describe_kind(path)}, not a file")
+        if path.stat().st_size > max_size:
+            raise InputError(f"{path} is larger than {max_size} bytes, the maximum size of such a file")
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"there is no file {path}") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read: {getattr(error, 'strerror', error)}") from None
+
+
 def read_source(path: Path) -> Source:
     """Return the text of a file.
 
@@ -108,18 +131,31 @@ def read_source(path: Path) -> Source:
         InputError: The file is missing, too large, or not UTF-8 text.
     """
     try:
-        if path.exists() and not path.is_file():
-            raise InputError(f"{path} is {_describe_kind(path)}, not a file")
-        if path.stat().st_size > _MAX_FILE_SIZE:
-            limit = f"{_MAX_FILE_SIZE} bytes, the maximum size of a mission or a cell"
-            raise InputError(f"{path} is larger than {limit}")
-        return Source(_shorten_path(path), path.read_bytes().decode("utf-8-sig"))
-    except FileNotFoundError:
-        raise InputError(f"there is no file {path}") from None
+        return Source(_shorten_path(path), read_file(path).decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not UTF-8 text: byte {error.start} is invalid") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}") from None
+
+
+def read_image_header(path: Path) -> tuple[tuple[int, int], bool]:
+    """Return width and height of the upright image, and True if the file contains upright RGB or grey pixels.
+
+    Raises:
+        InputError: The image cannot be read, or has more than `MAX_PIXEL_COUNT` pixels.
+    """
+    from PIL import ExifTags, Image  # The import takes 0.1 s, and missions name no images.
+
+    try:
+        with Image.open(path) as image:
+            width, height = image.size
+            if width * height > MAX_PIXEL_COUNT:
+                raise ValueError("it has too many pixels")
+            orientation = image.getexif().get(ExifTags.Base.Orientation, 1)
+            is_plain = orientation == 1 and image.mode in ("RGB", "L")
+    except Exception as error:  # Pillow raises errors of many types for damaged files.
+        advice = f"write a sound JPEG or PNG file of at most {MAX_PIXEL_COUNT} pixels"
+        raise InputError(f"the image {path} cannot be read; {advice}") from error
+    # The orientations 5 to 8 contain a quarter turn.
+    return ((height, width) if orientation in range(5, 9) else (width, height)), is_plain
 
 
 def _describe_kind(path: str | Path) -> str:

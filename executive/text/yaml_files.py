@@ -9,10 +9,12 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import yaml
 from pydantic import JsonValue
 
+from executive.errors import InputError
 from executive.text.findings import Finding, Source, Span, describe_value, make_error
 
 _MAX_DEPTH = 50
@@ -157,6 +159,20 @@ def parse_yaml(source: Source, text: str | None = None) -> tuple[YamlNode | None
     except _IncompleteTree:
         return None, composer.findings
     return root, composer.findings
+
+
+def load_yaml(source: Source, loader: type[yaml.SafeLoader | yaml.BaseLoader] = yaml.SafeLoader) -> Any:
+    """Return YAML text within the bounds of missions as plain values, as a loader of PyYAML converts them.
+
+    Raises:
+        InputError: The text is not valid YAML, or exceeds a bound.
+        YAMLError: The loader does not know a tag.
+    """
+    _, findings = parse_yaml(source)
+    for finding in findings:
+        if finding.code != "tag":
+            raise InputError(f"{source.path}:{finding.line}: {finding.message}")
+    return yaml.load(source.text, loader)
 
 
 class _IncompleteTree(Exception):

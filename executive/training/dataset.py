@@ -21,12 +21,14 @@ import cv2
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from PIL import ExifTags, Image
 from pydantic import BaseModel, ValidationError
 
 from executive.cell.frame import Box, Frame
 from executive.errors import InputError
 from executive.geometry import Array, Pose
+from executive.text.files import read_file, read_image_header
+from executive.text.findings import Source
+from executive.text.yaml_files import load_yaml
 
 ContentT = TypeVar("ContentT")
 
@@ -157,29 +159,13 @@ class DatasetEntry:
     truth: Mapping[str, Any] = field(default_factory=dict)
 
 
-def read_image_header(path: Path) -> tuple[tuple[int, int], bool]:
-    """Return width and height of the upright image, and True if the file contains upright RGB or grey pixels.
-
-    Raises:
-        InputError: The image cannot be read.
-    """
-    try:
-        with Image.open(path) as image:
-            orientation = image.getexif().get(ExifTags.Base.Orientation, 1)
-            width, height = image.size
-            is_plain = orientation == 1 and image.mode in ("RGB", "L")
-    except Exception as error:  # Pillow raises errors of many types for damaged files.
-        raise InputError(f"the image {path} cannot be read; write a sound JPEG or PNG file") from error
-    # The orientations 5 to 8 contain a quarter turn.
-    return ((height, width) if orientation in range(5, 9) else (width, height)), is_plain
-
-
 def read_image(path: Path) -> NDArray[np.uint8]:
     """Return an image file as `(H, W, 3)` uint8, RGB, turned upright by its EXIF orientation.
 
     Raises:
-        InputError: The image cannot be read.
+        InputError: The image cannot be read, or has too many pixels.
     """
+    read_image_header(path)
     image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if image is None:
         raise InputError(f"the image {path} cannot be read; is it missing or damaged?")
@@ -390,7 +376,7 @@ def read_class_file(file: Path) -> YoloFile:
     def parse(text: str) -> YoloFile:
         """Return the content; `BaseLoader` keeps a class name `no`, which YAML would convert to False."""
         if file.suffix in (".yaml", ".yml"):
-            return YoloFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader))
+            return YoloFile.model_validate(load_yaml(Source(str(file), text), yaml.BaseLoader))
         return YoloFile(names=[line.strip() for line in text.strip().splitlines()])
 
     return parse_file(file, MAX_CLASS_FILE_SIZE, parse)
@@ -405,14 +391,11 @@ def parse_file(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> C
     """
     try:
         return parse(read_text(file, max_size))
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise InputError(f"{file}:{line}: invalid YAML: {error.problem}") from error
     except ValidationError as error:
         problem = error.errors()[0]
         keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in problem["loc"])
         raise InputError(f"{file}: {keys.removeprefix('.') or 'content'}: {problem['msg']}") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{file} cannot be read: {error}") from error
 
 
@@ -422,13 +405,9 @@ def read_text(file: Path, max_size: int) -> str:
     Raises:
         InputError: The file is too large or cannot be read.
     """
-    if not os.path.isfile(file):
-        raise InputError(f"{file} is not a file")
-    if file.stat().st_size > max_size:
-        raise InputError(f"{file} has more than {max_size / 1e6:g} MB, the maximum for this kind of file")
+    content = read_file(file, max_size)
+    is_utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
-        content = file.read_bytes()
-        is_utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
         return content.decode("utf-16" if is_utf16 else "utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise InputError(f"{file} cannot be read: {error}") from error

@@ -15,7 +15,7 @@ from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
 
 from executive.errors import MAX_QUOTATION_LENGTH, InputError
 from executive.geometry import Array
-from executive.text.files import has_outside_link
+from executive.text.files import has_outside_link, read_image_header
 from executive.training import dataset
 from executive.training.dataset import DatasetEntry, LabelledImage
 
@@ -268,7 +268,7 @@ class LabelledDataset:
             raise InputError(f"{path} is not a file in {root}, or is a link to another folder")
         if len(labels) > MAX_OBJECT_COUNT:
             raise InputError(f"{path} has more than {MAX_OBJECT_COUNT} objects; divide the image")
-        size, _ = dataset.read_image_header(path)
+        size, _ = read_image_header(path)
         stated_size = stated_size[0] or size[0], stated_size[1] or size[1]
         if size != stated_size == size[::-1]:
             raise InputError(f"{path} has {size[0]} x {size[1]} pixels: it was turned after the export")

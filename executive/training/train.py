@@ -12,6 +12,7 @@ from jinja2 import Environment, StrictUndefined
 
 from executive.errors import InputError
 from executive.perception.detectors.rfdetr import read_labels
+from executive.text.files import read_image_header
 from executive.training import dataset, evaluate
 from executive.training.dataset import DatasetEntry
 from executive.training.evaluate import MODEL_NAME, EvaluatedDetector
@@ -129,7 +130,7 @@ def write_coco_dataset(splits: Mapping[str, LabelledDataset], folder: Path) -> l
     classes = list(dict.fromkeys([*splits["train"].classes, *splits["valid"].object_counts]))
     for split, images in splits.items():
         for index, (path, entry) in enumerate(images.annotations.items()):
-            _, is_plain = dataset.read_image_header(path)
+            _, is_plain = read_image_header(path)
             file = path.absolute()
             if not is_plain:
                 file = dataset.build_image_path(folder, "coco", split, f"{index}.png")

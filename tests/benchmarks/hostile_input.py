@@ -18,12 +18,15 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from random import Random
+from shutil import copytree
 
 import cv2
 import numpy as np
+from PIL import Image
 
 from executive.behaviours import load_skills
 from executive.cli.main import COMMANDS, main
@@ -69,16 +72,15 @@ MODEL_FILES = {
     "cell.yaml": (
         "cell: hostile\nbase: overhead.yaml\nobjects:\n  cube: {MODEL, height: 0.05, radius: 0.0354}\n"
     ),
-    "mission.yaml": (
-        "mission: hostile\ncell: cell.yaml\nroutes: {cube: red_bin, sphere: red_bin, duck: red_bin}\n"
-        "tree: [MoveToScan]\n"
-    ),
+    "mission.yaml": ("mission: hostile\ncell: cell.yaml\nroutes: {cube: red_bin}\ntree: [MoveToScan]\n"),
     "m.urdf": (
         "<robot name='r'><link name='l'><inertial><mass value='0.1'/><inertia ixx='1e-4' ixy='0' ixz='0' "
         "iyy='1e-4' iyz='0' izz='1e-4'/></inertial><visual><geometry><box size='0.05 0.05 0.05'/></geometry>"
         "</visual><collision><geometry><mesh filename='m.obj'/></geometry></collision></link></robot>\n"
     ),
-    "m.obj": "v 0 0 0\nv 0.05 0 0\nv 0 0.05 0\nv 0 0 0.05\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n",
+    "a.mtl": "newmtl a\nKd 1 1 1\nmap_Kd t.png\n",
+    "m.obj": "mtllib a.mtl\nusemtl a\ng a\n"
+    "v 0 0 0\nv 0.05 0 0\nv 0 0.05 0\nv 0 0 0.05\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n",
     "m.onnx": "model",
     "labels.txt": "cube\nsphere\nduck\n",
 }
@@ -95,8 +97,9 @@ def write_texts(rng: Random, folder: Path) -> Arguments:
     mission = rng.choice(sorted(MISSIONS.glob("*.yaml"))).read_text()
     cell = re.search(r"^cell: (\S+)$", mission, re.MULTILINE)
     names = ["mission.yaml", "mission.yaml", "library/sorting.yaml", *([cell[1]] if cell else [])]
-    name = rng.choice(names)
-    text = mission if name == "mission.yaml" else (MISSIONS / name).read_text()
+    name = rng.choice([*names, "pyproject.toml"])
+    texts = {"mission.yaml": mission, "pyproject.toml": (MISSIONS.parent / "pyproject.toml").read_text()}
+    text = texts.get(name) or (MISSIONS / name).read_text()
     (folder / "mission.yaml").write_text(mission)
     (folder / name).parent.mkdir(exist_ok=True)
     (folder / name).write_bytes(damage_text(rng, text))
@@ -126,9 +129,18 @@ def write_model(rng: Random, folder: Path) -> Arguments:
     if rng.random() < 0.2:
         with (folder / "cell.yaml").open("a") as cell:
             cell.write("detectors: {embedded: {kind: rfdetr, model_path: m.onnx, labels: labels.txt}}\n")
-    damage_file(rng, folder / rng.choice(("m.urdf", "m.obj", "m.obj", "m.onnx", "labels.txt")))
+    cv2.imwrite(str(folder / "t.png"), np.full((4, 4, 3), 120, np.uint8))
+    names = ("m.urdf", "m.obj", "m.obj", "a.mtl", "t.png", "m.onnx", "labels.txt")
+    damage_file(rng, folder / rng.choice(names))
     dataset = ["dataset", "cell.yaml", "--images", "1", "--workers", "1", "--out", "out"]
     return rng.choice((["check", "mission.yaml"], dataset))
+
+
+def write_record(run: Path, rng: Random, folder: Path) -> Arguments:
+    """Copy a run, damage a file of the copy, and return a command that reads it."""
+    copytree(run, folder / "run")
+    damage_file(rng, folder / "run" / rng.choice(("cell.yaml", "tree.json", "result.json", "mission.yaml")))
+    return [rng.choice(("report", "replay")), "run"]
 
 
 def write_odd_paths(rng: Random, folder: Path) -> Arguments:
@@ -189,14 +201,14 @@ def damage_text(rng: Random, text: str) -> bytes:
     )
     content = changed.encode(rng.choice(("utf-8",) * 4 + ("utf-16", "utf-8-sig", "latin-1")), "replace")
     if rng.random() < 0.1:
-        start = rng.randrange(len(content))
+        start = rng.randrange(len(content) + 1)
         content = content[:start] + rng.randbytes(rng.choice((1, 9, 1_000))) + content[start:]
     return content
 
 
 def damage_file(rng: Random, file: Path) -> None:
     """Change the content of a file, or put something else in its place."""
-    if rng.random() < 0.75 and file.is_file() and file.suffix != ".jpg":
+    if rng.random() < 0.75 and file.is_file() and file.suffix not in (".jpg", ".png"):
         text = file.read_text(errors="replace")
         file.write_bytes(damage_text(rng, text if re.search(r"\w", text) else "a"))
         return
@@ -210,6 +222,7 @@ def damage_file(rng: Random, file: Path) -> None:
             file.mkdir,
             lambda: file.symlink_to(rng.choice(("/etc/passwd", "nowhere", file.name, "../../other"))),
             lambda: file.write_bytes(rng.randbytes(min(size, 5_000))),
+            lambda: Image.new("1", (20_000, 20_000)).save(file, "png"),
             lambda: (file.touch(), os.truncate(file, size)),
             lambda: None,
         )
@@ -229,15 +242,19 @@ class CommandResult:
 
 
 def measure(texts: int = 5000, data_sets: int = 300, models: int = 300, seed: int = 0) -> Figures:
-    """Run commands with hostile missions, cells, libraries, data sets, models and paths."""
+    """Run commands with hostile missions, cells, libraries, data sets, models, paths and records."""
     for name in COMMANDS:
         import_module(f"executive.cli.{COMMANDS[name]}")
     load_skills()
+    runs = tempfile.TemporaryDirectory()  # The end of the function removes the folder.
+    run_fake = ["run", "sort_overhead", "--set", "cell.kind=fake", "--runs", "."]
+    run_in_child(lambda: main(run_fake), Path(runs.name), Path(runs.name))
     groups: list[tuple[str, int, Writer]] = [
         ("texts", texts, write_texts),
         ("data sets", data_sets, write_data_set),
         ("models", models // 2, write_model),
         ("paths", models - models // 2, write_odd_paths),
+        ("records", models, partial(write_record, next(Path(runs.name).glob("2*/*")))),
     ]
     rows: list[Figures] = []
     problems: list[str] = []

@@ -80,4 +80,4 @@ def test_what_has_no_report_is_refused_with_what_helps(run: Path) -> None:
         "writable folder, and write the report of the copy\n"
     )
     (run / "tree.json").unlink()
-    assert refused(str(run)) == f'cannot read the tree "{run / "tree.json"}": no such file or directory\n'
+    assert refused(str(run)) == f"there is no file {run / 'tree.json'}\n"

@@ -21,6 +21,7 @@ from executive.record.run_directory import (
     find_run,
     format_tree,
     make_dated_folder,
+    read_cell,
     read_mission_of_run,
     read_tree,
     write_atomically,
@@ -111,3 +112,23 @@ def test_a_tree_is_read_as_it_was_written_and_values_that_json_lacks_as_text(tmp
 def test_the_run_of_an_earlier_version_is_neither_replayed_nor_resumed(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="can be reported, but neither replayed nor resumed"):
         read_mission_of_run(tmp_path, replace(run_started(), format=3), load_skills())
+
+
+BOMB = "a0: &a0 x\n" + "".join(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]\n" for n in range(1, 9))
+
+
+@pytest.mark.parametrize(
+    ("read", "text", "error"),
+    [
+        (read_cell, BOMB, r"cell\.yaml:\d: the file has more than 20000 keys and values"),
+        (read_cell, " " * 1_000_001, r"cell\.yaml is larger than 1000000 bytes"),
+        (read_cell, "a: !!python/name:os.system ''", "could not determine a constructor for the tag"),
+        (lambda path: read_tree(path / "cell.yaml"), f"[{'0,' * 1_000_000}0]", "contains no tree of a run"),
+        (lambda path: read_tree(path / "pipe"), "", "pipe is a pipe or a device, not a file"),
+    ],
+)
+def test_files_of_a_run_are_read_within_bounds(tmp_path, read, text, error):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "cell.yaml").write_text(text)
+    with pytest.raises(InputError, match=error):
+        read(tmp_path)

@@ -15,7 +15,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pybullet
-import pybullet_data
 from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
@@ -27,7 +26,6 @@ from executive.geometry import Array, Pose
 from executive.physics import model_files
 from executive.physics.model_files import find_model, make_rotation
 from executive.processes import build_command
-from executive.text.files import get_shipped_folder
 from executive.text.validate import KeyPath
 
 DEFAULT_MESH_MASS = 0.05
@@ -146,11 +144,13 @@ def compute_mass(config: ObjectConfig) -> float:
     Raises:
         InputError: The mass in the URDF is missing, or out of range.
     """
-    if config.mass is not None or config.mesh:
+    if config.mesh:
         return config.mass or DEFAULT_MESH_MASS
     path = find_model(config.urdf)
     masses = model_files.read_urdf(path).iterfind(".//inertial/mass")
     mass = sum(sum(model_files.parse_numbers(path, mass, "value", (0.0,))) for mass in masses)
+    if config.mass is not None:
+        return config.mass
     if not MIN_MASS <= mass <= MAX_MASS:
         problem = f"the <inertial> of the model {path.name} has a mass of {mass:g} kg"
         raise InputError(f"{problem}; write {MIN_MASS:g} to {MAX_MASS:g} kg, or give the class a mass")
@@ -163,11 +163,10 @@ def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     A child process tries each model that is not shipped with the executive or PyBullet; this process reads
     the model afterwards, because reading may take very long.
     """
-    shipped_folders = (Path(pybullet_data.getDataPath()), get_shipped_folder() / "cells" / "fasteners")
     for label, object_config in config.objects.items():
         try:
             path = find_model(object_config.mesh or object_config.urdf)
-            if not any(path.is_relative_to(folder.resolve()) for folder in shipped_folders):
+            if not model_files.is_shipped(path):
                 _try_in_child_process(object_config, path, path.stat().st_mtime_ns)
             compute_mass(object_config)
             yield from _find_wrong_sizes(label, object_config)

@@ -29,6 +29,7 @@ from executive.perception.detectors.detector_registry import DetectorContext, De
 from executive.perception.detectors.envelope import is_measured
 from executive.perception.detectors.views import list_regions, remove_duplicates, search_regions
 from executive.processes import build_command
+from executive.text.files import read_file
 
 CHANNEL_MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)
 """Mean of ImageNet's images, for each channel, 0 to 1."""
@@ -196,8 +197,8 @@ def read_labels(path: Path) -> tuple[str, ...]:
         advice = "it needs one class name per line, in the order of the model"
         raise InputError(f"there is no label file {path}; {advice}")
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        lines = read_file(path).decode().splitlines()
+    except UnicodeDecodeError as error:
         raise InputError(f"the label file {path} cannot be read: {error}") from error
     names = tuple(line.strip() for line in lines if line.strip())
     if not names:

@@ -7,11 +7,12 @@ import re
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from executive.cell.config import ObjectConfig
 from executive.drivers.sim.models import compute_mass, load_mesh
 from executive.errors import InputError
-from executive.physics.model_files import find_model
+from executive.physics.model_files import find_arm_model_errors, find_model, read_mesh
 
 LEVELS = "".join(f"<!ENTITY a{number + 1} '{f'&a{number};' * 10}'>" for number in range(9))
 BOMB = f"<!DOCTYPE r [<!ENTITY a0 'ha'>{LEVELS}]><robot name='&a9;'/>"
@@ -31,9 +32,9 @@ BOMB = f"<!DOCTYPE r [<!ENTITY a0 'ha'>{LEVELS}]><robot name='&a9;'/>"
 )
 def test_a_file_that_is_no_urdf_is_an_error(content: str, error: str, tmp_path: Path) -> None:
     (tmp_path / "m.urdf").write_text(content)
-    config = ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03)
+    config = ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03, mass=0.1)
     with pytest.raises(InputError, match=re.escape(error)):
-        compute_mass(config)
+        compute_mass(config)  # also if the cell file states the mass
 
 
 @pytest.mark.parametrize("mesh", ["/etc/x.obj", "../x.obj", "link.obj", "file:///etc/x.obj", "http://x.obj"])
@@ -69,3 +70,33 @@ def test_a_model_of_more_than_20_megabytes_is_not_read(tmp_path: Path) -> None:
         file.truncate(20_000_001)
     with pytest.raises(InputError, match=r"m\.obj is larger than 20 MB$"):
         find_model(str(tmp_path / "m.obj"))
+
+
+@pytest.mark.parametrize(
+    ("mesh", "material", "error"),
+    [
+        ("mtllib pipe", "", r"there is no model .*/pipe, neither"),
+        (" mtllib /etc/passwd", "", 'm.obj names the file "/etc/passwd", which is outside'),
+        ("mtllib a.mtl", "map_Kd pipe", r"there is no model .*/pipe, neither"),
+        ("mtllib a.mtl", "\tmap_Kd zero", 'a.mtl names the file "zero", which is outside'),
+        ("mtllib a.mtl", "map_Kd m.obj", r"m\.obj cannot be read; write a sound JPEG or PNG"),
+        ("mtllib a.mtl", "map_Kd large.png", "large.png cannot be read; .* of at most 25000000 pixels"),
+        ("mtllib a.mtl", "".join(f"map_Kd {n}\n" for n in range(101)), "a.mtl names more than 100 files"),
+        ("g 1\n" * 1001, "", "it has more than 1000 groups"),
+    ],
+)
+def test_the_materials_and_textures_of_a_mesh_are_checked_like_the_mesh(mesh, material, error, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    Image.new("1", (5001, 5000)).save(tmp_path / "large.png")
+    (tmp_path / "a.mtl").write_text(material)
+    (tmp_path / "m.obj").write_text(f"{mesh}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(InputError, match=error):
+        read_mesh(tmp_path / "m.obj")
+
+
+def test_a_damaged_mesh_of_an_arm_is_an_error(overhead, tmp_path):
+    (tmp_path / "c.stl").write_bytes(b"damaged")
+    (tmp_path / "arm.urdf").write_text("<robot><collision><mesh filename='c.stl'/></collision></robot>")
+    arm = overhead.arm.model_copy(update={"urdf": str(tmp_path / "arm.urdf")})
+    assert "the model c.stl is no STL mesh" in next(find_arm_model_errors(arm))[1]
