@@ -33,6 +33,8 @@ else:
 
 DISTRIBUTION = "pick-place-executive"
 """Name of the distribution of this project; `executive` in the package index is another project."""
+MAX_PROJECT_LENGTH = 100_000
+"""Maximum length of a pyproject.toml [characters]; a command reads the file several times."""
 MAX_DOT_COUNT = 5_000
 """Maximum number of dots in a pyproject.toml."""
 CLASS_PATH = re.compile(r"\w+(\.\w+)*:\w+(\.\w+)*")
@@ -209,8 +211,8 @@ def _read_project(file: Path) -> Project:
     """Return the project with the given pyproject.toml."""
     text = read_source(file).text
     # The time of the parser grows with the square of the number of parts of a dotted key.
-    if text.count(".") > MAX_DOT_COUNT:
-        raise InputError(f"{file} contains more than {MAX_DOT_COUNT} dots; the file registers plugins")
+    if len(text) > MAX_PROJECT_LENGTH or text.count(".") > MAX_DOT_COUNT:
+        raise InputError(f"{file} has more than {MAX_PROJECT_LENGTH} characters or {MAX_DOT_COUNT} dots")
     try:
         content = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:

@@ -18,10 +18,7 @@ import numpy as np
 
 from executive.errors import Fault, InputError, describe_os_error, explain_os_errors
 from executive.motion.trajectory import Trajectory
-from executive.text.files import read_file
-
-MAX_LOG_SIZE = 100_000_000
-"""Maximum size of a log [byte]; the log of a run of 2,000 objects has 1 MB."""
+from executive.text.files import MAX_RECORD_SIZE, read_file
 
 
 class LogFile:
@@ -155,7 +152,7 @@ def read_commands(path: Path) -> Iterator[Command]:
 
 
 def _read_complete_lines(path: Path) -> bytes:
-    content = read_file(path, MAX_LOG_SIZE)
+    content = read_file(path, 10 * MAX_RECORD_SIZE)
     if not content.startswith(FILE_HEADER):
         header = FILE_HEADER.decode().strip()
         raise InputError(f'"{path}" is no log of a world: it does not begin with "{header}"')

@@ -34,9 +34,8 @@ MAX_MODEL_SIZE = 20_000_000
 MAX_TRIANGLE_COUNT = 20_000
 """Maximum number of triangles of a mesh: a collision in PyBullet takes 3 s with 20,000, 60 s with 300,000."""
 MAX_GROUP_COUNT = 1_000
-"""Maximum number of groups and objects of a Wavefront file, of each of which PyBullet makes a convex hull."""
-MAX_FILE_NAME_COUNT = 100
-"""Maximum number of files that a Wavefront or material file may name."""
+"""Maximum number of groups and objects of a Wavefront file, of each of which PyBullet makes a convex hull,
+and of the files that a Wavefront or material file names."""
 FIXED_JOINTS = "joint[@type='fixed'][parent]"
 """Path of the fixed joints of a URDF."""
 _NAMED_FILE = re.compile(r"^\s*(?:mtllib|map_\w+|bump|disp|decal|refl)\s+(.*\S)", re.MULTILINE)
@@ -307,8 +306,8 @@ def _list_named_files(path: Path, pattern: bytes) -> Iterator[Path]:
     PyBullet opens these files; it leaves out missing materials and textures.
     """
     names = set(re.findall(rb"(?m)^[ \t]*" + pattern, path.read_bytes()))
-    if len(names) > MAX_FILE_NAME_COUNT:
-        raise InputError(f"the model {path.name} names more than {MAX_FILE_NAME_COUNT} files; join them")
+    if len(names) > MAX_GROUP_COUNT:
+        raise InputError(f"the model {path.name} names more than {MAX_GROUP_COUNT} files; join them")
     for name in map(os.fsdecode, map(bytes.strip, sorted(names))):
         if os.path.lexists(path.parent / name):
             yield find_model(str(path.parent / _normalize_name(path, name)))

@@ -60,6 +60,8 @@ YOLO_CLASS_FILES = ("data.yaml", "data.yml", "dataset.yaml", "classes.txt", "obj
 """Names of the file with the class names of a YOLO dataset: YAML, or one name per line."""
 MAX_CLASS_FILE_SIZE = 100_000
 """Maximum size of a YOLO class file [byte]."""
+MAX_CONTAINER_COUNT = 1_000_000
+"""Maximum number of lists and mappings of a file, about 4 per object; each takes 0.3 kB while it is read."""
 MAX_LABEL_FILE_SIZE = 10_000_000
 """Maximum size of a YOLO label file, or of a text file with the paths of images [byte]."""
 
@@ -389,8 +391,13 @@ def parse_file(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> C
         InputError: The file is too large, cannot be read, is invalid, or lacks a required key; the message
             names the line or the key.
     """
+    text = read_text(file, max_size)
+    if text.count("[") + text.count("{") > MAX_CONTAINER_COUNT:
+        raise InputError(
+            f"{file} contains more than {MAX_CONTAINER_COUNT} lists and mappings; divide the dataset"
+        )
     try:
-        return parse(read_text(file, max_size))
+        return parse(text)
     except ValidationError as error:
         problem = error.errors()[0]
         keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in problem["loc"])

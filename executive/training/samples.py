@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter
+from pydantic import BaseModel, FailFast, Field, FiniteFloat, TypeAdapter
 
 from executive.errors import MAX_QUOTATION_LENGTH, InputError
 from executive.geometry import Array
@@ -89,9 +89,9 @@ class _CocoCategory(BaseModel):
 class _CocoFile(BaseModel):
     """The keys of a COCO file that are read."""
 
-    images: list[_CocoImage]
-    annotations: list[_CocoObject]
-    categories: list[_CocoCategory]
+    images: Annotated[list[_CocoImage], FailFast()]
+    annotations: Annotated[list[_CocoObject], FailFast()]
+    categories: Annotated[list[_CocoCategory], FailFast()]
 
 
 class LabelledDataset:

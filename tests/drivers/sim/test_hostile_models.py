@@ -81,7 +81,7 @@ def test_a_model_of_more_than_20_megabytes_is_not_read(tmp_path: Path) -> None:
         ("mtllib a.mtl", "\tmap_Kd zero", 'a.mtl names the file "zero", which is outside'),
         ("mtllib a.mtl", "map_Kd m.obj", r"m\.obj cannot be read; write a sound JPEG or PNG"),
         ("mtllib a.mtl", "map_Kd large.png", "large.png cannot be read; .* of at most 25000000 pixels"),
-        ("mtllib a.mtl", "".join(f"map_Kd {n}\n" for n in range(101)), "a.mtl names more than 100 files"),
+        ("mtllib a.mtl", "".join(f"map_Kd {n}\n" for n in range(1001)), "a.mtl names more than 1000 files"),
         ("g 1\n" * 1001, "", "it has more than 1000 groups"),
     ],
 )

@@ -31,8 +31,6 @@ MAX_ANSWER_LENGTH = 1 << 20
 """Maximum number of characters of an answer, about 20 times the length of 300 predictions."""
 MAX_BODY_SIZE = 8 << 20
 """Maximum size of the body of an HTTP response [byte], compressed or not; workflows also return images."""
-CHUNK_SIZE = 1 << 16
-"""Number of bytes of a response that are read at once."""
 MAX_DETAIL_LENGTH = 10_000
 """Maximum number of characters of the message of an error."""
 
@@ -142,19 +140,17 @@ def _bound_responses(url: str) -> None:
 
 def _read_body(response: Any) -> bytearray | bytes:
     """Return the decompressed body of a response of urllib3; raise ValueError above `MAX_BODY_SIZE`."""
-    problem = f"an answer of more than {MAX_BODY_SIZE} bytes"
     body = bytearray()
-    while chunk := response.read(CHUNK_SIZE, decode_content=False):
+    while chunk := response.read(1 << 16, decode_content=False):
         body += chunk
         if len(body) > MAX_BODY_SIZE:
-            response.close()
-            raise ValueError(problem)
+            raise ValueError(f"an answer of more than {MAX_BODY_SIZE} bytes")
     if response.headers.get("Content-Encoding", "identity") == "identity":
         return body
     decoder = zlib.decompressobj(wbits=zlib.MAX_WBITS | 32)  # The number 32 selects the format by its header.
     content = decoder.decompress(body, MAX_BODY_SIZE)
     if not decoder.eof:
-        raise ValueError(f"{problem}, or an incomplete one")
+        raise ValueError(f"an answer of more than {MAX_BODY_SIZE} bytes, or an incomplete one")
     return content
 
 
