@@ -252,7 +252,7 @@ def _normalize_name(urdf: Path, name: str) -> str:
     """Return a file name without `package://NAME/`, `file://` etc., relative to the URDF's folder.
 
     Raises:
-        InputError: The file is outside of the folder.
+        InputError: The file is outside of the folder and of the shipped folders.
     """
     scheme, path = re.findall(r"^(?:(\w+):(?://)?)?(.*)", name)[0]
     if scheme in ("package", "model") and not (urdf.parent / path).exists():
@@ -260,7 +260,7 @@ def _normalize_name(urdf: Path, name: str) -> str:
     if os.path.isabs(path):
         path = os.path.relpath(os.path.realpath(unquote(path) if scheme else path), urdf.parent)
     is_foreign = scheme not in ("", "file", "package", "model") or is_outside_path(path)
-    if is_foreign or has_outside_link(urdf.parent, path):
+    if not is_shipped((urdf.parent / path).resolve()) and (is_foreign or has_outside_link(urdf.parent, path)):
         problem = f'the model {urdf.name} names the file "{name}", which is outside of its folder'
         raise InputError(f"{problem}; copy the file into the folder, and name it without a folder")
     return path
