@@ -231,21 +231,37 @@ def list_model_files(model: Path) -> list[Path]:
     """Return a URDF or mesh, and the existing files that it names: meshes, materials and textures.
 
     Raises:
-        InputError: A URDF is invalid, or a file is outside of the folder of the file that names it.
+        InputError: A URDF is invalid, or `list_named_files` raises the error.
     """
     files = [model]
     for path in files:  # The loop goes on with the files that it appends.
-        find_model(str(path.absolute()))  # It limits the size.
-        values: list[str] = []
-        if path.suffix.lower() in (".obj", ".mtl"):
-            values = _NAMED_FILE.findall(path.read_text(encoding="utf-8", errors="replace"))
-        elif path.suffix.lower() == ".urdf":
-            values = [element.attrib["filename"] for element in read_robot(path).findall(".//*[@filename]")]
-        # Options of a material may precede the name.
-        names = [name for value in values for name in dict.fromkeys((value, *value.split()[-1:]))]
-        named_files = [path.parent / _normalize_name(path, name) for name in names]
-        files += [file for file in dict.fromkeys(named_files) if file.is_file() and file not in files]
+        files += [file for file in list_named_files(path) if file not in files]
     return files
+
+
+def list_named_files(path: Path) -> list[Path]:
+    """Return the existing files that a URDF, a Wavefront or a material file names.
+
+    PyBullet opens these files; it leaves out missing materials and textures.
+
+    Raises:
+        InputError: The file names too many files, or one that is too large, no regular file, or outside of
+            its folder.
+    """
+    values: list[str] = []
+    if path.suffix.lower() in (".obj", ".mtl"):
+        values = _NAMED_FILE.findall(path.read_text(encoding="utf-8", errors="surrogateescape"))
+    elif path.suffix.lower() == ".urdf":
+        values = [element.attrib["filename"] for element in read_robot(path).findall(".//*[@filename]")]
+    # Options of a material may precede the name.
+    names = dict.fromkeys(name for value in values for name in (value, *value.split()[-1:]))
+    if len(names) > MAX_GROUP_COUNT:
+        raise InputError(f"the model {path.name} names more than {MAX_GROUP_COUNT} files; join them")
+    named_files = [path.parent / _normalize_name(path, name) for name in names]
+    existing_files = [file for file in dict.fromkeys(named_files) if os.path.lexists(file)]
+    for file in existing_files:
+        find_model(str(file.absolute()))
+    return existing_files
 
 
 def _normalize_name(urdf: Path, name: str) -> str:
@@ -294,23 +310,10 @@ def read_mesh(path: Path, max_triangle_count: float = MAX_TRIANGLE_COUNT) -> Tri
         problem = f"the model {path.name} has more than {max_triangle_count} triangles"
         raise InputError(f"{problem}; simplify the mesh")
     if suffix == ".obj":
-        for material in _list_named_files(path, rb"mtllib[ \t]+(\S+)"):
-            for texture in _list_named_files(material, rb"map_Kd[ \t](.*)"):
+        for material in list_named_files(path):
+            for texture in list_named_files(material):
                 read_image_header(texture)
     return points, faces
-
-
-def _list_named_files(path: Path, pattern: bytes) -> Iterator[Path]:
-    """Yield the existing files in the lines of a Wavefront or material file that match `pattern`.
-
-    PyBullet opens these files; it leaves out missing materials and textures.
-    """
-    names = set(re.findall(rb"(?m)^[ \t]*" + pattern, path.read_bytes()))
-    if len(names) > MAX_GROUP_COUNT:
-        raise InputError(f"the model {path.name} names more than {MAX_GROUP_COUNT} files; join them")
-    for name in map(os.fsdecode, map(bytes.strip, sorted(names))):
-        if os.path.lexists(path.parent / name):
-            yield find_model(str(path.parent / _normalize_name(path, name)))
 
 
 def _read_wavefront(path: Path) -> tuple[ArrayLike, ArrayLike]:
