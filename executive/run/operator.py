@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import select
 import signal
 import sys
@@ -13,7 +14,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, nullco
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
-from executive.errors import InputError, Interrupted, Stopped, TickOverdue
+from executive.errors import InputError, Interrupted, Stopped, TickOverdue, shorten_quotations
 
 if TYPE_CHECKING:
     from executive.events import Emit
@@ -205,6 +206,11 @@ RESCAN = "rescan"
 """Request for a new scan of the table."""
 KEYBOARD_POLL_PERIOD = 0.1
 """Period at which `TerminalOperator` checks for requests in a browser and for a stop of the run [s]."""
+MAX_LINE_LENGTH = 1000
+"""Length of a line of standard input behind which the rest of the line is ignored [byte]; longer than every
+request, so that a cut line is an invalid request."""
+MAX_READ_SIZE = 65536
+"""Maximum number of bytes that are read from standard input at once."""
 
 
 class ScriptedOperator:
@@ -239,6 +245,8 @@ class ScriptedOperator:
 class TerminalOperator:
     """Operator at the terminal; the clock of the run stands still until the operator answers a question.
 
+    Each line of standard input answers one question, also if several lines arrive together.
+
     Args:
         emit: Function that emits an event.
         control: Control of the run, which also passes requests from other sources, such as a browser.
@@ -249,6 +257,8 @@ class TerminalOperator:
         self._emit = emit
         self._control = control
         self._has_keyboard = has_keyboard
+        self._input = b""
+        """Start of the input that no question has used."""
 
     def ask(self, choices: Sequence[str]) -> str | None:
         """Ask for a request; return a class, `rescan`, or None for `q` or the end of the input.
@@ -273,7 +283,7 @@ class TerminalOperator:
             if request != "":
                 self._emit(RequestGiven(request))
                 return request
-            sys.stderr.write(f'cannot pick "{line.strip()}"\n')
+            sys.stderr.write(shorten_quotations(f'cannot pick "{line.strip()}"\n'))
 
     def _read_line(self) -> str:
         """Wait for the next request, and return its text; "" if the input of the terminal has ended."""
@@ -282,10 +292,19 @@ class TerminalOperator:
                 sys.stderr.write("\n" if self._has_keyboard else "")
                 # An empty text would mean the end of the input.
                 return text or "?"
+            line, line_end, rest = self._input.partition(b"\n")
+            if line_end:
+                self._input = rest
+                return line[:MAX_LINE_LENGTH].decode(errors="replace") + "\n"
             if not self._has_keyboard:
                 time.sleep(KEYBOARD_POLL_PERIOD)
+            # `select` does not see what an object such as `sys.stdin` has read into its buffer.
             elif select.select([sys.stdin], [], [], KEYBOARD_POLL_PERIOD)[0]:
-                return sys.stdin.readline()
+                data = os.read(sys.stdin.fileno(), MAX_READ_SIZE)
+                self._input = line[:MAX_LINE_LENGTH] + data
+                if not data:
+                    self._input = b""
+                    return line.decode(errors="replace")
         raise Stopped("the run was stopped before a request of the operator")
 
 
@@ -299,6 +318,7 @@ def parse_request(text: str, choices: Sequence[str]) -> str | None:
         return None
     if text in ("s", RESCAN):
         return RESCAN
-    if text.isdecimal() and int(text) < len(choices):
-        return choices[int(text)]
+    numbers = [str(number) for number in range(len(choices))]
+    if text in numbers:
+        return choices[numbers.index(text)]
     return next((label for label in choices if label.lower() == text), "")

@@ -7,6 +7,7 @@ import io
 import os
 import signal
 import threading
+import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ CHOICES = ("cube", "sphere", "duck")
     ("word", "meaning"),
     [
         ("0", "cube"), ("2", "duck"), ("DUCK", "duck"), ("S", "rescan"), ("rescan", "rescan"), ("q", None),
-        ("Quit", None), ("3", ""), ("-1", ""), ("banana", ""), ("", ""), ("²", ""),
+        ("Quit", None), ("3", ""), ("-1", ""), ("banana", ""), ("", ""), ("²", ""), ("1" * 5000, ""),
     ],
 )  # fmt: skip
 def test_what_a_word_means(word: str, meaning: str | None) -> None:
@@ -81,6 +82,32 @@ def test_the_terminal_lists_the_classes_and_takes_numbers_and_names(
     assert TerminalOperator(heard, RunControl()).ask(CHOICES) == meant
     assert capsys.readouterr().err == "pick what?  0 cube  1 sphere  2 duck  s rescan  q quit > "
     assert heard == [OperatorAsked([*CHOICES]), RequestGiven(meant)]
+
+
+def test_each_line_of_a_pipe_answers_one_question_at_once(type_in: Any) -> None:
+    type_in("duck\n\n0\n" + "x" * 50_000 + "\n1\ncube", closed=True)
+    operator = TerminalOperator(Heard(), RunControl())
+    assert [operator.ask(CHOICES) for _ in range(6)] == ["duck", "cube", "sphere", "cube", None, None]
+
+
+def test_a_line_without_end_is_neither_kept_nor_a_request(monkeypatch: pytest.MonkeyPatch) -> None:
+    reading, writing = os.pipe()
+
+    def write() -> None:
+        with open(writing, "wb") as keyboard:
+            for _ in range(200):
+                keyboard.write(b"duck" * 25_000)
+            keyboard.write(b"\nsphere\n")
+
+    writer = threading.Thread(target=write)
+    with open(reading) as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        writer.start()
+        tracemalloc.start()
+        assert TerminalOperator(Heard(), RunControl()).ask(CHOICES) == "sphere"
+        assert tracemalloc.get_traced_memory()[1] < 1_000_000, "the line has 20 MB"
+        tracemalloc.stop()
+        writer.join()
 
 
 @pytest.mark.parametrize("keyboard", [True, False])
